@@ -222,9 +222,19 @@ Contact::TouchingComponents Contact::touching_components() const {
   for (const Touching& t : set_) {
     out.which[at(model.component_of_edge(t.pair.key.a))] = true;
     if (t.pair.key.b >= 0) out.which[at(model.component_of_edge(t.pair.key.b))] = true;
-    out.obstacle = out.obstacle || t.pair.key.b < 0;
+    if (t.pair.key.b >= 0) continue;
+    const Vec3d velocity = problem_.velocity_of(t.pair);
+    const auto same = [&](const Vec3d& other) { return dot(velocity - other, velocity - other) == 0.0; };
+    if (std::none_of(out.obstacles.begin(), out.obstacles.end(), same)) out.obstacles.push_back(velocity);
   }
   return out;
+}
+
+void Contact::leave_obstacles(State& state) const {
+  if (!target_.empty()) state.obstacles = target_;
+  const bool moves = !problem_.velocity.empty() && problem_.pressing != Pressing::still;
+  for (std::size_t o = 0; o < state.obstacles.size(); ++o)
+    state.obstacles[o].velocity = moves ? problem_.velocity[o] : Vec3d{};
 }
 
 void Contact::predict_friction(const VectorX& change, ContactLinearisation& linearisation) const {

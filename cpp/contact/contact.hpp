@@ -117,7 +117,7 @@ class Contact {
   /// Which connected components touch anything, and whether that is an obstacle.
   struct TouchingComponents {
     std::vector<bool> which;
-    bool obstacle = false;
+    std::vector<Vec3d> obstacles;  ///< velocities in the step of those that are touched, which all differ [m/s]
   };
   TouchingComponents touching_components() const;
   /// Takes from a predicted change of q what would move surfaces that stick: friction is steep there, and from outside
@@ -147,9 +147,7 @@ class Contact {
   void move_obstacles();
   void lag_friction();
   /// Notes in a state that obstacles have come to where they were to go.
-  void leave_obstacles(State& state) const {
-    if (!target_.empty()) state.obstacles = target_;
-  }
+  void leave_obstacles(State& state) const;
 
   Surfaces surfaces_;
   ContactParameters parameters_;

@@ -134,6 +134,7 @@ void add_lagged_friction(const ContactProblem& problem, const Touching& t, const
   ByStart moved[kContactUnknowns], multiplied[kContactUnknowns];
   for (int i = 0; i < kContactUnknowns; ++i) {
     moved[i] = t.now[i] - start.unknown[i];
+    if (i >= 12 && f.finite_turns) moved[i] = finite_turn(moved[i]);
     multiplied[i] = rows[i];
   }
   const Vec3<ByStart> slip = start_slip(f, c, moved) - (shift - dot(shift, c.normal) * c.normal);

@@ -78,6 +78,7 @@ FrictionSetting friction_setting(const ContactProblem& problem, const Touching& 
   f.pressing = t.law;
   f.before = t.before;
   f.middle = pair.key.b >= 0 && problem.turns(pair);
+  f.finite_turns = problem.finite_turns();
   f.law = contact.friction_law;
   f.tangential_stiffness = anchor_stiffness(pair, kind, t.stiffness);
   f.rate = slip_rate(problem, regularisation);

@@ -117,6 +117,8 @@ struct ContactProblem {
     const FrictionLaw law = model.description.contact.friction_law;
     return law == FrictionLaw::lagged || law == FrictionLaw::semi_explicit;
   }
+  /// Whether edges spin by the rates of finite rotations, as in energy-momentum steps.
+  bool finite_turns() const { return pressing == Pressing::mean_direction; }
   /// Whether the Jacobian of friction is unsymmetric.
   bool unsymmetric() const { return frictional() && !lags(); }
   bool anchored() const { return description().friction_law == FrictionLaw::anchored; }

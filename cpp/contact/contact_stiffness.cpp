@@ -347,9 +347,10 @@ void ContactStiffness::renew(ContactSet& start, std::vector<ContactRecord>& reco
   for (int i = 0; i < start.count(); ++i) {
     const Touching& t = start[i];
     ContactRecord record;
-    bool drawn = false;
+    bool drawn = false, struck = false;
     if (const ContactRecord* known = find_record(problem_.start->contacts, t.pair.key, at_start)) {
-      if (known->approach == 0.0) continue;  // they rest until they have left each other
+      struck = known->approach == 0.0;
+      if (struck && !is_struck(t.pair)) continue;  // they rest until they have left each other
       record = *known;
     } else {
       record.key = t.pair.key;
@@ -359,7 +360,7 @@ void ContactStiffness::renew(ContactSet& start, std::vector<ContactRecord>& reco
       drawn = begins && begins_at_rest(t, record);
       if (drawn) start.renew(problem_, i, record);
     }
-    const bool anew = !still && begins_anew(t, record);
+    const bool anew = !still && begins_anew(t, struck, record);
     if (!drawn && !anew) continue;
     if (anew) start.renew(problem_, i, record);
     records.push_back(record);
@@ -382,10 +383,10 @@ bool ContactStiffness::begins_at_rest(const Touching& t, ContactRecord& record) 
 /// be hit by more than the impact that is not yet over. The speed at which they near each other is then that of another
 /// impact, which is on its way in while its age is 0: for it contact is as stiff as if it only began, without a change
 /// of energy.
-bool ContactStiffness::begins_anew(const Touching& t, ContactRecord& record) const {
+bool ContactStiffness::begins_anew(const Touching& t, bool struck, ContactRecord& record) const {
   const ContactPair& pair = t.pair;
   double speed = approach_speed(problem_, pair);
-  if (record.approach == 0.0) {
+  if (record.approach == 0.0 && !struck) {
     const double given =
         0.5 * speed * speed + problem_.parameters->gravity * std::max(t.proximity.distance - pair.radii(), 0.0);
     if (!(t.energy.value < pair.share * problem_.mass_of(pair) * given)) return false;
@@ -405,6 +406,14 @@ bool ContactStiffness::begins_anew(const Touching& t, ContactRecord& record) con
   record.stick = (1.0 / std::sqrt(ratio)) * record.stick;
   record.roll = (1.0 / std::sqrt(ratio)) * record.roll;
   return true;
+}
+
+/// Whether the obstacle that a rod rests on jumps to a velocity at which it strikes the rod.
+bool ContactStiffness::is_struck(const ContactPair& pair) const {
+  if (pair.key.b >= 0 || problem_.velocity.empty()) return false;
+  const Vec3d jump = problem_.velocity_of(pair) - problem_.start->obstacles[at(-1 - pair.key.b)].velocity;
+  const double rest = rest_speed(problem_, pair);
+  return dot(jump, jump) > rest * rest && approach_speed(problem_, pair) > rest;
 }
 
 }  // namespace withe

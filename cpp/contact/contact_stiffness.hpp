@@ -54,7 +54,8 @@ class ContactStiffness {
 
  private:
   bool begins_at_rest(const Touching& t, ContactRecord& record) const;
-  bool begins_anew(const Touching& t, ContactRecord& record) const;
+  bool begins_anew(const Touching& t, bool struck, ContactRecord& record) const;
+  bool is_struck(const ContactPair& pair) const;
   ContactRecord record(const Touching& t) const;
   void finish(const ContactSet& set, std::vector<ContactRecord>& records) const;
   double yielded_at(const Touching& t, double ratio, Keep keep) const;

@@ -8,7 +8,9 @@
 /// weights, and phi is that of both edges in the shares 1/2 - s and 1/2 + s. The force F on S goes back through the
 /// same J, so its work, F . S, is never negative, whatever the integrator. Under the midpoint rules t, |e| and the way
 /// between two rods, which r_b - r_a is, are those in the middle of the step: a rotation of both rods there is no slip,
-/// and so friction leaves their angular momentum as it is.
+/// and so friction leaves their angular momentum as it is. In energy-momentum steps theta - theta^0 becomes the angle
+/// by which moments about an edge do work there, 2 tan((theta - theta^0) / 2) over (t^0 + t^1) . t / 2, t in the
+/// middle.
 ///   implicit, lagged: F = mu N tanh(K |S| / (2 dt)) S / |S|, K = 15 / nu [Choi, dissertation, (5.7)-(5.14),
 ///                     there between centrelines]
 ///   anchored:         F = k_t (stick + S), of length mu N at most: an elastic stick that slips [Simo and Hughes 1998]
@@ -28,6 +30,7 @@
 #include "common/dual.hpp"
 #include "contact/pressing_law.hpp"
 #include "contact/surfaces.hpp"
+#include "geometry/finite_turn.hpp"
 #include "geometry/segment_distance.hpp"
 
 namespace withe {
@@ -43,8 +46,9 @@ struct FrictionSetting {
   double start[kContactUnknowns] = {};           ///< unknowns at the start of the step
   Vec3d source[2];                               ///< tangents that the frames of a and b are transported from
   PressingLaw pressing;
-  double before = 0;    ///< distance at the start [m]
-  bool middle = false;  ///< edges turn, on their arms, as they stand in the middle of the step
+  double before = 0;          ///< distance at the start [m]
+  bool middle = false;        ///< edges turn, on their arms, as they stand in the middle of the step
+  bool finite_turns = false;  ///< edges spin as in energy-momentum steps
   FrictionLaw law = FrictionLaw::implicit;
   double tangential_stiffness = 0;  ///< of an anchor [N/m]
   double rate = 0;                  ///< K / (2 dt) [1/m]
@@ -193,6 +197,7 @@ struct SlippingEdge {
   Vec3<Scalar> tangent, arm;  ///< where the edge turns
   Vec3<Scalar> turn;          ///< phi
   Vec3<Scalar> spin{};        ///< of the frame, by the edge [1/m]
+  Scalar angle{};             ///< by which it has turned about itself [rad]
   Scalar inverse;             ///< of the length there [1/m]
 };
 
@@ -299,6 +304,39 @@ void direct_friction(const FrictionSetting& f, SlippingSurfaces<Scalar>& c) {
       Scalar(pair.across) * c.plain + (Scalar(pair.along - pair.across) * dot(c.along, c.plain)) * c.along;
 }
 
+/// What of an edge's direction in the middle of the step lies along the mean of those at its ends.
+template <class Scalar>
+Scalar mean_along_middle(const SlippingEdge<Scalar>& side) {
+  using std::sqrt;
+  const Vec3<Scalar> start = side.edge - side.change, middle = start + side.edge;
+  const Vec3<Scalar> mean =
+      (0.5 / sqrt(dot(start, start))) * start + (0.5 / sqrt(dot(side.edge, side.edge))) * side.edge;
+  return dot(mean, middle) / sqrt(dot(middle, middle));
+}
+
+/// The angle by which the spin of an edge does work in an energy-momentum step, whose rates are those of its finite
+/// rotation (inertia.cpp): on another, what rolls would gain energy.
+template <class Scalar>
+Scalar working_turn(const SlippingEdge<Scalar>& side) {
+  return finite_turn(side.angle) / mean_along_middle(side);
+}
+
+/// Its derivatives by the angle, and by the edge.
+struct WorkingTurnSlopes {
+  double angle = 1.0;
+  Vec3d edge{};
+};
+inline WorkingTurnSlopes working_turn_slopes(const SlippingEdge<double>& side) {
+  using Slope = Dual<1>;
+  const Slope turn = finite_turn(Slope::unknown(side.angle, 0));
+  SlippingEdge<Dual<3>> moving;
+  moving.edge = {Dual<3>::unknown(side.edge.x, 0), Dual<3>::unknown(side.edge.y, 1), Dual<3>::unknown(side.edge.z, 2)};
+  const Vec3d start = side.edge - side.change;
+  moving.change = moving.edge - Vec3<Dual<3>>{Dual<3>(start.x), Dual<3>(start.y), Dual<3>(start.z)};
+  const Dual<3> inverse = 1.0 / mean_along_middle(moving);
+  return {turn.slope[0] * inverse.value, turn.value * Vec3d{inverse.slope[0], inverse.slope[1], inverse.slope[2]}};
+}
+
 /// How far the surfaces have slipped from `start`, and the friction on that.
 template <class Scalar>
 SlippingSurfaces<Scalar> slipping_surfaces(const FrictionSetting& f, const SlipStart<Scalar>& start,
@@ -329,7 +367,8 @@ SlippingSurfaces<Scalar> slipping_surfaces(const FrictionSetting& f, const SlipS
     side.arm = curve ? piece_arm(*f.pair, b, c.s, c.normal) : contact_arm(*f.pair, b, c.lever);
     side.turn = side.inverse * cross(side.tangent, side.change);
     if (f.spatial) {
-      side.turn += (unknown[12 + b] - start.unknown[12 + b]) * side.tangent;
+      side.angle = unknown[12 + b] - start.unknown[12 + b];
+      side.turn += (f.finite_turns ? working_turn(side) : side.angle) * side.tangent;
       const Vec3<Scalar>& source = start.source[b];
       side.spin = -((side.inverse / (1.0 + dot(source, side.tangent))) * cross(source, side.tangent));
     }

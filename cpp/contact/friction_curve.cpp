@@ -72,7 +72,15 @@ void add_turn_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c
       d.turn[3 * side.tail + 3 + k] += turned;
       d.turn[3 * side.tail + k] -= turned;
     }
-    if (f.spatial) d.turn[kAngle + b] = rho * side.tangent;
+    if (f.spatial) {
+      const WorkingTurnSlopes spun = f.finite_turns ? working_turn_slopes(side) : WorkingTurnSlopes{};
+      d.turn[kAngle + b] = (rho * spun.angle) * side.tangent;
+      for (int k = 0; k < 3; ++k) {
+        const Vec3d turned = (rho * spun.edge[k]) * side.tangent;
+        d.turn[3 * side.tail + 3 + k] += turned;
+        d.turn[3 * side.tail + k] -= turned;
+      }
+    }
     const double grown = f.pair->radius_a * curve.w.share_slope[b];
     curve.each_way(false, [&](int j) { d.turn[j] += (grown * d.s[j]) * side.turn; });
   }

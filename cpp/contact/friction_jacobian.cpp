@@ -67,7 +67,10 @@ void add_turn_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c
       d.turn[kEdge[b] + k] = (rho * inverse) * (inverse * cross(start, kAxis[k]) - (2.0 * share * along) * bend +
                                                 (share * angle) * (kAxis[k] - along * side.tangent));
     }
-    if (f.spatial) d.turn[kAngle[b]] = rho * side.tangent;
+    if (!f.spatial) continue;
+    const WorkingTurnSlopes spun = f.finite_turns ? working_turn_slopes(side) : WorkingTurnSlopes{};
+    d.turn[kAngle[b]] = (rho * spun.angle) * side.tangent;
+    for (int k = 0; k < 3; ++k) d.turn[kEdge[b] + k] += (rho * spun.edge[k]) * side.tangent;
   }
 }
 

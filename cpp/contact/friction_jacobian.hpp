@@ -8,7 +8,8 @@
 ///   dt = b . dp - K_st D . du + K_tt D . dv,    b = K_tt v - K_st u,
 ///   dD = dp + u (a . dp) - v (b . dp) + a (D . du) - b (D . dv),
 ///   dN = N' (D / distance) . dp,
-///   dphi_a = (e^0 x du - 2 (t . du) e^0 x t) / |u|^2 + (theta - theta^0) (1 - t t^T) du / |u| + t dtheta.
+///   dphi_a = (e^0 x du - 2 (t . du) e^0 x t) / |u|^2 + (theta - theta^0) (1 - t t^T) du / |u| + t dtheta,
+/// where in energy-momentum steps the angle is `working_turn`.
 /// Arms are -rho_a c and rho_b c, c = D or, on an obstacle, n. So with omega = rho_a phi_a + rho_b phi_b the slip is
 /// S = (1 - n n^T) T, T = sum_i w_i (x_i - x_i^0) - omega x c less an obstacle's way, and
 ///   dT = dp + (u - u^0) ds - (v - v^0) dt + c x domega - omega x dc,

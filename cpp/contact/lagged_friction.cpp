@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "geometry/finite_turn.hpp"
+
 namespace withe {
 namespace {
 
@@ -61,13 +63,27 @@ void set_direction(const ContactProblem& problem, const ContactPair& pair, Lagge
   lagged.pressing *= std::tanh(7.5 * speed / problem.parameters->slip_tolerance);
 }
 
+/// Ways of the unknowns since the start, and their slopes; angles as they do work, see `FrictionSetting::finite_turns`.
+struct Ways {
+  double way[kContactUnknowns], slope[kContactUnknowns];
+
+  Ways(const ContactProblem& problem, const Touching& t) {
+    problem.bodies.values(t.pair, problem.start->q, way);
+    for (int i = 0; i < kContactUnknowns; ++i) {
+      Dual<1> now = Dual<1>::unknown(t.now[i] - way[i], 0);
+      if (i >= 12 && problem.finite_turns()) now = finite_turn(now);
+      way[i] = now.value;
+      slope[i] = now.slope[0];
+    }
+  }
+};
+
 /// How far the surfaces have slipped, with J of the start.
 Vec3d lagged_slip(const ContactProblem& problem, const Touching& t) {
   const LaggedFriction& lagged = problem.lagged_friction[at(t.lagged)];
-  double before[kContactUnknowns];
-  problem.bodies.values(t.pair, problem.start->q, before);
+  const Ways ways(problem, t);
   Vec3d slip = -lagged.drift;
-  for (int i = 0; i < kContactUnknowns; ++i) slip += (t.now[i] - before[i]) * lagged.column(i);
+  for (int i = 0; i < kContactUnknowns; ++i) slip += ways.way[i] * lagged.column(i);
   return slip;
 }
 
@@ -99,8 +115,9 @@ Slipping lagged_slipping(const ContactProblem& problem, const Touching& t, doubl
   out.slip = lagged_slip(problem, t);
   int dofs[kContactUnknowns];
   problem.surfaces->unknowns(t.pair, dofs);
+  const Ways ways(problem, t);
   for (int i = 0; i < kContactUnknowns; ++i)
-    if (dofs[i] >= 0) out.change += change(dofs[i]) * lagged.column(i);
+    if (dofs[i] >= 0) out.change += (ways.slope[i] * change(dofs[i])) * lagged.column(i);
   out.law = tanh_law(t.pair.friction, lagged.pressing, dot(out.slip, out.slip), rate);
   return out;
 }
@@ -143,11 +160,12 @@ void add_lagged_friction(const ContactProblem& problem, const Touching& t, doubl
   for (int i = 0; i < kContactUnknowns; ++i)
     for (int k = 0; k < 3; ++k) out.gradient[i] += lagged.slip[k][i] * force[k];
   if (!with_hessian) return;
+  const Ways ways(problem, t);
   double back[3][kContactUnknowns];  // derivative of the force by the unknowns
   for (int k = 0; k < 3; ++k)
     for (int i = 0; i < kContactUnknowns; ++i) {
       back[k][i] = 0.0;
-      for (int l = 0; l < 3; ++l) back[k][i] += f.slope[k][l] * lagged.slip[l][i];
+      for (int l = 0; l < 3; ++l) back[k][i] += ways.slope[i] * f.slope[k][l] * lagged.slip[l][i];
     }
   for (int i = 0; i < kContactUnknowns; ++i)
     for (int j = 0; j < kContactUnknowns; ++j)

@@ -2,6 +2,7 @@
 
 #include "elasticity/elements.hpp"
 #include "model/drawn_frame.hpp"
+#include "model/mass_matrix.hpp"
 #include "model/stencil_numbers.hpp"
 
 namespace withe {
@@ -99,8 +100,10 @@ class Chain {
       if (!model_.planar()) by_inertia(e) = by_.mass(model_.edge_dof[at(e)]);
     }
     for (const FrameStencil& s : model_.half) {
-      by_inertia(s.edge) += 0.5 * by_.mass.segment(model_.frame_dof[at(s.frame)], model_.frame_size()).sum();
-      if (s.hinge >= 0) by_inertia(s.edge) += 0.5 * by_.mass(model_.hinges[at(s.hinge)].dof);
+      double by_share = by_.mass.segment(model_.frame_dof[at(s.frame)], model_.frame_size()).sum();
+      if (!model_.planar()) by_share -= by_.mass(model_.edge_dof[at(s.edge)]);
+      if (s.hinge >= 0) by_share += by_.mass(model_.hinges[at(s.hinge)].dof);
+      by_inertia(s.edge) += kFrameShare * by_share;
     }
     out.edge_rotary = by_inertia.cwiseProduct(model_.edge_arc);
     out.edge_density += by_.edge_mass.cwiseProduct(model_.edge_arc);

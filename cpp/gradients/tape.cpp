@@ -161,8 +161,9 @@ std::vector<HandPose> Tape::moved_hands(const std::vector<HandPose>& hands) {
 
 std::vector<ObstaclePlace> Tape::moved_obstacles(const std::vector<ObstaclePlace>& obstacles) {
   const auto same = [](const ObstaclePlace& a, const ObstaclePlace& b) {
-    const Vec3d point = a.point - b.point, other = a.other - b.other, turn = a.turn - b.turn;
-    return dot(point, point) + dot(other, other) + dot(turn, turn) == 0.0;
+    const Vec3d point = a.point - b.point, other = a.other - b.other, turn = a.turn - b.turn,
+                velocity = a.velocity - b.velocity;
+    return dot(point, point) + dot(other, other) + dot(turn, turn) + dot(velocity, velocity) == 0.0;
   };
   if (std::equal(obstacles.begin(), obstacles.end(), last_obstacles_.begin(), last_obstacles_.end(), same)) return {};
   last_obstacles_ = obstacles;

@@ -10,8 +10,9 @@ namespace withe {
 
 /// Where supports put the held unknowns at the end of a step.
 struct HeldTarget {
-  VectorX q;              ///< end of step; meaningful where held
-  bool reachable = true;  ///< false: a frame would have to turn by half a turn at once
+  VectorX q;                  ///< end of step; meaningful where held
+  double turn = 0, spin = 0;  ///< of a frame in space, of an edge about itself, against where they are; the greatest
+  bool reachable = true;      ///< false: a frame would have to turn by half a turn at once
 };
 
 /// One implicit step: its rule and its length; `slot` tells the parts of a composition apart.

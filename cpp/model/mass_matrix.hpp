@@ -13,6 +13,10 @@
 /// a step is known to second order only (`find_held_velocity`), so fourth-order steps leave the mass of edges at held
 /// nodes at their nodes (`Parameters::held_lumped`).
 ///
+/// A frame of a joint or a clamp takes a quarter of the rotary inertia of each edge that is attached to it, what lies
+/// within half of its stencil: the edge, which has the rest, turns in its middle. About an edge's axis the inertia of
+/// both is that of the edge. A hinge has as much again against its frame, as a mass of its own must not vanish.
+///
 /// Rods whose edges are chords of arcs, of more than a radian in all, have their mass at their nodes: a chord that
 /// spins about the centre of its arc is nearer to it than the arc, by which the consistent matrix loses kappa^2 l^2 / 6
 /// of the energy and the lumped one nothing. An explicit scheme divides by masses, and so takes the row sums alone
@@ -21,6 +25,9 @@
 #include "model/model.hpp"
 
 namespace withe {
+
+/// Of an edge's rotary inertia, what a frame at its end carries.
+inline constexpr double kFrameShare = 0.25;
 
 struct MassMatrix {
   VectorX rows;      ///< per unknown, row sums [kg], [kg m^2]

@@ -6,6 +6,7 @@
 
 #include "common/check.hpp"
 #include "common/text.hpp"
+#include "model/mass_matrix.hpp"
 #include "model/parameter_index.hpp"
 #include "model/stencil_numbers.hpp"
 
@@ -241,10 +242,11 @@ void update_masses(const Model& model, Parameters& p) {
   p.dragged = (p.node_drag.array() != 0.0).any();
   p.frame_inertia = VectorX::Zero(model.frame_count);
   p.hinge_inertia = VectorX::Zero(static_cast<Eigen::Index>(model.hinges.size()));
-  // A frame carries the rotary inertia of the half edges attached to it.
   for (const FrameStencil& s : model.half) {
-    (s.hinge < 0 ? p.frame_inertia(s.frame) : p.hinge_inertia(s.hinge)) += 0.5 * p.edge_inertia(s.edge);
-    if (s.hinge >= 0) p.frame_inertia(s.frame) += 0.5 * p.edge_inertia(s.edge);
+    const double share = kFrameShare * model.edge_arc(s.edge) * p.edge_rotary(s.edge);
+    p.edge_inertia(s.edge) -= share;
+    p.frame_inertia(s.frame) += share;
+    if (s.hinge >= 0) p.hinge_inertia(s.hinge) += share;
   }
 }
 

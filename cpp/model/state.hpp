@@ -33,6 +33,7 @@ struct ContactRecord {
 struct ObstaclePlace {
   Vec3d point{}, other{};  ///< of a plane: a point, and its normal; of a capsule: its ends [m]
   Vec3d turn{};            ///< about its own axis, since it was drawn; full turns count [rad]
+  Vec3d velocity{};        ///< with which it came there in the last step [m/s]
 };
 
 /// Finds items by their keys in a sorted sequence. Those that are asked for mostly come in its order, so that the one

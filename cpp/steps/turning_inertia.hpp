@@ -5,16 +5,10 @@
 #include <cmath>
 
 #include "common/dual.hpp"
+#include "geometry/finite_turn.hpp"
 #include "geometry/frames.hpp"
 
 namespace withe {
-
-/// What a step's rotation by `angle` counts for where the middle of the step is that of a rotation: its Cayley vector.
-template <class Scalar>
-Scalar finite_turn(const Scalar& angle) {
-  const double t = std::tan(0.5 * value_of(angle));
-  return chain(angle, 2.0 * t, 1.0 + t * t);
-}
 
 /// An edge in a step: as z has it, its vectors at the start (at the end: midpoint rules only), and how its angle moves.
 template <class Scalar>

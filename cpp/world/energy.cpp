@@ -271,24 +271,30 @@ void World::Implementation::find_component_energies(const State& then, Component
   }
 }
 
-/// Kinetic and elastic energy of components that touch anything [J]: about their common centre of mass, but where
-/// something is held or an obstacle.
+/// Kinetic and elastic energy of components that touch anything [J]: about their common centre of mass, but in a frame
+/// that goes with an obstacle, or rests as what is held does, where there is one; the greatest of several.
 double World::Implementation::touching_energy(const State& then) {
   ComponentEnergies& energies = energy_scratch.components;
   find_component_energies(then, energies);
   double sum = 0.0, mass = 0.0, travelling = 0.0;
   Vector3 momentum = Vector3::Zero();
-  auto [which, fixed] = equations_of_step().contact()->touching_components();
+  const auto [which, obstacles] = equations_of_step().contact()->touching_components();
+  bool held = false;
   for (int i = 0; i < model.component_count; ++i) {
     if (!which[at(i)]) continue;
-    fixed = fixed || energies.held_nodes[i] > 0.0;
+    held = held || energies.held_nodes[i] > 0.0;
     sum += energies.kinetic[i] + energies.elastic[i];
     travelling += energies.travelling[i];
     mass += energies.mass[i];
     momentum += energies.momentum.row(i).transpose();
   }
-  if (!fixed && mass > 0.0) travelling -= 0.5 * momentum.squaredNorm() / mass;
-  return sum + travelling;
+  if (!held && obstacles.empty()) return sum + travelling - (mass > 0.0 ? 0.5 * momentum.squaredNorm() / mass : 0.0);
+  double greatest = held ? travelling : 0.0;
+  for (const Vec3d& obstacle : obstacles) {
+    const Vector3 frame = to_eigen(obstacle);
+    greatest = std::max(greatest, travelling - frame.dot(momentum - 0.5 * mass * frame));
+  }
+  return sum + greatest;
 }
 
 /// Where surfaces slide over each other's edges by much within a step, the forces at its end may push more than those

@@ -119,7 +119,8 @@ void exchange(Archive& io, State& state) {
   for (auto& f : frame) io(f);
   io(bend_tau), io(half_tau);
   exchange_contacts(io, contacts);
-  for (auto& [point, other, turn] : obstacles) exchange(io, point), exchange(io, other), exchange(io, turn);
+  for (auto& [point, other, turn, velocity] : obstacles)
+    exchange(io, point), exchange(io, other), exchange(io, turn), exchange(io, velocity);
   for (HandState& hand : hands) exchange(io, hand);
   io(contact_stiffness);
   auto& [known, velocity, times] = motion;

@@ -64,10 +64,10 @@ struct World::Implementation : Running {
   MatrixRecord marked_matrix;
   GuessHistory marked_guesses;
   StepControl marked_control;
-  Moving kept;                                              ///< at the start of a step that may be taken back
-  EnergyGuard guard_before;                                 ///< likewise
-  double turned = 0;                                        ///< of an edge in the last step at most [rad]
-  ComponentGains gained;                                    ///< in the last step, all of its parts
+  Moving kept;                         ///< at the start of a step that may be taken back
+  EnergyGuard guard_before;            ///< likewise
+  double turned = 0, held_turned = 0;  ///< of an edge, of a held frame in the last step at most [rad]
+  ComponentGains gained;               ///< in the last step, all of its parts
   std::vector<SupportMotion> motions_before, kept_motions;  ///< at the start of a time step, of a part of it
   Plan plan;
   bool plan_current = false;  ///< made when it is asked for
@@ -211,6 +211,7 @@ struct World::Implementation : Running {
   void account_for_error(double error, double dt);
   bool may_grow(double dt, double times) const;
   Attempt try_step(double dt);
+  bool turns_rods() const;
   void take_back();
   void commit_step();
   void return_to_start();

@@ -84,6 +84,7 @@ void put_node(const Model& model, int node, const Vector3& position, VectorX& q)
 /// The held unknowns when supports are where `motions` say.
 void World::Implementation::hold_now(HeldTarget& target) const {
   target.q = state.q;
+  target.turn = target.spin = 0.0;
   target.reachable = true;
   for (std::size_t s = 0; s < model.supports.size(); ++s) {
     const Support& support = model.supports[s];
@@ -101,7 +102,8 @@ void World::Implementation::hold_now(HeldTarget& target) const {
         target.q(dof) = now + rotation_log(rest).dot(model.plane->normal);
       } else {
         const Matrix3 rest = motion.rotation * state.frame[at(support.frame)].transpose();
-        if (rotation_log(rest).norm() > 2.5) target.reachable = false;
+        target.turn = std::max(target.turn, rotation_log(rest).norm());
+        if (target.turn > 2.5) target.reachable = false;
         target.q.segment<3>(dof) = cayley_inverse(rest);
       }
     }
@@ -123,6 +125,13 @@ void World::Implementation::hold_now(HeldTarget& target) const {
     }
   }
   hold_hands(target);
+  for (const Support& support : model.supports) {
+    if (!support.active || support.yields() || model.planar()) continue;
+    for (int edge : support.edges) {
+      const int dof = model.edge_dof[at(edge)];
+      target.spin = std::max(target.spin, std::abs(target.q(dof) - state.q(dof)));
+    }
+  }
 }
 
 CustomForces World::Implementation::custom_forces(double time, const VectorX& q, const VectorX& v, bool derivatives) {

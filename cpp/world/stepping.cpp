@@ -17,6 +17,11 @@ constexpr int kMostStiffenings = 4;
 constexpr int kMostPatience = 64;
 // Steps from one look at how well the mesh resolves the motion to the next, and at the energy of an explicit one.
 constexpr int kResolutionPeriod = 64, kAlarmPeriod = 16;
+// What is held turns by no more than this in a step [rad]. Of a frame's turn by w the middle of its Cayley vector is
+// that by 2 atan(tan(w / 2) / 2), of an edge's angle that by w / 2: what is between twists by the difference, w^3 / 32.
+// In energy-momentum steps edges that turn by w have the rate 2 tan(w / 2) / dt. Parts of fourth-order steps twist
+// there and back, and so turn by less.
+constexpr double kMostHeldTurn = 0.25, kMostHeldTurnOfPart = 0.15;
 // Share of the tolerance that is kept for events, and of the duration, over what steps are averaged.
 constexpr double kEventShare = 0.2, kAverage = 1.0 / 64.0;
 
@@ -180,7 +185,7 @@ World::Implementation::Attempt World::Implementation::try_step(double dt) {
   const bool euler = options.integrator == Integrator::backward_euler;
   const bool asks = options.adaptive && options.energy_guard, guarded = watches_energy();
   const bool watched = options.adaptive && equations->contact() && options.integrator != Integrator::verlet;
-  const bool keeps = guarded || watched || options.tolerance || fourth;
+  const bool keeps = guarded || watched || options.tolerance || fourth || turns_rods();
   if (keeps) kept = *this;
   if (tape) taped = tape->count();
   if (guarded) guard_before = guard;
@@ -204,7 +209,9 @@ World::Implementation::Attempt World::Implementation::try_step(double dt) {
     return Attempt::inaccurate;
   }
   Contact* contact = watched ? equations_of_step().contact() : nullptr;
-  const bool unresolved = contact && (contact->unresolved(dt) || contact->missed(kept.state.q));
+  const double held_turn =
+      options.adaptive && conserving() ? held_turned / (fourth ? kMostHeldTurnOfPart : kMostHeldTurn) : 0.0;
+  const bool unresolved = held_turn > 1.0 || (contact && (contact->unresolved(dt) || contact->missed(kept.state.q)));
   const bool gains = !unresolved && guarded && gains_energy(),
              pumped = !unresolved && !gains && watched && asks && contact_pumps(dt);
   if (unresolved && may_cut()) {
@@ -222,13 +229,20 @@ World::Implementation::Attempt World::Implementation::try_step(double dt) {
   watch_step(dt, equations_of_step());
   commit_step();
   if (options.tolerance) account_for_error(error, dt);
-  if (event || (contact && contact->unresolved(2.0 * dt))) return Attempt::hard;
+  if (event || 2.5 * held_turn > 1.0 || (contact && contact->unresolved(2.0 * dt))) return Attempt::hard;
   if (!options.tolerance) return Attempt::easy;
   // An oscillation has no error twice a period: what counts is the greatest of the last steps, were they longer.
   // Far below what is allowed an estimate is mostly rounding.
   const double seen = error > 0.01 * allowed ? error / std::pow(dt, local_order()) : 0.0;
   error_rate = std::max(seen, error_rate * (1.0 - 1.0 / 256.0));
   return may_grow(dt, std::exp2(1.0 / levels_per_halving())) ? Attempt::easy : Attempt::hard;
+}
+
+/// Whether supports in space may turn rods about themselves.
+bool World::Implementation::turns_rods() const {
+  return !model.planar() && std::any_of(model.supports.begin(), model.supports.end(), [](const Support& s) {
+    return s.active && (s.frame >= 0 || !s.edges.empty());
+  });
 }
 
 /// Undoes an accepted step.
@@ -269,7 +283,7 @@ double World::Implementation::force_time(double start, double dt) const {
 
 /// One step of the scheme; changes nothing where it does not converge.
 bool World::Implementation::scheme_step(double dt, double& error) {
-  turned = 0.0;
+  turned = held_turned = 0.0;
   gained.energy.setZero(model.component_count);
   gained.whole.assign(at(model.component_count), 0);
   for (VectorX* v : {&guard.scale, &guard.excess})
@@ -360,6 +374,8 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
   if (tape) record_step(rule_of_step(), dt, begins);
   error = r.error;
   turned = std::max(turned, r.largest_turn);
+  held_turned = std::max(held_turned, work.held.turn);
+  if (rule_of_step() == StepRule::energy_momentum) held_turned = std::max(held_turned, work.held.spin);
   if (watches_energy()) {
     gained.energy += work.gains.energy;
     for (std::size_t i = 0; i < gained.whole.size(); ++i)

@@ -121,6 +121,7 @@ void random_touch(RandomNumbers& random, Other other, FrictionLaw law, bool plan
   f.spatial = !planar;
   f.centreline = random.normal() > 0.0 && !rolling;
   f.middle = other == Other::rod && random.normal() > 0.0;
+  f.finite_turns = !planar && random.normal() > 0.0;
   f.pressing = {ContactLaw::imcv2, c.pair.radii(), c.pair.tolerance, 40.0, 0.01 * c.pair.tolerance};
   f.tangential_stiffness = random.normal() > 0.0 ? 1.0 : 100.0;
   f.rate = 3.0;

@@ -115,3 +115,57 @@ def test_what_an_obstacle_cannot_do_is_refused() -> None:
         simulation.move(table, position=(0, 0, 0), path=lambda t: (0, 0, t))
     with pytest.raises(ValueError, match="over"):
         simulation.move(table, position=(0, 0, 0.1), over=-1.0)
+
+
+@pytest.mark.parametrize("shape", ["floor", "ball"])
+@pytest.mark.parametrize(
+    ("integrator", "restitution"),
+    [("implicit_midpoint", 0.0), ("implicit_midpoint", 0.5), ("energy_momentum", 0.0), ("backward_euler", 0.5)],
+)
+@pytest.mark.parametrize("speed", [0.5, 5.0])
+def test_an_obstacle_that_meets_a_rod_at_rest_sends_it_off_as_if_the_rod_had_come(
+    shape: str, integrator: Any, restitution: float, speed: float
+) -> None:
+    """Galilei: the energy by which gains of contact are judged is none in a frame in which the rods rest."""
+
+    def parted(moving: bool) -> float:
+        scene = withe.Scene(gravity=(0, 0, 0))
+        rubber = withe.Material(youngs_modulus=1e7, density=1000.0)
+        rod = scene.add_rod(start=(-0.1, 0, 0.05), end=(0.1, 0, 0.05), nodes=6, radius=5e-3, material=rubber)
+        if shape == "floor":
+            body = scene.add_floor(restitution=restitution)
+        else:
+            body = scene.add_sphere((0, 0, -0.02), 0.02, restitution=restitution)
+        simulation = scene.build(integrator=integrator)
+        duration = 0.07 / speed
+        if moving:
+            height = speed * duration - (0.0 if shape == "floor" else 0.02)
+            simulation.move(body, position=(0, 0, height), over=duration)
+        else:
+            simulation.set_velocities(rod, (0, 0, -speed))
+        simulation.run(duration, progress=False)
+        return float(simulation.momentum().linear[2] / (1000.0 * np.pi * 25e-6 * 0.2) / speed + (0 if moving else 1))
+
+    assert parted(True) == pytest.approx(parted(False), abs=0.03)
+    if shape == "floor":
+        assert parted(True) == pytest.approx(1.0 + restitution, abs=0.06)
+
+
+@pytest.mark.parametrize("time_step", [5e-3, 5e-4])
+@pytest.mark.parametrize("restitution", [0.0, 0.5, 0.8])
+def test_what_rests_on_a_floor_is_sent_off_by_restitution_when_the_floor_jumps_up(
+    restitution: float, time_step: float
+) -> None:
+    scene = withe.Scene(gravity=(0, 0, -1.0))
+    rubber = withe.Material(youngs_modulus=1e7, density=1000.0)
+    rod = scene.add_rod(start=(-0.1, 0, 0.0051), end=(0.1, 0, 0.0051), nodes=6, radius=5e-3, material=rubber)
+    floor = scene.add_floor(restitution=restitution)
+    simulation = scene.build(time_step=time_step)
+    simulation.run(0.2, progress=False)
+    assert abs(simulation.velocities(rod)[:, 2]).max() < 5e-3
+    speed, duration = 2.0, 0.03
+    simulation.move(floor, position=(0, 0, speed * duration), over=duration)
+    simulation.run(duration, progress=False)
+    parted = simulation.momentum().linear[2] / (1000.0 * np.pi * 25e-6 * 0.2) / speed
+    fallen = duration / speed if restitution > 0.0 else 0.0
+    assert parted + fallen == pytest.approx(1.0 + restitution, abs=0.03)

@@ -164,3 +164,57 @@ def test_a_snapshot_of_a_ring_that_rolls_is_restored_to_the_bit() -> None:
     simulation.restore(kept)
     simulation.step(100)
     np.testing.assert_array_equal(simulation.positions(ring), first)
+
+
+def cylinder(degrees: float = 0.0, friction_model: Any = "anchored", **options: Any) -> tuple[Any, Any]:
+    """A straight rod of 1 cm radius and .2 m on a rough plane, across the fall of a slope along x."""
+    slope = np.radians(degrees)
+    scene = withe.Scene(gravity=(G * np.sin(slope), 0, -G * np.cos(slope)))
+    rubber = withe.Material(youngs_modulus=1e7, density=1000.0)
+    rod = scene.add_rod(start=(0, -0.1, 0.01), end=(0, 0.1, 0.01), nodes=5, radius=0.01, material=rubber)
+    scene.add_floor(friction=1.0)
+    scene.enable_contact(rods=False, friction_model=friction_model)
+    if options.pop("beside_a_tumbling_rod", False):
+        soft = withe.Material(youngs_modulus=1e6, density=1000.0)
+        other = scene.add_rod(start=(0, 5, 50), end=(0.3, 5, 50), nodes=11, radius=4e-3, material=soft)
+        simulation = scene.build(**options)
+        x = simulation.positions(other)[:, 0]
+        bent = 3.0 * np.cos(3.0 * np.pi * x / 0.3)
+        simulation.set_velocities(other, np.stack([0.0 * x, bent, 40.0 * (x - 0.15)], axis=1))
+        return simulation, rod
+    return scene.build(**options), rod
+
+
+@pytest.mark.parametrize("friction_model", ["anchored", "implicit", "lagged"])
+@pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum"])
+def test_a_cylinder_that_turns_far_in_a_step_rolls_on_as_fast_as_it_came(integrator: Any, friction_model: Any) -> None:
+    """2 rad a step. Friction that knew the angle and not the rate of finite turns made it spin up by a fifth."""
+    simulation, rod = cylinder(integrator=integrator, friction_model=friction_model)
+    simulation.set_state(rod, velocities=(4.0, 0, 0), spins=400.0)
+    before = simulation.energy()
+    simulation.step(100)
+    after = simulation.energy()
+    assert simulation.velocities(rod)[:, 0] == pytest.approx(4.0, rel=2e-3)
+    assert simulation.spins(rod) == pytest.approx(400.0, rel=2e-3)
+    assert after.kinetic == pytest.approx(before.kinetic, rel=2e-3)
+    assert after.dissipated > -1e-9 * before.kinetic
+
+
+def test_a_cylinder_rolls_down_a_slope_as_fast_whatever_else_makes_steps_conserve_energy() -> None:
+    """v = 2/3 g sin(a) t, while a rod far away tumbles so that all is stepped by energy-momentum steps."""
+    simulation, rod = cylinder(40.0, beside_a_tumbling_rod=True)
+    simulation.step(200)
+    assert simulation.statistics.energy_momentum_steps == 200
+    speed = 2.0 / 3.0 * G * np.sin(np.radians(40.0)) * simulation.time
+    assert simulation.velocities(rod)[:, 0].mean() == pytest.approx(speed, rel=1e-3)
+    assert simulation.spins(rod).mean() == pytest.approx(speed / 0.01, rel=1e-3)
+
+
+@pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum"])
+def test_a_cylinder_that_is_thrown_keeps_two_thirds_of_its_speed(integrator: Any) -> None:
+    simulation, rod = cylinder(integrator=integrator)
+    simulation.set_state(rod, velocities=(6.0, 0, 0))
+    kinetic = simulation.energy().kinetic
+    simulation.step(300)
+    assert simulation.velocities(rod)[:, 0].mean() == pytest.approx(4.0, rel=2e-3)
+    assert simulation.energy().dissipated == pytest.approx(kinetic / 3.0, rel=5e-3)

@@ -157,3 +157,70 @@ def test_reactions_of_a_held_edge_do_the_work_that_is_booked(integrator, planar)
         apart.append(work / simulation.energy().work - 1)
     assert abs(apart[0]) < 2e-6
     assert apart[0] / apart[1] == pytest.approx(4, rel=0.2)
+
+
+@pytest.mark.parametrize("hold", ["frame", "edge"])
+@pytest.mark.parametrize("nodes", [5, 21])
+def test_a_shaft_that_is_spun_up_asks_for_its_own_inertia(nodes, hold):
+    """What frames carry of edges' rotary inertia edges have no more."""
+    scene = withe.Scene(gravity=(0, 0, 0))
+    stiff = withe.Material(youngs_modulus=1e8, density=1000.0, viscosity=1e5)
+    rod = scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=nodes, radius=0.01, material=stiff)
+    wall = scene.clamp(rod.start, hold=hold)
+    simulation = scene.build(time_step=1e-3)
+    rate, inertia = 20.0, 0.5 * 1000.0 * np.pi * 1e-4 * 0.2 * 1e-4
+
+    def turned(t):
+        c, s = np.cos(0.5 * rate * t * t), np.sin(0.5 * rate * t * t)
+        return (0.0, 0.0, 0.0), ((1, 0, 0), (0, c, -s), (0, s, c))
+
+    simulation.move(wall, path=turned)
+    simulation.step(500)
+    moments = []
+    for _ in range(500):
+        simulation.step()
+        moments.append(simulation.reaction(wall).moment[0])
+    assert np.mean(moments) == pytest.approx(inertia * rate, rel=1e-4)
+    assert simulation.momentum().angular[0] == pytest.approx(inertia * rate * simulation.time, rel=1e-4)
+
+
+@pytest.mark.parametrize("kind", ["rigid", "revolute"])
+def test_joined_shafts_have_the_inertia_of_one(kind):
+    scene = withe.Scene(gravity=(0, 0, 0))
+    rubber = withe.Material(youngs_modulus=1e7, density=1000.0)
+    parts = [
+        scene.add_rod(start=(x, 0, 0), end=(x + 0.1, 0, 0), nodes=3, radius=0.01, material=rubber) for x in (0.0, 0.1)
+    ]
+    if kind == "rigid":
+        scene.join(parts[0].end, parts[1].start, "rigid", form="frame")
+    else:
+        scene.join(parts[0].end, parts[1].start, "revolute", axis=(0, 1, 0))
+    simulation = scene.build()
+    for part in parts:
+        simulation.set_state(part, spins=10.0)
+    inertia = 0.5 * 1000.0 * np.pi * 1e-4 * 0.2 * 1e-4
+    assert simulation.momentum().angular[0] == pytest.approx(10.0 * inertia, rel=1e-12)
+    assert simulation.energy().kinetic == pytest.approx(50.0 * inertia, rel=1e-12)
+
+
+@pytest.mark.parametrize("nodes", [5, 41])
+@pytest.mark.parametrize("hold", ["frame", "edge"])
+@pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum", "fourth_order"])
+def test_a_shaft_that_its_clamp_spins_fast_turns_as_fast(integrator, hold, nodes):
+    """1.5 rad a step: the middle of a frame's turn is not that of an edge's, which twisted what is between."""
+    scene = withe.Scene(gravity=(0, 0, 0))
+    rubber = withe.Material(youngs_modulus=1e7, density=1000.0)
+    rod = scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=nodes, radius=0.01, material=rubber)
+    wall = scene.clamp(rod.start, hold=hold)
+    simulation = scene.build(integrator=integrator, time_step=5e-3)
+
+    def turned(t):  # from rest to 300 rad/s within .2 s
+        angle = 300.0 * (t - 0.1 if t > 0.2 else 2.5 * t * t)
+        c, s = np.cos(angle), np.sin(angle)
+        return (0.0, 0.0, 0.0), ((1, 0, 0), (0, c, -s), (0, s, c))
+
+    simulation.move(wall, path=turned)
+    simulation.step(100)
+    assert simulation.spins(rod) == pytest.approx(300.0, rel=0.08)
+    energy = simulation.energy()
+    assert energy.total - energy.work == pytest.approx(0.0, abs=3e-3 * energy.kinetic)

@@ -256,9 +256,11 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
             arm on a turning hub ten times more closely than midpoint at the same step.
         time_step : float [s]
         adaptive : bool
-            Whether an implicit step that fails is halved; steps grow back. And whether midpoint and fourth-order
-            steps that would gain more than a thousandth of the energy are taken as energy-momentum ones, which are
-            as accurate there or more so; `statistics.energy_momentum_steps` counts them.
+            Whether an implicit step that fails is halved; steps grow back. So are those in which surfaces that graze
+            would go through each other, impacts are not resolved for their restitution, or a clamp turns by more than
+            a quarter of a radian, but under backward Euler. And whether midpoint and fourth-order steps that would
+            gain more than a thousandth of the energy are taken as energy-momentum ones, which are as accurate there or
+            more so; `statistics.energy_momentum_steps` counts them.
         tolerance : float [m]
             Cut steps so that the error of positions stays below it, over `duration`. A fifth of it is kept for events
             such as impacts, in which steps go by the error of each rather than by that per unit of time.

@@ -1,0 +1,17 @@
+#pragma once
+/// The angle of a step where its middle is that of a rotation.
+
+#include <cmath>
+
+#include "common/dual.hpp"
+
+namespace withe {
+
+/// What a step's rotation by `angle` counts for where the middle of the step is that of a rotation: its Cayley vector.
+template <class Scalar>
+Scalar finite_turn(const Scalar& angle) {
+  const double t = std::tan(0.5 * value_of(angle));
+  return chain(angle, 2.0 * t, 1.0 + t * t);
+}
+
+}  // namespace withe
