@@ -11,7 +11,7 @@ import numpy as np
 from withe.common import validation
 from withe.folding.jaw import Jaw
 from withe.folding.paper import Paper
-from withe.folding.planning import Grasp, Method, Source, slow_plan
+from withe.folding.planning import Grasp, Method, Source, least_friction, slow_plan
 from withe.folding.plans import Plan
 from withe.folding.plunging import plunge
 
@@ -50,7 +50,7 @@ def plan(
     method : {"ucs", "slip", "local", "intuitive"}
         "ucs": least accumulated ratio of the table's tangential to its normal force, on a grid of positions
         [dissertation, Alg. 7, with costs that accumulate]. "slip": no predicted slide where such a way exists, or else
-        as little as can be; then short and little bent. "local": from each pose to the next one of least tangential
+        as little as can be, to 2e-3 Lgb; then short and little bent. "local": from each pose to the next one of least tangential
         force, after Petrik et al. 2016, with the right stiffness. "intuitive": half a circle [dissertation, (7.18)].
     grasp : {"moment_free", "free"}
         "moment_free": the angle of the jaw is that at which the sheet ends without curvature [dissertation, (7.6)].
@@ -128,9 +128,9 @@ def plan(
     said = None
     if method == "slip":
         said = _slides(slow)
-        needed = float(slow.slip_ratio.max())
-        if needed > paper.friction:
-            said = f"the sheet slides: this way needs friction {needed:.3f}, the paper has {paper.friction:g}"
+        if slow.slip_ratio.max() > paper.friction:
+            needed = np.ceil(1e3 * least_friction(slow)) / 1e3  # as said it is enough
+            said = f"the sheet slides: not to slide it needs friction {needed:.3f}, the paper has {paper.friction:g}"
     elif method != "intuitive" and replans:
         said = _unseen(slow)
     if said is None:

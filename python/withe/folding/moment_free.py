@@ -26,11 +26,13 @@ from withe.folding.manifold import Manifold
 from withe.folding.sheets import SHORTEST, Elastica, at_forces, join, poses_of, slides_to_rest, take
 from withe.folding.widths import Width
 
-__all__ = ["goal_pose", "greedy", "least_slide", "smoothed", "uniform_cost"]
+__all__ = ["SMOOTHING", "goal_pose", "greedy", "least_ratio", "least_slide", "smoothed", "uniform_cost"]
 
 FloatArray = npt.NDArray[np.float64]
 _MOST_STEPS = 2000
 _ROOM = 2e-3  # of a path on which the sheet slides least, for it to be short [Lgb]
+SMOOTHING = 1.02
+"""What a path through nodes may need of friction when its corners are taken off, over what the nodes need."""
 
 
 @lru_cache(maxsize=8)
@@ -80,6 +82,17 @@ def _allowed(solve: Manifold, holding: Holding) -> npt.NDArray[np.bool_]:
     return allowed
 
 
+def least_ratio(
+    solve: Manifold, holding: Holding, enough: float, goal: Elastica, start: Elastica | None = None
+) -> Elastica | None:
+    """Nodes of the shortest path, bends counted, that asks for no more friction than is enough.
+
+    Where every path asks for more, of those whose greatest ratio is least.
+    """
+    ratio = holding.ratio(make_grid(solve).pose)
+    return _shortest_within(solve, holding, lambda nodes: ratio[nodes], (enough, 0.0), goal, start)
+
+
 def least_slide(
     solve: Manifold, holding: Holding, friction: float, goal: Elastica, start: Elastica | None = None
 ) -> Elastica | None:
@@ -88,12 +101,60 @@ def least_slide(
     At each pose there is a range of slides at which friction holds the sheet, and it slides no further than to the
     nearer end of that; so what a path slides is the farthest of these ends from 0.
     """
+    slides = _needed_slides(solve, holding.length, friction)
+    return _shortest_within(solve, holding, slides.at, (0.0, _ROOM), goal, start)
+
+
+def _shortest_within(
+    solve: Manifold,
+    holding: Holding,
+    needed: Callable[[IndexArray], FloatArray],
+    bounds: tuple[float, float],
+    goal: Elastica,
+    start: Elastica | None,
+) -> Elastica | None:
+    """Nodes of the shortest path over those that need least of something; `bounds` as `_spread` has them."""
     grid = make_grid(solve)
     cost, allowed = 1.0 + 0.4 * grid.pose.max_curvature, _allowed(solve, holding)
     network = make_network(grid, cost, allowed)
     begin = np.array([0]) if start is None else nodes_near(network, start)
-    within = _needed_slides(solve, holding.length, friction).spread(network, begin, nodes_near(network, goal))
+    within = _spread(network, needed, bounds, begin, nodes_near(network, goal))
     return None if within is None else shortest_path(ways_to(make_network(grid, cost, within), goal), start)
+
+
+def _spread(
+    network: Network,
+    needed: Callable[[IndexArray], FloatArray],
+    bounds: tuple[float, float],
+    begin: IndexArray,
+    ends: IndexArray,
+) -> npt.NDArray[np.bool_] | None:
+    """Nodes that are reached by as little as one of the ends can be; None if none is, finitely.
+
+    `needed` of nodes; `bounds`: what may be needed in any case, and how much more than the least.
+    Always on from those of least need, as Prim's algorithm goes; all of those that are no worse at a time.
+    """
+    first, neighbours = network.graph.indptr, network.graph.indices
+    seen, reached = np.zeros((2, len(network.allowed)), dtype=bool)
+    waiting: list[tuple[float, int]] = []
+    bound, room = bounds
+    found, next_nodes = False, begin
+    while True:
+        new = next_nodes[~seen[next_nodes]]
+        seen[new] = True
+        for need, node in zip(needed(new), new, strict=True):
+            if np.isfinite(need):
+                heappush(waiting, (float(need), int(node)))
+        if not waiting or (found and waiting[0][0] > bound):
+            return reached if found else None
+        bound = max(bound, waiting[0][0])
+        wave = []
+        while waiting and waiting[0][0] <= bound:
+            wave.append(heappop(waiting)[1])
+        reached[wave] = True
+        if not found and np.isin(wave, ends).any():
+            found, bound = True, bound + room
+        next_nodes = np.unique(np.concatenate([neighbours[first[node] : first[node + 1]] for node in wave]))
 
 
 class _NeededSlides:
@@ -114,32 +175,6 @@ class _NeededSlides:
             some = take(self._pose, unknown)
             self._slide[unknown] = slides_to_rest(some, self._friction, self._length, self._width)
         return self._slide[nodes]
-
-    def spread(self, network: Network, begin: IndexArray, ends: IndexArray) -> npt.NDArray[np.bool_] | None:
-        """Nodes that are reached without a greater slide than the least at which one of the ends is; None if none is.
-
-        Always on from those of least slide, as Prim's algorithm goes; all of those that are no worse at a time.
-        """
-        first, neighbours = network.graph.indptr, network.graph.indices
-        seen, reached = np.zeros((2, len(network.allowed)), dtype=bool)
-        waiting: list[tuple[float, int]] = []
-        bound, found, next_nodes = 0.0, False, begin
-        while True:
-            new = next_nodes[~seen[next_nodes]]
-            seen[new] = True
-            for slide, node in zip(self.at(new), new, strict=True):
-                if np.isfinite(slide):
-                    heappush(waiting, (float(slide), int(node)))
-            if not waiting or (found and waiting[0][0] > bound):
-                return reached if found else None
-            bound = max(bound, waiting[0][0])
-            wave = []
-            while waiting and waiting[0][0] <= bound:
-                wave.append(heappop(waiting)[1])
-            reached[wave] = True
-            if not found and np.isin(wave, ends).any():
-                found, bound = True, bound + _ROOM
-            next_nodes = np.unique(np.concatenate([neighbours[first[node] : first[node + 1]] for node in wave]))
 
 
 @lru_cache(maxsize=8)
@@ -192,7 +227,8 @@ def smoothed(
     """Poses along a path through nodes, without their grid's corners; ends stay, and so does the lift.
 
     `cut` says at which places, indices with fractions, of poses of shape (n, 3) that are nearly those of the path.
-    No more friction is needed than at the nodes. Some poses may not be valid.
+    No more friction is needed than `SMOOTHING` times that at the nodes, where corners can be taken off so. Some poses
+    may not be valid.
     """
     from scipy.ndimage import gaussian_filter1d
 
@@ -203,7 +239,7 @@ def smoothed(
     count = 2 * max(2, int(travelled[-1] / spacing)) + 1
     even = np.linspace(0.0, travelled[-1], count)
     way = np.stack([np.interp(even, travelled, known[head:, i]) for i in range(3)], axis=1)
-    bound, room = 1.02 * holding.ratio(nodes).max(), -0.1 * spacing
+    bound, room = SMOOTHING * holding.ratio(nodes).max(), -0.1 * spacing
     for spread in (3.0, 1.5, 0.75, 0.4):
         sigma = min(2 * spread, count / 8)
         pad = min(count - 2, int(4 * sigma) + 1)

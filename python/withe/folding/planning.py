@@ -20,7 +20,7 @@ from withe.folding.sheets import LONGEST, SHORTEST, Elastica, at_forces, at_pose
 from withe.folding.timing import evenly, travel_times
 from withe.folding.widths import Width, free_width
 
-__all__ = ["Grasp", "Method", "Source", "plan_above", "replan", "slow_plan"]
+__all__ = ["Grasp", "Method", "Source", "least_friction", "plan_above", "replan", "slow_plan"]
 
 FloatArray = npt.NDArray[np.float64]
 Method = Literal["intuitive", "local", "ucs", "slip"]
@@ -165,19 +165,52 @@ def _half_circle(task: _Task) -> Plan:
 
 def _over_manifold(task: _Task) -> Plan:
     goal = _checked_goal(_goal(task), task)
-    if task.method == "ucs":
-        nodes = moment_free.uniform_cost(task.solve, task.holding, goal)
-    elif task.method == "slip":
-        nodes = moment_free.least_slide(task.solve, task.holding, task.paper.friction, goal)
+    if task.method == "slip":
+        sheet = _least_sliding(task, goal, None, _POSES)
     else:
-        nodes = moment_free.greedy(task.solve, task.holding, goal)
-    if nodes is None:
+        search = moment_free.uniform_cost if task.method == "ucs" else moment_free.greedy
+        sheet = _smoothed(task, search(task.solve, task.holding, goal), _POSES)
+    if sheet is None:
         ends = "the step of least force leads nowhere" if task.method == "local" else "those do not connect"
         raise ValueError(f"no path to {task.target:g} m over poses that lift less than {task.length:.2f} Lgb: {ends}")
-    sheet = moment_free.smoothed(task.solve, nodes, task.holding, task.cut(_POSES))
     if not sheet.valid.all():
         raise ValueError(f"no path to {task.target:g} m: between poses of the grid there are some without equilibrium")
     return _finished(task, task.outer(poses_of(sheet)), sheet)
+
+
+def _smoothed(task: _Task, nodes: Elastica | None, count: int) -> Elastica | None:
+    return None if nodes is None else moment_free.smoothed(task.solve, nodes, task.holding, task.cut(count))
+
+
+def _least_sliding(task: _Task, goal: Elastica, start: Elastica | None, count: int) -> Elastica | None:
+    """Poses without moment of the shortest way on which friction holds the sheet, or else on which it slides least.
+
+    What holds at nodes need not hold between them, along a border above all: so nodes leave the room that smoothing
+    takes. The way of least friction is asked last: a paper with more friction has that too.
+    """
+    friction = task.paper.friction
+    for enough in (friction / moment_free.SMOOTHING, 0.0):
+        sheet = _with_friction(task, enough, goal, start, count)
+        if sheet is not None and sheet.valid.all() and task.holding.ratio(sheet).max() <= friction:
+            return sheet
+    nodes = moment_free.least_slide(task.solve, task.holding, friction, goal, start)
+    return _smoothed(task, nodes, count)
+
+
+def _with_friction(
+    task: _Task, enough: float, goal: Elastica, start: Elastica | None, count: int
+) -> Elastica | None:
+    """Poses without moment that ask for no more friction at nodes than is enough, or for the least that there is."""
+    return _smoothed(task, moment_free.least_ratio(task.solve, task.holding, enough, goal, start), count)
+
+
+def least_friction(present: Plan) -> float:
+    """Friction with which a plan of method "slip" to the same target has no slide."""
+    if present.grasp == "free":  # which goes where least is needed, if that is not there
+        return float(present.slip_ratio.max())
+    task = _task_of(present)
+    sheet = _with_friction(task, 0.0, _checked_goal(_goal(task), task), None, _POSES)
+    return np.inf if sheet is None or not sheet.valid.all() else float(task.holding.ratio(sheet).max())
 
 
 def replan(present: Plan, pose: npt.ArrayLike, slide: float) -> Plan:
@@ -264,12 +297,12 @@ def _anew_from(task: _Task, inner: FloatArray) -> tuple[FloatArray, FloatArray]:
         )
     goal = _checked_goal(_goal(task), task)
     if task.method == "slip":
-        nodes = moment_free.least_slide(task.solve, task.holding, task.paper.friction, goal, start)
+        sheet = _least_sliding(task, goal, start, _POSES_OF_REST)
     else:
         nodes = moment_free.uniform_cost(task.solve, task.holding, goal, start)
-    if nodes is None:
+        sheet = _smoothed(task, nodes, _POSES_OF_REST)
+    if sheet is None:
         raise ValueError(f"no path from there to {task.target:g} m over poses without moment")
-    sheet = moment_free.smoothed(task.solve, nodes, task.holding, task.cut(_POSES_OF_REST))
     wanted = poses_of(sheet)
     wanted[:, 2] += np.linspace(1.0, 0.0, len(wanted)) * (inner[2] - start.angle[0])
     return wanted, forces_of(sheet)
