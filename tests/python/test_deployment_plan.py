@@ -179,6 +179,15 @@ def test_bad_input_says_what_is_wrong(call, message):
         call()
 
 
+def test_lines_of_what_a_pattern_needs_are_drawn_whole():
+    pytest.importorskip("matplotlib").use("Agg")
+    angle = np.linspace(0, 2 * np.pi, 200)
+    eight = plan(CABLE, Pattern(np.stack([0.12 * np.sin(angle), 0.06 * np.sin(2 * angle)], 1)), crossings="over")
+    needs = eight.plot(0.4).axes[1]
+    floor = next(line for line in needs.lines if line.get_label() == "floor").get_ydata()
+    assert 2.0 < floor.max() < needs.get_ylim()[1]
+
+
 def test_a_pattern_that_only_lacks_a_tail_says_so():
     angle = np.linspace(0.0, 2.0 * np.pi, 200)
     circle = Pattern(0.1 * np.stack([np.sin(angle), 1.0 - np.cos(angle)], 1))

@@ -202,6 +202,30 @@ def test_the_friction_that_a_warning_names_is_the_least_that_is_enough(friction,
     assert np.abs(less.slide).max() > 1e-4
 
 
+@pytest.mark.parametrize("way", ["ucs", "intuitive", "local", "replan"])
+def test_sheets_are_drawn_where_they_are_predicted_to_be_and_joined_to_the_jaw(way):
+    """They were drawn without slide, and half a circle's hung from black bars of up to 190 mm."""
+    pytest.importorskip("matplotlib").use("Agg")
+    folded = replan(planned("a4"), planned("a4").poses[100], 0.004) if way == "replan" else planned("a4", method=way)
+    axes = folded.plot(poses=11)
+    lines = [line.get_xydata() for line in axes.lines]
+    bars = np.array([line for line in lines if len(line) == 2 and line[0, 1] + line[1, 1] > 1e-6])
+    sheets = [line for line in lines if len(line) > 300]
+    np.testing.assert_allclose(np.linalg.norm(np.diff(bars, axis=1)[:, 0], axis=1), 0.01, rtol=1e-2)
+    shown = np.linspace(0, len(folded) - 1, 11).astype(int)
+    known = shown[np.isfinite(folded.slide[shown])]
+    assert len(sheets) == len(known)
+    assert (len(known) < 11) == (way in ("intuitive", "local"))
+    far = [points[0, 0] for points in sheets]  # of the sheet
+    np.testing.assert_allclose(far, folded.paper.length + folded.offset + folded.slide[known], atol=1e-6)
+    axes.figure.canvas.draw()
+    assert axes.get_legend().get_window_extent().y0 >= axes.get_window_extent().y1
+
+
+def test_what_is_said_of_half_a_circle_is_known():
+    assert "nan" not in repr(planned("a4", method="intuitive"))
+
+
 @pytest.mark.parametrize(("paper", "target"), [("us_letter", 0.2), ("cardboard", "half"), ("cardboard", 0.2)])
 def test_a_path_on_which_the_sheet_jumps_says_so_and_promises_no_slide(paper, target):
     """In simulation US Letter at .20 m slides back by 88 mm at .24 m/s, and cardboard snaps."""

@@ -14,7 +14,8 @@ from withe.deployment.pattern import Pattern
 __all__ = ["draw_plan"]
 
 FloatArray = npt.NDArray[np.float64]
-_MOST_SHOWN = 2.0  # coefficients of friction
+_MOST_SHOWN = 2.0  # coefficients of friction, by colours
+_MOST_DRAWN = 3.3  # and by lines: a little above what plans bear of a floor
 
 
 def draw_plan(pattern: Pattern, jaw: FloatArray, found: Feasibility, title: str) -> Any:
@@ -54,10 +55,12 @@ def _draw_needs(axes: Any, found: Feasibility, title: str) -> None:
     axes.axhline(found.friction, color="k", ls="--", lw=1.0, label="there is")
     for slip in found.slips:
         axes.axvspan(1e3 * slip.start, 1e3 * slip.end, color="tab:red", alpha=0.12, lw=0)
-    top = max(1.3 * found.friction, min(_MOST_SHOWN, 1.1 * float(np.max(np.maximum(found.floor, found.lift_off)))))
+    most = float(np.max(np.maximum(found.floor, found.lift_off)))
+    top = max(1.3 * found.friction, min(_MOST_DRAWN, 1.1 * most))
+    cut = f", up to {top:.1f}" if most > top else ""
     axes.set(
         xlabel="arc length from the free end [mm]",
-        ylabel="needed coefficient of friction",
+        ylabel=f"needed coefficient of friction{cut}",
         title=title,
         ylim=(0.0, top),
         xlim=(0.0, s[-1]),

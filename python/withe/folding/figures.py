@@ -58,4 +58,4 @@ def draw_fold(
     axes.set_aspect("equal")
     axes.set(xlabel="x [m]", ylabel="z [m]")
     axes.spines[["top", "right"]].set_visible(False)
-    axes.legend(frameon=False, loc="upper right")
+    axes.legend(frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0)  # over what is drawn

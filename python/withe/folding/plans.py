@@ -273,7 +273,8 @@ class Plan:
 
     def __repr__(self) -> str:
         slow = self.before_plunge()
-        ratio, curvature = np.max(slow.slip_ratio), np.max(slow.max_curvature)
+        # Of half a circle nothing is known from where the sheet jumps.
+        ratio, curvature = np.nanmax(slow.slip_ratio), np.nanmax(slow.max_curvature)
         way = f"{self.method}, {self.grasp}, {len(self)} poses in {self.times[-1]:.1f} s"
         if self.plunges_at is not None:
             way += f", plunges at {self.plunges_at:.1f} s"
@@ -283,14 +284,16 @@ class Plan:
         return f"Plan({way}, greatest {greatest}, fingers from the {self.side})"
 
     def plot(self, axes: Any | None = None, poses: int = 10) -> Any:
-        """Draw the sheet from the side at some of the poses, as planned, without slide.
+        """Draw the sheet from the side at some of the poses, as it is predicted to slide and hang there.
+
+        From `jumps_at` on nothing is predicted, and only the way of the edge is drawn.
 
         Parameters
         ----------
         axes : matplotlib.axes.Axes, optional
             To draw into; by default those of a new figure.
         poses : int
-            How many, evenly in travel.
+            How many, evenly in travel over the whole way.
 
         Returns
         -------
@@ -303,15 +306,18 @@ class Plan:
         """
         if axes is None:
             axes = require("matplotlib.pyplot", "view").subplots(layout="constrained")[1]
-        sheet, lgb = self.sheet, self.paper.gravito_bending_length
+        (sheet, slide), lgb = self._motion, self.paper.gravito_bending_length
         index = np.unique(np.linspace(0, len(self) - 1, validation.integer(poses, "poses", 1, 1000)).astype(int))
         index = index[sheet.valid[index]]
         outer = self.poses[:, [0, 2]]
+        moved = self.jaw.depth + self.offset + lgb * slide[index]  # the sheet's frame in the world
         views = [
-            side_view(forces, self._length, self._width) * lgb + [self.jaw.depth, 0.0]
-            for forces in forces_of(sheet)[index]
+            side_view(forces, self._length, self._width) * lgb + [along, 0.0]
+            for forces, along in zip(forces_of(sheet)[index], moved, strict=True)
         ]
-        draw_fold(axes, views, outer[index], outer, (-0.05 * self.paper.length, 1.05 * self.paper.length))
+        beyond = 0.05 * self.paper.length
+        farthest = max(float(points[:, 0].max()) for points in views)
+        draw_fold(axes, views, outer[index], outer, (-beyond, farthest + beyond))
         return axes
 
     def to_dict(self) -> dict[str, Any]:
