@@ -91,7 +91,9 @@ def planned(case: Case) -> folding.Plan:
     paper = replace(PAPERS[case.paper], friction=case.friction, width=case.width)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # of slide that is predicted
-        return folding.plan(paper, progress=False, **{"curvature": CURVATURES.get(case.paper, 2.5), **WAYS[case.way]})
+        asked = WAYS[case.way]
+        curvature = CURVATURES.get(case.paper) if asked.get("grasp") == "free" else None
+        return folding.plan(paper, progress=False, curvature=curvature, **asked)
 
 
 def row(case: Case, folds: list[Turned]) -> tuple[str, ...]:

@@ -66,7 +66,7 @@ def trial_of(key: Key, seed: int, sheet: dict) -> folding.Trial:
         target,
         seed,
         replans=REPLANS if watched else 0,
-        planner={"curvature": CURVATURES.get(case, 2.5), **asked},
+        planner={**asked, "curvature": CURVATURES.get(case) if asked.get("grasp") == "free" else None},
         sheet=sheet,
         believed=replace(paper, outline=folding.Paper.a4().outline, friction=friction) if way == STRIP else None,
         name=name_of(key),

@@ -165,6 +165,9 @@ def loop(count=300):
         (lambda: plan(CABLE, Pattern(wave()), tail=-0.1), "tail must not be negative"),
         (lambda: plan(CABLE, Pattern(wave()), "clever"), "controller must be"),
         (lambda: plan(CABLE, Pattern(wave()), speed=0.0), "speed must be positive"),
+        (lambda: plan(CABLE, Pattern(wave()), friction=-5.0), "friction must be positive, got -5"),
+        (lambda: plan(CABLE, Pattern(wave()), "intuitive", friction="a"), "friction must be a number, got 'a'"),
+        (lambda: plan(CABLE, Pattern(wave()), "optimised"), "'optimised' needs friction"),
         (lambda: plan(CABLE, Pattern(wave()), time_step=-1.0), "time_step must be positive"),
         (lambda: plan(CABLE, Pattern(loop())), "must not cross itself"),
         (lambda: plan(Cable.dlo(5), Pattern(wave(0.06))), "no floor holds this cable on this pattern"),
@@ -177,6 +180,16 @@ def loop(count=300):
 def test_bad_input_says_what_is_wrong(call, message):
     with pytest.raises(ValueError, match=message):
         call()
+
+
+@pytest.mark.parametrize("controller", ["exact", "least_friction"])
+def test_a_plan_that_needs_more_friction_than_there_is_says_so(controller, recwarn):
+    pattern = Pattern(wave())
+    needed = float(plan(CABLE, pattern, controller).needed_friction.max())
+    plan(CABLE, pattern, controller, friction=1.01 * needed)
+    assert not recwarn.list
+    with pytest.warns(UserWarning, match=rf"the cable slips: \d+ % .* than friction 0\.05, most {needed:.2f} at \d+ mm"):
+        plan(CABLE, pattern, controller, friction=0.05)
 
 
 def test_lines_of_what_a_pattern_needs_are_drawn_whole():

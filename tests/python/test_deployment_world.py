@@ -199,6 +199,7 @@ def test_a_cable_put_on_its_pattern_moves_only_where_friction_fails(arc):
     assert np.abs(still.laid - moving.laid).max() < 5e-4
 
 
+@pytest.mark.filterwarnings("ignore:the cable slips")
 def test_optimising_makes_up_for_what_slips():
     pattern = Pattern(bend(1.0, radius=0.03), smoothing=3e-4)  # needs more friction than there is
     exact, better = (

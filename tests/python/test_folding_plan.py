@@ -337,6 +337,8 @@ def test_saved_tables_hold_the_plan(tmp_path):
         ({"uncertainty": (0.1, 1.5)}, "uncertainty must be shares"),
         ({"uncertainty": 0.1}, "uncertainty must"),
         ({"curvature": 0.0}, "curvature must be positive"),
+        ({"curvature": 3.0}, "curvature bounds sheets of grasp 'free', whose moment may be any, not of 'moment_free'"),
+        ({"curvature": 2.5, "method": "intuitive"}, "curvature bounds sheets of grasp 'free'"),
         ({"speed": 0.0}, "speed must be positive"),
         ({"acceleration": float("nan")}, "acceleration must"),
         ({"jaw": Jaw(depth=0.1)}, "jaw must hold less than a fifth"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import warnings
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path as FilePath
@@ -204,7 +205,8 @@ def plan(
         as thick ones are (it needs torch); or the jaw straight above the lift-off point at the height of what still
         hangs, upright, the baseline of the dissertation (figure 9.2).
     friction : float
-        Coefficient between cable and floor, for "optimised".
+        Coefficient between cable and floor: "optimised" plans for it, of "exact" and "least_friction" it is told where
+        it does not hold the cable. The others know no forces.
     speed : float [m/s]
         Of the lift-off point.
     tail : float [m]
@@ -233,6 +235,11 @@ def plan(
         the way; no floor has the friction that the pattern needs; speed, tail, time step or friction not positive;
         "optimised" without friction; "network" for a cable or pattern beyond what it has learned.
 
+    Warns
+    -----
+    UserWarning
+        The pattern needs more than the given friction, and neither posts nor "optimised" make up for it.
+
     Examples
     --------
     >>> import numpy as np
@@ -251,6 +258,7 @@ def plan(
     for given, name, kind in ((cable, "cable", Cable), (pattern, "pattern", Pattern)):
         if not isinstance(given, kind):
             raise ValueError(f"{name} must be a withe.deployment.{kind.__name__}, got {type(given).__name__}")
+    friction = None if friction is None else validation.positive(friction, "friction")
     require_bendable(pattern, cable)
     require_room(posts, pattern, cable)
     if crossings == "refuse":
@@ -266,12 +274,14 @@ def plan(
     elif controller == "optimised":
         if friction is None:
             raise ValueError("controller 'optimised' needs friction, the floor's coefficient")
-        path, followed = _improved(held, pattern, path, validation.positive(friction, "friction"), start, progress)
+        path, followed = _improved(held, pattern, path, friction, start, progress)
         needed = _needed(pattern, held, followed, grasps_along(pattern, held, followed), bool(posts))
         way = way_along(held, path, grasps_along(path, held, followed))
     else:
         grasps = grasps_along(path, held, controller)
         needed, way = _needed(pattern, held, controller, grasps, bool(posts)), way_along(held, path, grasps)
+        if friction is not None and not posts and needed.max() > friction:
+            warnings.warn(_slips(pattern, needed, friction), UserWarning, stacklevel=2)
     motion = course(held, path, way, speed, time_step, start)
     return Plan(
         times=motion.times,
@@ -314,6 +324,13 @@ def _needed(pattern: Pattern, cable: Cable, controller: Controller, grasps: Gras
         missing = _missing_tail(pattern, cable, controller, worst)
         raise ValueError(f"no floor holds this cable on this pattern: {worst}{missing}")
     return found.needed
+
+
+def _slips(pattern: Pattern, needed: FloatArray, friction: float) -> str:
+    """How much of a pattern needs more friction than there is, and most where."""
+    share, most = 100.0 * float((needed > friction).mean()), int(needed.argmax())
+    where = f"{needed[most]:.2f} at {1e3 * pattern.arc_length[most]:.0f} mm"
+    return f"the cable slips: {share:.0f} % of the pattern needs more than friction {friction:g}, most {where}"
 
 
 def _worst_slip(found: Feasibility) -> Slip | None:

@@ -33,7 +33,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument("--target", type=_target, default="half", help="where the edge comes down [m], or half")
     parser.add_argument("--method", choices=["ucs", "slip", "local", "intuitive"], default="ucs")
     parser.add_argument("--grasp", choices=["moment_free", "free"], default="moment_free")
-    parser.add_argument("--curvature", type=float, default=2.5, metavar="K", help="bound of a free grasp [1/Lgb]")
+    parser.add_argument("--curvature", type=float, metavar="K", help="bound of a free grasp [1/Lgb] (default: 2.5)")
     parser.add_argument("--manifold", choices=["exact", "network"], default="exact")
     parser.add_argument("--ending", choices=["auto", "slow", "plunge"], default="auto", help="how the edge comes down")
     parser.add_argument("--out", type=Path, default=Path("fold.csv"), help="NAME.csv or NAME.json")

@@ -29,7 +29,7 @@ def plan(
     method: Method = "ucs",
     grasp: Grasp = "moment_free",
     uncertainty: tuple[float, float] = (0.1, 0.5),
-    curvature: float = 2.5,
+    curvature: float | None = None,
     jaw: Jaw | None = None,
     manifold: Source = "exact",
     ending: Ending = "auto",
@@ -68,7 +68,7 @@ def plan(
     replans : int
         How often that will be, by `fold`. Sheets on which plunges are tried are led so.
     curvature : float [1/Lgb]
-        Bound of a free moment's curvature.
+        Bound of the sheet's curvature with grasp "free", by default 2.5; without moment there is none.
     jaw : Jaw, optional
         How it holds the sheet; by default 10 mm of it.
     manifold : {"exact", "network"}
@@ -89,7 +89,7 @@ def plan(
     ------
     ValueError
         A target outside the sheet, or one that no pose of the grasp has; sizes and limits that are not positive; a
-        bound of curvature that is too low, with the least that would do; no path, with what blocks it; with ending
+        bound of curvature without a moment to keep it; a bound of curvature that is too low, with the least that would do; no path, with what blocks it; with ending
         "plunge", that none is within bounds.
 
     Warns

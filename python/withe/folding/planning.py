@@ -28,6 +28,7 @@ Grasp = Literal["moment_free", "free"]
 Source = Literal["exact", "network"]
 _POSES = 251
 _POSES_OF_REST = 101
+_CURVATURE = 2.5  # [1/Lgb] at most, where nobody says
 _CLEARANCE = 2e-3  # [m] of an edge on its way over the sheet
 
 
@@ -92,7 +93,7 @@ def slow_plan(
     method: Method,
     grasp: Grasp,
     uncertainty: tuple[float, float],
-    curvature: float,
+    curvature: float | None,
     jaw: Jaw | None,
     manifold: Source,
     speed: float,
@@ -107,6 +108,9 @@ def slow_plan(
     validation.choice(grasp, "grasp", ("moment_free", "free"))
     if grasp == "free" and method != "slip":
         raise ValueError(f"grasp 'free' is one of method 'slip', not of {method!r}")
+    bound = _CURVATURE if curvature is None else validation.positive(curvature, "curvature")
+    if curvature is not None and grasp != "free":
+        raise ValueError(f"curvature bounds sheets of grasp 'free', whose moment may be any, not of {grasp!r}")
     validation.choice(manifold, "manifold", ("exact", "network"))
     if manifold == "network" and (grasp == "free" or method == "intuitive"):
         raise ValueError(
@@ -129,7 +133,7 @@ def slow_plan(
         grasp=grasp,
         jaw=jaw,
         uncertainty=(float(lgb_share), float(friction_share)),
-        curvature=validation.positive(curvature, "curvature"),
+        curvature=bound,
         manifold=manifold,
         speed=validation.positive(speed, "speed"),
         turning=validation.positive(turning, "turning"),
