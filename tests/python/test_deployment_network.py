@@ -1,5 +1,7 @@
 """Networks that know where to hold a rod, against exact grasps; and plans made with one."""
 
+import copy
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +35,14 @@ def distances(found, exact, name):
 def test_the_small_one_comes_with_withe_and_is_small():
     assert SHIPPED.is_relative_to(Path(withe.__file__).parent)
     assert SHIPPED.stat().st_size < 300_000
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda network: pickle.loads(pickle.dumps(network))])
+def test_networks_are_pickled_and_copied(copied, small):
+    asked = small(5.0, [0.25, -1.0])  # it is used, and has what it is used with
+    again = copied(small)
+    assert type(again) is GraspNetwork
+    np.testing.assert_array_equal(again(5.0, [0.25, -1.0]).position, asked.position)
 
 
 @pytest.mark.parametrize("question", [new_questions(), (ROWS["lsbar"], ROWS["kappabar"], ROWS["ksbar"])])

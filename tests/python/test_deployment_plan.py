@@ -1,6 +1,8 @@
 """Plans of a gripper that lays a cable: the motion, its files, the command line, and what is refused."""
 
+import copy
 import json
+import pickle
 from itertools import pairwise
 
 import numpy as np
@@ -116,6 +118,15 @@ def test_files_hold_the_motion(motion, tmp_path):
     assert [part["name"] for part in held["phases"]] == [part.name for part in motion.phases]
     with pytest.raises(ValueError, match=r"must end in .csv or .json"):
         motion.save(tmp_path / "motion.txt")
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda motion: pickle.loads(pickle.dumps(motion))])
+def test_plans_are_pickled_and_copied(copied, motion):
+    assert len(motion.pattern.crossings) == 0  # which is kept
+    again = copied(motion)
+    assert again.cable == motion.cable
+    np.testing.assert_array_equal(again.path, motion.path)
+    np.testing.assert_array_equal(again.feasibility(0.3).needed, motion.feasibility(0.3).needed)
 
 
 def test_the_command_line_plans_and_says_what_holds(tmp_path, capsys):

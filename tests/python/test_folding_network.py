@@ -1,5 +1,7 @@
 """Networks that know how sheets hang, against exact equilibria; and plans made with one."""
 
+import copy
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +29,14 @@ def exact():
 def test_the_small_one_comes_with_withe_and_is_small():
     assert SHIPPED.is_relative_to(Path(withe.__file__).parent)
     assert SHIPPED.stat().st_size < 300_000
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda network: pickle.loads(pickle.dumps(network))])
+def test_networks_are_pickled_and_copied(copied, small):
+    asked = small([3.0, 4.0], 2.25)  # it is used, and has what it is used with
+    again = copied(small)
+    assert type(again) is SheetNetwork
+    np.testing.assert_array_equal(again([3.0, 4.0], 2.25).angle, asked.angle)
 
 
 def test_the_small_one_is_near_exact_equilibria(small, exact):

@@ -1,7 +1,9 @@
 """Plans of how paper is folded: what they promise, against what their poses say by themselves."""
 
 import ast
+import copy
 import json
+import pickle
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -319,6 +321,25 @@ def test_saved_tables_hold_the_plan(tmp_path):
     json.loads(planned("a4", method="intuitive").save(tmp_path / "snaps.json").read_text(), parse_constant=pytest.fail)
     with pytest.raises(ValueError, match=r"\.csv or \.json"):
         folded.save(tmp_path / "fold.txt")
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda folded: pickle.loads(pickle.dumps(folded))])
+@pytest.mark.parametrize("paper", [Paper.a4(), replace(Paper.origami(), length=0.4, width=0.4)])
+@pytest.mark.parametrize("method", ["ucs", "intuitive"])
+@pytest.mark.filterwarnings("ignore:the sheet jumps")
+def test_plans_that_have_been_used_are_pickled_and_copied(copied, paper, method):
+    folded = plan(paper, 0.25, method=method)
+    slide, worst = folded.slide, folded.worst_slide  # from the engine, and kept
+    again = copied(folded)
+    assert again.worst_slide == worst
+    np.testing.assert_array_equal(again.poses, folded.poses)
+    stiffer = replace(paper, gravito_bending_length=1.05 * paper.gravito_bending_length)
+    np.testing.assert_array_equal(again.slide, slide)
+    np.testing.assert_array_equal(again.slide_of(stiffer), folded.slide_of(stiffer))
+    if method == "ucs":
+        np.testing.assert_array_equal(
+            replan(again, again.poses[100], 0.002).poses, replan(folded, folded.poses[100], 0.002).poses
+        )
 
 
 @pytest.mark.parametrize(

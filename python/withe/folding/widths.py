@@ -42,6 +42,10 @@ class Width:
         """The same, for the engine."""
         return SheetWidth() if self.even else SheetWidth(list(self.places), list(self.widths))
 
+    def __getstate__(self) -> dict[str, object]:
+        """Without what is made for the engine, which is no part of a file or a copy."""
+        return {"places": self.places, "widths": self.widths}
+
     def weight(self, place: FloatArray | float) -> FloatArray:
         """Of the part from the tip to places [w Lgb]."""
         if self.even:

@@ -80,6 +80,10 @@ class Surrogate:
         """Write it to a file."""
         return self.network.save(path)
 
+    def __reduce__(self) -> tuple[type[Self], tuple[Network]]:
+        """By its network alone: what numbers mean is told by functions, which no file can hold."""
+        return type(self), (self.network,)
+
     def __repr__(self) -> str:
         return f"{type(self).__name__.removesuffix('Network')}{self.network!r}"
 
