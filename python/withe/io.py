@@ -18,7 +18,17 @@ import numpy.typing as npt
 
 from withe.common.frames import Frames, edges_to_nodes, stencils_to_nodes
 
-__all__ = ["load_arrays", "load_poses", "pose_path", "save_arrays", "save_poses", "write_vtk", "written_beside"]
+__all__ = [
+    "load_arrays",
+    "load_json",
+    "load_poses",
+    "pose_path",
+    "save_arrays",
+    "save_json",
+    "save_poses",
+    "write_vtk",
+    "written_beside",
+]
 
 _HEADER = "header"
 _POSE_COLUMNS = ("t", "x", "y", "z", "qx", "qy", "qz", "qw")
@@ -153,6 +163,10 @@ def _read_header(path: Path, text: npt.NDArray[Any], kind: str, version: int) ->
         header = json.loads(str(text))
     except (json.JSONDecodeError, RecursionError) as error:
         raise ValueError(f"{path} is not a withe file: its header is unreadable ({error})") from error
+    return _checked_header(path, header, kind, version)
+
+
+def _checked_header(path: Path, header: Any, kind: str, version: int) -> dict[str, Any]:
     if not isinstance(header, dict) or not str(header.get("format", "")).startswith("withe "):
         raise ValueError(f"{path} is not a withe file")
     if header["format"] != f"withe {kind}":
@@ -160,6 +174,33 @@ def _read_header(path: Path, text: npt.NDArray[Any], kind: str, version: int) ->
     if header.get("version") != version:
         raise ValueError(f"{path} is a {kind} of version {header.get('version')!r}, this withe reads version {version}")
     return header
+
+
+def save_json(path: str | os.PathLike[str], kind: str, version: int, content: Mapping[str, Any]) -> Path:
+    """Write numbers and words as JSON, with what they are and the version of their form before them."""
+    path = Path(path)
+    with written_beside(path) as beside:
+        text = json.dumps({"format": f"withe {kind}", "version": version, **content}, indent=1, allow_nan=False)
+        beside.write_text(text, encoding="utf-8")
+    return path
+
+
+def load_json(path: str | os.PathLike[str], kind: str, version: int) -> dict[str, Any]:
+    """Read what `save_json` wrote.
+
+    Raises
+    ------
+    ValueError
+        A file that is damaged, not ours, of another kind or of another version; the message names it.
+    OSError
+        The file cannot be opened.
+    """
+    path = Path(path)
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (json.JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise ValueError(f"{path} is not a withe file, or damaged: it is no JSON ({error})") from error
+    return _checked_header(path, content, kind, version)
 
 
 def save_poses(path: str | os.PathLike[str], times: npt.NDArray[np.float64], poses: npt.NDArray[np.float64]) -> Path:

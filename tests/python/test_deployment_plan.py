@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import withe
 from withe.__main__ import main
-from withe.deployment import Cable, Pattern, plan
+from withe.deployment import Cable, Pattern, Plan, Post, deploy, plan
 
 CABLE = Cable.dlo(2)
 JAW = 0.01  # [m] that are held
@@ -127,6 +127,44 @@ def test_plans_are_pickled_and_copied(copied, motion):
     assert again.cable == motion.cable
     np.testing.assert_array_equal(again.path, motion.path)
     np.testing.assert_array_equal(again.feasibility(0.3).needed, motion.feasibility(0.3).needed)
+
+
+@pytest.mark.parametrize("options", [{}, {"controller": "intuitive"}, {"start": "held", "posts": (Post(0.1, -0.1),)}])
+def test_a_plan_is_read_back_as_it_was(options, tmp_path):
+    cable = Cable(0.885, 1.6e-3, 0.032, natural_curvature=(0.3, -0.1))
+    motion = plan(cable, Pattern(wave(), lead_in=0.02), **options)
+    motion.save(tmp_path / "motion.json")
+    again = Plan.load(tmp_path / "motion.json")
+    assert vars(again).keys() == vars(motion).keys()
+    for name in vars(motion).keys() - {"pattern"}:
+        np.testing.assert_array_equal(getattr(again, name), getattr(motion, name))
+    for name, value in vars(motion.pattern).items():
+        np.testing.assert_array_equal(value, getattr(again.pattern, name))
+    assert str(again.feasibility(0.1)) == str(motion.feasibility(0.1))
+    if not options:
+        laid = [deploy(each, floor=0.4, nodes=40, quasi_static=True, progress=False).laid for each in (again, motion)]
+        np.testing.assert_array_equal(*laid)
+
+
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        (lambda text: text[:-200], "is not a withe file, or damaged: it is no JSON"),
+        (lambda text: text.replace("plan of a deployment", "plan of a fold"), "expected a withe plan of a deployment"),
+        (lambda text: text.replace('"laid"', '"lain"'), "is a damaged plan: it has no 'laid'"),
+        (lambda text: text.replace('"radius": 0.0016', '"radius": -1'), "damaged plan: radius must be positive"),
+        (lambda text: text.replace('"name": "lay"', '"name": "fly"'), "damaged plan: name of a phase must be"),
+        (lambda text: text.replace('"t": [', '"t": [-1.0, '), "damaged plan: quaternion_xyzw must have shape"),
+        (lambda text: text.replace('"arc_length": [', '"arc_length": [-1.0, '), "damaged plan: arc_length must grow"),
+    ],
+)
+def test_a_plan_that_is_damaged_is_refused(damage, message, motion, tmp_path):
+    motion.save(tmp_path / "motion.json")
+    text = (tmp_path / "motion.json").read_text()
+    assert damage(text) != text
+    (tmp_path / "motion.json").write_text(damage(text))
+    with pytest.raises(ValueError, match=message):
+        Plan.load(tmp_path / "motion.json")
 
 
 def test_the_command_line_plans_and_says_what_holds(tmp_path, capsys):

@@ -4,7 +4,7 @@ import ast
 import copy
 import json
 import pickle
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import cache
 from pathlib import Path
 
@@ -13,7 +13,7 @@ import pytest
 
 import withe
 from withe.__main__ import main
-from withe.folding import Jaw, Paper, elastica, plan, replan
+from withe.folding import Jaw, Paper, Plan, elastica, plan, replan
 from withe.folding.grid import make_grid
 from withe.folding.sheets import at_poses, forces_of
 
@@ -340,6 +340,66 @@ def test_plans_that_have_been_used_are_pickled_and_copied(copied, paper, method)
         np.testing.assert_array_equal(
             replan(again, again.poses[100], 0.002).poses, replan(folded, folded.poses[100], 0.002).poses
         )
+
+
+def same(first, second):
+    """Whether two plans, or what they are made of, are the same to the last digit."""
+    if isinstance(first, np.ndarray):
+        return first.dtype == second.dtype and np.array_equal(first, second, equal_nan=True)
+    if hasattr(first, "__dataclass_fields__"):
+        return all(same(getattr(first, each.name), getattr(second, each.name)) for each in fields(first))
+    return type(first) is type(second) and first == second
+
+
+def saved_plans():
+    yield planned("a4")
+    yield planned("a4", method="intuitive")
+    yield freely("a4")
+    yield replan(planned("a4"), planned("a4").poses[100], 0.004)
+    yield plan(Paper.origami(), 0.3, jaw=Jaw(depth=0.012), speed=0.03)
+
+
+def test_a_plan_is_read_back_as_it_was(tmp_path):
+    for number, folded in enumerate(saved_plans()):
+        again = Plan.load(folded.save(tmp_path / f"{number}.json"))
+        assert same(again, folded)
+        np.testing.assert_array_equal(again.slide, folded.slide)
+        assert repr(again) == repr(folded)
+    rest, other = (replan(each, folded.poses[100], 0.002) for each in (again, folded))
+    np.testing.assert_array_equal(rest.poses, other.poses)
+
+
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        (lambda text: text[: len(text) // 2], "is not a withe file, or damaged: it is no JSON"),
+        (lambda text: text.replace("withe plan of a fold", "withe record"), "holds a withe record, expected"),
+        (lambda text: text.replace('"version": 1', '"version": 7'), "of version 7, this withe reads version 1"),
+        (lambda text: "[1, 2]", "is not a withe file"),
+        (lambda text: text.replace('"jaw"', '"jaws"'), "is a damaged plan: it has no 'jaw'"),
+        (lambda text: text.replace('"friction": 0.12', '"friction": -1'), "damaged plan: friction must be positive"),
+        (lambda text: text.replace('"thickness"', '"weight"'), "damaged plan: .*weight"),
+        (lambda text: text.replace('"method": "ucs"', '"method": "best"'), "damaged plan: method must be"),
+        (lambda text: without(text, "times"), "damaged plan: poses must have shape"),
+        (lambda text: without(text, "angles"), "damaged plan: angles must have shape"),
+        (lambda text: json.dumps({**json.loads(text), "sheet": None}), "damaged plan: sheet must be known"),
+        (lambda text: json.dumps({**json.loads(text), "angles": [0.1] * 251}), "poses must be turned about y by angles"),
+    ],
+)
+def test_a_plan_that_is_damaged_is_refused(damage, message, tmp_path):
+    file = planned("a4").save(tmp_path / "fold.json")
+    text = file.read_text()
+    assert damage(text) != text
+    file.write_text(damage(text))
+    with pytest.raises(ValueError, match=message):
+        Plan.load(file)
+    with pytest.raises(OSError, match="nowhere"):
+        Plan.load(tmp_path / "nowhere.json")
+
+
+def without(text, name):
+    content = json.loads(text)
+    return json.dumps({**content, name: content[name][:-1]})
 
 
 @pytest.mark.parametrize(

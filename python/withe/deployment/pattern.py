@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any
 
@@ -21,6 +21,14 @@ from withe.perception import trace
 __all__ = ["Pattern"]
 
 FloatArray = npt.NDArray[np.float64]
+_COLUMNS: dict[str, tuple[int, ...]] = {  # arrays of a pattern, by node
+    "arc_length": (),
+    "points": (2,),
+    "tangent": (2,),
+    "curvature": (),
+    "curvature_slope": (),
+    "curvature_bend": (),
+}
 _FUNCTION_SAMPLES = 2001
 _SLOWEST = 0.15  # of the way along the curve over that along what was given, where it turns back by 160 degrees
 _MUCH_FARTHER = 1.5
@@ -259,6 +267,32 @@ class Pattern:
                 UserWarning,
                 stacklevel=3,
             )
+
+    def to_dict(self) -> dict[str, Any]:
+        """All its numbers as lists, for JSON. SI units."""
+        columns = {name: getattr(self, name).tolist() for name in ("raw", *_COLUMNS)}
+        return {**columns, "deviation": self.deviation, "lead_in": self.lead_in}
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Pattern:
+        """The pattern of which `to_dict` says so, to the last digit: it is not smoothed again.
+
+        Raises
+        ------
+        KeyError, TypeError, ValueError
+            Something is missing, not numbers, or does not fit the rest.
+        """
+        pattern = cls.__new__(cls)
+        pattern.raw = validation.number_array(content["raw"], "raw", ("m", 2))
+        pattern.arc_length = validation.number_array(content["arc_length"], "arc_length", ("nodes",))
+        count = len(pattern.arc_length)
+        if count < 2 or pattern.arc_length[0] != 0.0 or (np.diff(pattern.arc_length) <= 0.0).any():
+            raise ValueError("arc_length must grow from 0")
+        for name, shape in _COLUMNS.items():
+            setattr(pattern, name, validation.number_array(content[name], name, (count, *shape)))
+        pattern.deviation = validation.non_negative(content["deviation"], "deviation")
+        pattern.lead_in = validation.non_negative(content["lead_in"], "lead_in")
+        return pattern
 
     @property
     def length(self) -> float:

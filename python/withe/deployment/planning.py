@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import warnings
 from collections.abc import Sequence
@@ -24,8 +23,9 @@ from withe.deployment.optimising import optimised, runs
 from withe.deployment.pattern import Pattern
 from withe.deployment.pattern import crossings as crossings_of
 from withe.deployment.placing import require_room
+from withe.deployment.plan_files import KIND, VERSION, parts_of
 from withe.deployment.posts import Post
-from withe.io import pose_path, save_poses, written_beside
+from withe.io import load_json, pose_path, save_json, save_poses
 
 __all__ = ["Plan", "PlanController", "plan"]
 
@@ -109,7 +109,7 @@ class Plan:
         ----------
         path : str or Path
             ``.csv``, with the header t,x,y,z,qx,qy,qz,qw [s, m], which `withe.io.load_poses` reads, or ``.json``, with
-            phases, cable and pattern beside.
+            phases, cable and pattern beside, which `load` reads.
 
         Raises
         ------
@@ -120,10 +120,41 @@ class Plan:
         if path.suffix == ".csv":
             save_poses(path, self.times, np.column_stack([self.positions, self.rotations]))
         elif path.suffix == ".json":
-            with written_beside(path) as beside:
-                beside.write_text(json.dumps(self.to_dict()), encoding="utf-8")
+            save_json(path, KIND, VERSION, self.to_dict())
         else:
             raise ValueError(f"path must end in .csv or .json, got {path.name!r}")
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Plan:
+        """Read a plan that `save` wrote as JSON: the same to the last digit, for `deploy`, `plot` and all the rest.
+
+        Parameters
+        ----------
+        path : str or Path
+
+        Returns
+        -------
+        Plan
+
+        Raises
+        ------
+        ValueError
+            A file that is damaged, of something else (a table of poses has no plan), or of another version.
+        OSError
+            The file cannot be opened.
+
+        Examples
+        --------
+        >>> motion.save("motion.json")  # doctest: +SKIP
+        >>> withe.deployment.Plan.load("motion.json").feasibility(0.4)  # doctest: +SKIP
+        """
+        content = load_json(path, KIND, VERSION)
+        try:
+            return cls(**parts_of(content))
+        except KeyError as error:
+            raise ValueError(f"{path} is a damaged plan: it has no {error}") from error
+        except (AttributeError, TypeError, ValueError) as error:
+            raise ValueError(f"{path} is a damaged plan: {error}") from error
 
     def plot(self, friction: float) -> Any:
         """Draw the pattern coloured by the friction that it needs, the jaw's way, and each test along the cable.
@@ -156,14 +187,13 @@ class Plan:
                 "tail": self.tail,
             },
             "pattern": {
-                "points": self.pattern.points.tolist(),
-                "curvature": self.pattern.curvature.tolist(),
-                "deviation": self.pattern.deviation,
+                **self.pattern.to_dict(),
                 "needed_friction": [None if not np.isfinite(x) else x for x in self.needed_friction.tolist()],
             },
             "posts": [asdict(post) for post in self.posts],
             "motion": {
                 "t": self.times.tolist(),
+                "laid": self.laid.tolist(),
                 "position": self.positions.tolist(),
                 "quaternion_xyzw": self.rotations.tolist(),
             },

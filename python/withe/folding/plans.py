@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -18,9 +17,10 @@ from withe.common.extras import require
 from withe.folding.figures import draw_fold, side_view
 from withe.folding.jaw import Jaw, inner_edge
 from withe.folding.paper import Paper
+from withe.folding.plan_files import KIND, VERSION, listed, parts_of, sheet_listed
 from withe.folding.sheets import Elastica, at_forces, drag, forces_of, join, of_other, take
 from withe.folding.widths import Width, free_width
-from withe.io import pose_path, save_poses, written_beside
+from withe.io import load_json, pose_path, save_json, save_poses
 
 __all__ = ["SHORT", "Plan", "flat_forces"]
 
@@ -322,10 +322,6 @@ class Plan:
 
     def to_dict(self) -> dict[str, Any]:
         """Everything, with frames and units, as JSON takes it; what is not finite is None."""
-
-        def listed(values: FloatArray) -> list[Any]:
-            return [value if np.isfinite(value) else None for value in values.tolist()]
-
         return {
             "frames": {
                 "world": "origin where the middle of the lifted edge lay in the flat sheet; x along the sheet to its "
@@ -351,6 +347,7 @@ class Plan:
             "plunges_at": self.plunges_at,
             "plunge_slide": self.plunge_slide,
             "blocked": self.blocked,
+            "sheet": sheet_listed(self._foreseen),
             "prediction": {
                 "slip_ratio": listed(self.slip_ratio),
                 "slide": listed(self.slide),
@@ -367,7 +364,7 @@ class Plan:
         path : path-like
             "NAME.csv": columns t, x, y, z, qx, qy, qz, qw, the fields of geometry_msgs' PoseArray and
             trajectory_msgs' MultiDOFJointTrajectory, which `withe.io.load_poses` reads for a hand; "NAME.json":
-            everything.
+            everything, which `load` reads.
 
         Returns
         -------
@@ -383,6 +380,36 @@ class Plan:
             return save_poses(path, self.times, self.poses)
         if path.suffix != ".json":
             raise ValueError(f"path must end in .csv or .json, got {path.name!r}")
-        with written_beside(path) as beside:
-            beside.write_text(json.dumps(self.to_dict(), indent=1), encoding="utf-8")
-        return path
+        return save_json(path, KIND, VERSION, self.to_dict())
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Plan:
+        """Read a plan that `save` wrote as JSON: the same to the last digit, for `replan`, `plot` and all the rest.
+
+        Parameters
+        ----------
+        path : path-like
+
+        Returns
+        -------
+        Plan
+
+        Raises
+        ------
+        ValueError
+            A file that is damaged, of something else (a table of poses has no plan), or of another version.
+        OSError
+            The file cannot be opened.
+
+        Examples
+        --------
+        >>> plan.save("fold.json")  # doctest: +SKIP
+        >>> withe.folding.Plan.load("fold.json").plot()  # doctest: +SKIP
+        """
+        content = load_json(path, KIND, VERSION)
+        try:
+            return cls(**parts_of(content))
+        except KeyError as error:
+            raise ValueError(f"{path} is a damaged plan: it has no {error}") from error
+        except (AttributeError, TypeError, ValueError) as error:
+            raise ValueError(f"{path} is a damaged plan: {error}") from error

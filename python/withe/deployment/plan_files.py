@@ -1,0 +1,63 @@
+"""Plans of deployments in files: a plan's parts from what JSON says of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, get_args
+
+import numpy as np
+
+from withe.common import validation
+from withe.deployment.cable import Cable
+from withe.deployment.motion import Phase, Start
+from withe.deployment.pattern import Pattern
+from withe.deployment.posts import Post
+
+__all__ = ["KIND", "VERSION", "parts_of"]
+
+KIND, VERSION = "plan of a deployment", 1
+_CONTROLLERS = ("exact", "least_friction", "optimised", "network", "intuitive")
+_UNIT = 1e-9  # of quaternions
+
+
+def parts_of(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Arguments of a plan from what its `to_dict` says.
+
+    Raises
+    ------
+    KeyError, TypeError, ValueError
+        Something is missing, of another kind, or does not fit the rest.
+    """
+    motion, cable = content["motion"], dict(content["cable"])
+    times = validation.number_array(motion["t"], "t", ("n",))
+    rotations = validation.number_array(motion["quaternion_xyzw"], "quaternion_xyzw", (len(times), 4))
+    if len(times) < 2 or times[0] != 0.0 or (np.diff(times) <= 0.0).any():
+        raise ValueError("t must be two or more that grow from 0")
+    if (np.abs(np.linalg.norm(rotations, axis=1) - 1.0) > _UNIT).any():
+        raise ValueError("quaternion_xyzw must have length 1")
+    tail = validation.non_negative(cable.pop("tail"), "tail")
+    pattern = Pattern.from_dict(content["pattern"])
+    needed = content["pattern"]["needed_friction"]
+    missing = np.array([value is None for value in needed])
+    known = validation.number_array([value or 0.0 for value in needed], "needed_friction", (len(pattern.points),))
+    return {
+        "times": times,
+        "positions": validation.number_array(motion["position"], "position", (len(times), 3)),
+        "rotations": rotations,
+        "laid": validation.number_array(motion["laid"], "laid", (len(times),)),
+        "phases": tuple(_phase(phase) for phase in content["phases"]),
+        "cable": Cable(**cable),
+        "pattern": pattern,
+        "tail": tail,
+        "controller": validation.choice(content["controller"], "controller", _CONTROLLERS),
+        "start": validation.choice(content["start"], "start", get_args(Start)),
+        "speed": validation.positive(content["speed"], "speed"),
+        "fastest": validation.positive(content["fastest"], "fastest"),
+        "needed_friction": np.where(missing, np.nan, known),
+        "posts": tuple(Post(**post) for post in content["posts"]),
+    }
+
+
+def _phase(phase: Mapping[str, Any]) -> Phase:
+    name = validation.choice(phase["name"], "name of a phase", ("hang", "touch down", "lay"))
+    return Phase(name, validation.number(phase["start"], "start"), validation.number(phase["end"], "end"))
