@@ -264,6 +264,23 @@ def test_the_rest_of_a_fold_is_planned_anew_from_where_the_sheet_slid(at, slide)
     assert again.target == pytest.approx(rest.target)
 
 
+@pytest.mark.parametrize(
+    ("paper", "target"), [(Paper.origami(), "half"), (Paper.a4(), 0.02), (Paper.cardboard(), 0.1)]
+)
+@pytest.mark.filterwarnings("ignore:the sheet jumps")
+def test_a_target_out_of_reach_is_refused_with_those_that_can_be_reached(paper, target):
+    with pytest.raises(ValueError, match=r"targets from 0\.\d+ to 0\.\d+ m can be reached$") as refused:
+        plan(paper, target)
+    words = str(refused.value).split()
+    for reached in (float(words[-7]), float(words[-5])):
+        assert plan(paper, reached).poses[-1, 0] == pytest.approx(reached, abs=1e-8)
+
+
+def test_that_a_sheet_jumps_on_every_way_is_told_from_that_there_is_none():
+    with pytest.raises(ValueError, match=r"no path .*: the sheet jumps on all of them"):
+        plan(Paper.cardboard(), method="slip")
+
+
 def test_a_pose_far_from_any_sheet_is_refused():
     folded = planned("a4")
     with pytest.raises(ValueError, match="pose must be one of a sheet without moment"):

@@ -46,7 +46,7 @@ def plan(
     paper : Paper
     target : float or "half" [m]
         Where the lifted edge comes down, from where it lay (the dissertation's C); the crease is in the middle. "half":
-        on the far edge.
+        on the far edge, which long sheets do not reach without a moment: what is refused says which targets can be.
     method : {"ucs", "slip", "local", "intuitive"}
         "ucs": least accumulated ratio of the table's tangential to its normal force, on a grid of positions
         [dissertation, Alg. 7, with costs that accumulate]. "slip": no predicted slide where such a way exists, or else

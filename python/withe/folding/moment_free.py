@@ -26,7 +26,7 @@ from withe.folding.manifold import Manifold
 from withe.folding.sheets import SHORTEST, Elastica, at_forces, join, poses_of, slides_to_rest, take
 from withe.folding.widths import Width
 
-__all__ = ["SMOOTHING", "goal_pose", "greedy", "least_ratio", "least_slide", "smoothed", "uniform_cost"]
+__all__ = ["SMOOTHING", "connects", "goal_pose", "greedy", "least_ratio", "least_slide", "smoothed", "uniform_cost"]
 
 FloatArray = npt.NDArray[np.float64]
 _MOST_STEPS = 2000
@@ -71,6 +71,20 @@ def _ways_by_ratio(solve: Manifold, holding: Holding, goal: Elastica) -> Ways:
 def _by_ratio(solve: Manifold, holding: Holding) -> Network:
     grid = make_grid(solve)
     return make_network(grid, grid.pose.force_ratio, _allowed(solve, holding))
+
+
+def connects(solve: Manifold, holding: Holding, goal: Elastica) -> bool:
+    """Whether there is a path from flat to a goal at all."""
+    label = _parts(solve, holding)
+    return bool((label[nodes_near(_by_ratio(solve, holding), goal)] == label[0]).any())
+
+
+@lru_cache(maxsize=8)
+def _parts(solve: Manifold, holding: Holding) -> IndexArray:
+    """Of the grid that hang together, a label for each node."""
+    from scipy.sparse.csgraph import connected_components
+
+    return np.asarray(connected_components(_by_ratio(solve, holding).graph, directed=False)[1])
 
 
 def _allowed(solve: Manifold, holding: Holding) -> npt.NDArray[np.bool_]:

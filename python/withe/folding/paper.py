@@ -87,7 +87,9 @@ class Paper:
     def origami(cls, side: float = 0.35) -> Paper:
         """Square origami paper, Lgb 43 mm [Choi, dissertation, 7.8.3], to be folded over its diagonal.
 
-        It is held by a corner: its width grows from there to the middle, and falls again.
+        It is held by a corner: its width grows from there to the middle, and falls again. Of the default size, corner
+        on corner (the target "half") would lift more of it than can be led without a moment; the dissertation's target
+        is .30 m.
 
         Parameters
         ----------

@@ -28,6 +28,7 @@ Grasp = Literal["moment_free", "free"]
 Source = Literal["exact", "network"]
 _POSES = 251
 _POSES_OF_REST = 101
+_TARGETS = 150  # along a sheet, of which a message says whether they can be reached
 _CURVATURE = 2.5  # [1/Lgb] at most, where nobody says
 _CLEARANCE = 2e-3  # [m] of an edge on its way over the sheet
 
@@ -176,6 +177,8 @@ def _over_manifold(task: _Task) -> Plan:
         sheet = _smoothed(task, search(task.solve, task.holding, goal), _POSES)
     if sheet is None:
         ends = "the step of least force leads nowhere" if task.method == "local" else "those do not connect"
+        if task.method == "slip" and moment_free.connects(task.solve, task.holding, goal):
+            ends = "the sheet jumps on all of them"
         raise ValueError(f"no path to {task.target:g} m over poses that lift less than {task.length:.2f} Lgb: {ends}")
     if not sheet.valid.all():
         raise ValueError(f"no path to {task.target:g} m: between poses of the grid there are some without equilibrium")
@@ -340,7 +343,7 @@ def _checked_goal(goal: Elastica | None, task: _Task) -> Elastica:
     if goal is None:
         raise ValueError(
             f"target is {where:g} m, {where / lgb:.2f} Lgb: no pose without moment that lifts less than {LONGEST:g} "
-            f"Lgb, and more than {SHORTEST:g}, brings the edge there"
+            f"Lgb, and more than {SHORTEST:g}, brings the edge there{_reachable(task)}"
         )
     lifted = float(goal.suspended[0])
     for bound, wrong, what in (
@@ -348,8 +351,26 @@ def _checked_goal(goal: Elastica | None, task: _Task) -> Elastica:
         (SHORTEST, lifted <= SHORTEST, "more, so as not to be bent too sharply"),
     ):
         if wrong:
-            raise ValueError(f"target is {where:g} m: there {lifted:.2f} Lgb are lifted, not {what}: {bound:.2f}")
+            raise ValueError(
+                f"target is {where:g} m: there {lifted:.2f} Lgb are lifted, not {what}: {bound:.2f}{_reachable(task)}"
+            )
     return goal
+
+
+def _reachable(task: _Task) -> str:
+    """Between which targets a path leads to some, of those that stand evenly along the sheet."""
+
+    def reaches(target: float) -> bool:
+        goal = _goal(replace(task, target=target))
+        fits = goal is not None and SHORTEST < float(goal.suspended[0]) < task.length
+        return fits and moment_free.connects(task.solve, task.holding, goal)
+
+    targets = np.linspace(0.0, task.paper.length, _TARGETS + 1)[1:]
+    there = np.flatnonzero([reaches(float(target)) for target in targets])
+    if not len(there):
+        return "; no target can be reached without moment"
+    least, most = np.ceil(1e3 * targets[there[0]]) / 1e3, np.floor(1e3 * targets[there[-1]]) / 1e3
+    return f"; targets from {least:.3f} to {most:.3f} m can be reached"
 
 
 def _free(task: _Task) -> Plan:
