@@ -218,6 +218,7 @@ def test_bad_patterns_say_what_is_wrong(arguments, message):
             "250 of its gravito-bending lengths long",
         ),
         (lambda: measure(height=-1.0), "height must be positive"),
+        (lambda: measure(height=36.5), "height must be less than 10 m, got 36.5 m: is it in metres"),
         (lambda: measure(), "exactly one of height and image"),
         (lambda: measure(image=np.zeros((50, 50, 3), np.uint8)), "needs scale"),
         (lambda: measure(image=np.zeros((50, 50, 3), np.uint8), scale=1e-3), "it is plain"),

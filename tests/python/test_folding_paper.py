@@ -101,6 +101,7 @@ def test_strips_that_say_little_are_named():
     ("arguments", "message"),
     [
         ({"length": 0.0, "drop": 0.1}, "length must be positive"),
+        ({"length": 100, "drop": 30}, "length must be less than 10 m, got 100 m: are all in metres"),
         ({"length": 0.1, "drop": 0.2}, "tells nothing"),
         ({"length": 0.1, "drop": -0.1}, "drop must be positive"),
         ({"length": 0.1, "drop": 0.04, "error": -1.0}, "error must not be negative"),
@@ -111,6 +112,21 @@ def test_strips_that_say_little_are_named():
 def test_readings_that_cannot_be_are_refused(arguments, message):
     with pytest.raises(ValueError, match=message):
         measure(**arguments)
+
+
+@pytest.mark.parametrize(
+    ("sizes", "message"),
+    [
+        ((297, 210, 48), "length must be at most 20 m, got 297 m: are all sizes in metres"),
+        ((0.297, 210, 0.048), "width must be at most 20 m, got 210 m: are all sizes in metres"),
+        ((0.297, 0.21, 48), "gravito_bending_length must be at most 10 lengths, got 48 m: are all sizes in metres"),
+        ((0.297, 0.21, 0.048, 0.12, 0.1), "thickness must be at most a tenth of the length of 0.297 m, got 0.1 m"),
+    ],
+)
+def test_sizes_in_millimetres_are_refused(sizes, message):
+    with pytest.raises(ValueError, match=message):
+        Paper(*sizes)
+    assert Paper(19.0, 19.0, 19.0, thickness=1.0).length == 19.0
 
 
 def test_papers_are_as_published():

@@ -130,7 +130,7 @@ def measure(
     Raises
     ------
     ValueError
-        None or both of height and image, one that is not positive, an image without scale or without a loop, a negative
+        None or both of height and image, one that is not positive or above 10 m, an image without scale or without a loop, a negative
         error.
 
     Examples
@@ -152,6 +152,8 @@ def measure(
         validation.positive(height, "height"),
         validation.non_negative(5e-4 if error is None else error, "error"),
     )
+    if not height < _HIGHEST_LOOP:
+        raise ValueError(f"height must be less than {_HIGHEST_LOOP:g} m, got {height:g} m: is it in metres?")
     return MeasuredCable(height / LOOP_HEIGHT, error / LOOP_HEIGHT)
 
 

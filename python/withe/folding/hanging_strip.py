@@ -142,7 +142,7 @@ def measure(
     Raises
     ------
     ValueError
-        Neither length and drop nor image and scale, lengths that are not positive, a drop that no strip of the length
+        Neither length and drop nor image and scale, lengths that are not positive or above 10 m, a drop that no strip of the length
         can have, a picture without a sheet, two readings that are not of one strip.
 
     Examples
@@ -158,6 +158,8 @@ def measure(
         raise ValueError("measure needs length and drop, or image and scale")
     if by_ruler:
         along = validation.positive(length, "length")
+        if not along < _LONGEST_REACH:
+            raise ValueError(f"length must be less than {_LONGEST_REACH:g} m, got {along:g} m: are all in metres?")
         readings = {"drop": drop, "turned": turned}
         drops = [_checked_drop(down, along, name) for name, down in readings.items() if down is not None]
         error = validation.non_negative(5e-4 if error is None else error, "error")

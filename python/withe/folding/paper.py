@@ -13,6 +13,8 @@ from withe.common import validation
 __all__ = ["Paper", "require_length"]
 
 FloatArray = npt.NDArray[np.float64]
+_LARGEST = 20.0  # [m]
+_STIFFEST = 10.0  # lengths that Lgb may be: such a sheet droops by 6e-5 of its length
 
 
 @dataclass(frozen=True)
@@ -35,7 +37,8 @@ class Paper:
     Raises
     ------
     ValueError
-        A length or friction that is not positive, an outline that does not go from 0 to 1 or is nowhere 1 wide.
+        A length or friction that is not positive; sizes that no paper has, above 20 m, thicker than a tenth of the length
+        or with an Lgb of more than ten lengths, as are those in millimetres; an outline that does not go from 0 to 1 or is nowhere 1 wide.
 
     Examples
     --------
@@ -56,7 +59,19 @@ class Paper:
     def __post_init__(self) -> None:
         for name in ("length", "width", "gravito_bending_length", "friction", "thickness"):
             object.__setattr__(self, name, validation.positive(getattr(self, name), name))
+        self._require_metres()
         object.__setattr__(self, "outline", _checked_outline(self.outline))
+
+    def _require_metres(self) -> None:
+        """Refuse what no paper is, and sizes in millimetres are."""
+        for name, value, most, what in (
+            ("length", self.length, _LARGEST, f"{_LARGEST:g} m"),
+            ("width", self.width, _LARGEST, f"{_LARGEST:g} m"),
+            ("thickness", self.thickness, 0.1 * self.length, f"a tenth of the length of {self.length:g} m"),
+            ("gravito_bending_length", self.gravito_bending_length, _STIFFEST * self.length, f"{_STIFFEST:g} lengths"),
+        ):
+            if value > most:
+                raise ValueError(f"{name} must be at most {what}, got {value:g} m: are all sizes in metres?")
 
     def width_at(self, place: npt.ArrayLike) -> FloatArray:
         """How wide it is [m] at distances from the lifted edge [m]."""
