@@ -130,8 +130,8 @@ def measure(
     Raises
     ------
     ValueError
-        None or both of height and image, one that is not positive or above 10 m, an image without scale or without a loop, a negative
-        error.
+        None or both of height and image, one that is not positive or above 10 m, an image without scale or without a
+        loop, a negative error.
 
     Examples
     --------

@@ -50,8 +50,9 @@ def plan(
     method : {"ucs", "slip", "local", "intuitive"}
         "ucs": least accumulated ratio of the table's tangential to its normal force, on a grid of positions
         [dissertation, Alg. 7, with costs that accumulate]. "slip": no predicted slide where such a way exists, or else
-        as little as can be, to 2e-3 Lgb; then short and little bent. "local": from each pose to the next one of least tangential
-        force, after Petrik et al. 2016, with the right stiffness. "intuitive": half a circle [dissertation, (7.18)].
+        as little as can be, to 2e-3 Lgb; then short and little bent. "local": from each pose to the next one of least
+        tangential force, after Petrik et al. 2016, with the right stiffness. "intuitive": half a circle [dissertation,
+        (7.18)].
     grasp : {"moment_free", "free"}
         "moment_free": the angle of the jaw is that at which the sheet ends without curvature [dissertation, (7.6)].
         "free", of method "slip": the jaw turns the edge as it likes, and curvature is bounded.
@@ -88,9 +89,9 @@ def plan(
     Raises
     ------
     ValueError
-        A target outside the sheet, or one that no pose of the grasp has; sizes and limits that are not positive; a
-        bound of curvature without a moment to keep it; a bound of curvature that is too low, with the least that would do; no path, with what blocks it; with ending
-        "plunge", that none is within bounds.
+        A target outside the sheet, or one that no pose of the grasp has, with those that some have; sizes and limits
+        that are not positive; a bound of curvature without a moment to keep it, or one that is too low, with the least
+        that would do; no path, with what blocks it; with ending "plunge", that none is within bounds.
 
     Warns
     -----

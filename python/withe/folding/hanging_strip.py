@@ -142,8 +142,8 @@ def measure(
     Raises
     ------
     ValueError
-        Neither length and drop nor image and scale, lengths that are not positive or above 10 m, a drop that no strip of the length
-        can have, a picture without a sheet, two readings that are not of one strip.
+        Neither length and drop nor image and scale, lengths that are not positive or above 10 m, a drop that no strip
+        of the length can have, a picture without a sheet, two readings that are not of one strip.
 
     Examples
     --------
