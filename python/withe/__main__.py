@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import argparse
 import sys
+import warnings
 from collections.abc import Sequence
+from typing import Any
 
 from withe.deployment import command as deploy
 from withe.folding import command as fold
@@ -14,7 +16,7 @@ __all__ = ["main"]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; what the user gave wrongly is said in one line."""
+    """Run one command; what the user gave wrongly, and what is warned of, is said in one line."""
     parser = argparse.ArgumentParser(prog="withe", description="Tools around withe: soft robots made of slender rods.")
     commands = parser.add_subparsers(required=True, metavar="command")
     perceive.add_parser(commands)
@@ -22,10 +24,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     fold.add_parser(commands)
     parsed = parser.parse_args(arguments)
     try:
-        return int(parsed.run(parsed))
+        with warnings.catch_warnings():
+            warnings.simplefilter("always", UserWarning)
+            warnings.showwarning = _said
+            return int(parsed.run(parsed))
     except (ValueError, OSError, ImportError) as error:
         sys.stderr.write(f"withe: {error}\n")
         return 2
+
+
+def _said(message: Warning | str, *_: Any, **__: Any) -> None:
+    """In one line, as errors are: where in withe it was said helps nobody at a command line."""
+    sys.stderr.write(f"withe: {message}\n")
 
 
 if __name__ == "__main__":

@@ -195,10 +195,47 @@ def test_the_command_line_plans_and_says_what_holds(tmp_path, capsys):
         assert (tmp_path / "with_heights_plan.csv").read_text() == (tmp_path / "wave_plan.csv").read_text()
     with_heights.write_text("x,y,z\n0,0,0\n0.1,0\n")
     assert main(["deploy", str(with_heights), "--dlo", "2"]) == 2
-    assert "rows x,y,z in m, got '0.1,0'" in capsys.readouterr().err
+    assert "rows x,y,z, got '0.1,0'" in capsys.readouterr().err
     source.write_text("x,y\n0,0\nfar,away\n")
     assert main(["deploy", str(source), "--dlo", "2"]) == 2
-    assert "rows x,y in m, got 'far,away'" in capsys.readouterr().err
+    assert "rows x,y, got 'far,away'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("header", "size"),
+    [
+        ("x [mm], y [mm]", 1e-3),
+        ("x_cm,y_cm", 1e-2),
+        ('"x (in)","y (in)"', 0.0254),
+        ("x/m,y/m", 1.0),
+        ("X [MM],Y [MM]", 1e-3),
+    ],
+)
+def test_a_table_of_points_is_in_the_unit_that_its_header_says(header, size, tmp_path):
+    (tmp_path / "points.csv").write_text(header + "\n" + "\n".join(f"{x},{y}" for x, y in (wave() / size).tolist()))
+    out = ["--dlo", "2", "--out", str(tmp_path), "--no-picture"]
+    assert main(["deploy", str(tmp_path / "points.csv"), *out]) == 0
+    found = Plan.load(tmp_path / "points_plan.json").pattern
+    np.testing.assert_allclose(found.raw, wave(), atol=1e-12)
+
+
+def test_the_command_line_warns_and_refuses_in_one_line(tmp_path, capsys):
+    source, out = tmp_path / "wave.csv", ["--dlo", "2", "--out", str(tmp_path), "--no-picture"]
+    np.savetxt(source, 1e3 * wave(), delimiter=",")
+    assert main(["deploy", str(source), *out]) == 2
+    said = capsys.readouterr().err
+    assert "the pattern 517.3 m" in said
+    assert said.strip().endswith("is the pattern in metres?")
+    assert all(line.startswith("withe: ") for line in said.splitlines())
+    np.savetxt(source, wave(), delimiter=",")
+    assert main(["deploy", str(source), *out, "--friction", "0.05", "--nodes", "101"]) == 0
+    assert capsys.readouterr().err.startswith("withe: the cable slips: ")
+    assert len(Plan.load(tmp_path / "wave_plan.json").pattern.points) == 101
+    source.write_text("x [km],y [km]\n0,0\n1,1\n")
+    assert main(["deploy", str(source), *out]) == 2
+    assert capsys.readouterr().err == "withe: a pattern must be in m, mm, cm, in, got a column 'x [km]'\n"
+    assert main(["deploy", str(source), "--dlo", "2", "--out", str(source)]) == 2
+    assert "out must be a folder" in capsys.readouterr().err
 
 
 def loop(count=300):
@@ -237,7 +274,9 @@ def test_a_plan_that_needs_more_friction_than_there_is_says_so(controller, recwa
     needed = float(plan(CABLE, pattern, controller).needed_friction.max())
     plan(CABLE, pattern, controller, friction=1.01 * needed)
     assert not recwarn.list
-    with pytest.warns(UserWarning, match=rf"the cable slips: \d+ % .* than friction 0\.05, most {needed:.2f} at \d+ mm"):
+    with pytest.warns(
+        UserWarning, match=rf"the cable slips: \d+ % .* than friction 0\.05, most {needed:.2f} at \d+ mm"
+    ):
         plan(CABLE, pattern, controller, friction=0.05)
 
 

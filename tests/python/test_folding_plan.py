@@ -264,9 +264,7 @@ def test_the_rest_of_a_fold_is_planned_anew_from_where_the_sheet_slid(at, slide)
     assert again.target == pytest.approx(rest.target)
 
 
-@pytest.mark.parametrize(
-    ("paper", "target"), [(Paper.origami(), "half"), (Paper.a4(), 0.02), (Paper.cardboard(), 0.1)]
-)
+@pytest.mark.parametrize(("paper", "target"), [(Paper.origami(), "half"), (Paper.a4(), 0.02), (Paper.cardboard(), 0.1)])
 @pytest.mark.filterwarnings("ignore:the sheet jumps")
 def test_a_target_out_of_reach_is_refused_with_those_that_can_be_reached(paper, target):
     with pytest.raises(ValueError, match=r"targets from 0\.\d+ to 0\.\d+ m can be reached$") as refused:
@@ -300,6 +298,45 @@ def test_the_command_writes_a_plan(tmp_path, capsys):
     assert main(["fold", "--target", "0.5", "--out", f"{out}"]) == 2
     assert "target must be on the sheet" in capsys.readouterr().err
     assert main(["fold", "--lgb", "-1", "--out", f"{out}"]) == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--out", "foo.txt"], "withe: out must end in .csv or .json, got 'foo.txt'"),
+        (["--out", "nowhere/foo.csv"], "withe: out must be in a folder that there is, got 'nowhere/foo.csv'"),
+        (
+            ["--lgb", "48"],
+            "withe: gravito_bending_length must be at most 10 lengths, got 48 m: are all sizes in metres?",
+        ),
+        (["--thickness", "0.1"], "withe: thickness must be at most a tenth of the length"),
+        (["--curvature", "3"], "withe: curvature bounds sheets of grasp 'free'"),
+        (["--paper", "origami"], "m can be reached"),
+    ],
+)
+def test_the_command_refuses_in_one_line(arguments, message, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["fold", *arguments]) == 2
+    said = capsys.readouterr().err
+    assert message in said
+    assert said.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_command_says_what_a_target_may_be(capsys):
+    with pytest.raises(SystemExit):
+        main(["fold", "--target", "abc"])
+    assert "argument --target: must be half, or a place along the sheet in m, got 'abc'" in capsys.readouterr().err
+
+
+def test_the_command_takes_any_size_of_paper_and_warns_in_one_line(tmp_path, capsys):
+    sizes = ["--length", "0.28", "--width", "0.1", "--thickness", "2e-4", "--lgb", "0.05", "--friction", "0.2"]
+    assert main(["fold", *sizes, "--method", "slip", "--out", str(tmp_path / "fold.json")]) == 0
+    folded = Plan.load(tmp_path / "fold.json")
+    assert folded.paper == Paper(0.28, 0.1, 0.05, friction=0.2, thickness=2e-4)
+    said = capsys.readouterr().err
+    assert said.startswith("withe: the sheet slides: not to slide it needs friction 0.")
+    assert said.count("\n") == 1
 
 
 def test_limits_of_speed_and_acceleration_hold():
@@ -400,7 +437,10 @@ def test_a_plan_is_read_back_as_it_was(tmp_path):
         (lambda text: without(text, "times"), "damaged plan: poses must have shape"),
         (lambda text: without(text, "angles"), "damaged plan: angles must have shape"),
         (lambda text: json.dumps({**json.loads(text), "sheet": None}), "damaged plan: sheet must be known"),
-        (lambda text: json.dumps({**json.loads(text), "angles": [0.1] * 251}), "poses must be turned about y by angles"),
+        (
+            lambda text: json.dumps({**json.loads(text), "angles": [0.1] * 251}),
+            "poses must be turned about y by angles",
+        ),
     ],
 )
 def test_a_plan_that_is_damaged_is_refused(damage, message, tmp_path):

@@ -103,7 +103,9 @@ def test_the_planner_comes_down_slowly_where_no_paper_slides():
 def test_where_nothing_bears_the_uncertainty_the_plan_says_so():
     """Cardboard on a table that is all but without friction."""
     paper = replace(Paper.cardboard(), friction=0.02)
-    with pytest.warns(UserWarning, match=r"not to slide it needs friction 0\.6\d+, the paper has 0\.02; no plunge folds"):
+    with pytest.warns(
+        UserWarning, match=r"not to slide it needs friction 0\.6\d+, the paper has 0\.02; no plunge folds"
+    ):
         found = plan(paper, method="slip", grasp="free", curvature=4.0, progress=False)
     assert found.plunges_at is None
     assert "needs friction 0.6" in found.blocked

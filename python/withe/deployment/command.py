@@ -6,7 +6,7 @@ import argparse
 import re
 import sys
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,8 @@ from withe.deployment.pattern import Pattern
 from withe.deployment.planning import PlanController, plan
 
 __all__ = ["add_parser", "run"]
+
+_UNITS = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "in": 0.0254}  # [m]
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -31,7 +33,8 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument(
         "pattern",
         type=Path,
-        help="a CSV file of x, y [m], one row a point (a third column, z, is not used), or a picture with --scale",
+        help="a CSV file of x, y, one row a point (a third column, z, is not used), in m or as its header says, "
+        "'x [mm],y [mm]' say; or a picture with --scale",
     )
     parser.add_argument("--scale", type=float, help="size of a pixel of a picture [m]")
     parser.add_argument("--dlo", type=int, help="one of the five cables of the experiments, 1 to 5")
@@ -44,6 +47,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument(
         "--smoothing", type=float, default=1e-3, help="farthest from what is given [m] (default: %(default)s)"
     )
+    parser.add_argument("--nodes", type=int, default=301, help="points of the pattern (default: %(default)s)")
     parser.add_argument("--out", type=Path, default=Path("."), help="folder to write to (default: here)")
     parser.add_argument("--no-picture", action="store_true", help="write no PNG file")
     parser.set_defaults(run=run)
@@ -52,10 +56,13 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 def run(arguments: argparse.Namespace) -> int:
     """Plan, write the files and say what will hold."""
     cable = _cable(arguments)
+    if arguments.out.exists() and not arguments.out.is_dir():
+        raise ValueError(f"out must be a folder, {str(arguments.out)!r} is a file")
+    shape: dict[str, Any] = {"smoothing": arguments.smoothing, "nodes": arguments.nodes}
     if arguments.pattern.suffix.lower() == ".csv":
-        pattern = Pattern(_points(arguments.pattern), smoothing=arguments.smoothing)
+        pattern = Pattern(_points(arguments.pattern), **shape)
     else:
-        pattern = Pattern(image=arguments.pattern, scale=arguments.scale, smoothing=arguments.smoothing)
+        pattern = Pattern(image=arguments.pattern, scale=arguments.scale, **shape)
     motion = plan(cable, pattern, arguments.controller, friction=arguments.friction, speed=arguments.speed)
     arguments.out.mkdir(parents=True, exist_ok=True)
     stem = arguments.out / f"{arguments.pattern.stem}_plan"
@@ -82,21 +89,34 @@ def _cable(arguments: argparse.Namespace) -> Cable:
 
 
 def _points(path: Path) -> npt.NDArray[np.float64]:
-    """Columns x, y of a file, in the order of its header if it has one; there may be a third one, z."""
+    """Columns x, y of a file [m], in the order and units of its header if it has one; there may be a third one, z."""
     lines = path.read_text(encoding="utf-8-sig").splitlines()  # spreadsheets begin with a byte order mark
+    sizes = np.ones(2)
     names = ["x", "y", "z"] if lines and _is_row(lines[0], 3) else ["x", "y"]
     if lines and not _is_row(lines[0], len(names)):
         heads = [re.fullmatch(r'\s*"?([xyz])([^a-z].*)?', name, re.IGNORECASE) for name in lines[0].split(",")]
         names = [head[1].lower() if head else "" for head in heads]
         if sorted(names) not in (["x", "y"], ["x", "y", "z"]):
             raise ValueError(f"{path.name} must begin with a row x,y or x,y,z, or with numbers, got {lines[0]!r}")
+        named = dict(zip(names, lines[0].split(","), strict=True))
+        sizes = np.array([_unit(named[name]) for name in ("x", "y")])
         lines = lines[1:]
     rows = [line for line in lines if line.strip()]
     bad = next((row for row in rows if not _is_row(row, len(names))), None)
     if bad is not None:
-        raise ValueError(f"{path.name} must hold rows {','.join(names)} in m, got {bad!r}")
+        raise ValueError(f"{path.name} must hold rows {','.join(names)}, got {bad!r}")
     numbers = np.array([[float(number) for number in row.split(",")] for row in rows]).reshape(-1, len(names))
-    return numbers[:, [names.index("x"), names.index("y")]]
+    return np.asarray(sizes * numbers[:, [names.index("x"), names.index("y")]])
+
+
+def _unit(head: str) -> float:
+    """Of a column whose head may end in one, 'x [mm]', 'x (mm)', 'x_mm' or 'x/mm' [m]."""
+    found = re.search(r"[\[(_/\s]\s*([^\W\d_]+)\s*[\])]?\s*\"?\s*$", head)
+    if found is None:
+        return 1.0
+    if found[1].lower() not in _UNITS:
+        raise ValueError(f"a pattern must be in {', '.join(_UNITS)}, got a column {head.strip()!r}")
+    return _UNITS[found[1].lower()]
 
 
 def _is_row(line: str, count: int) -> bool:

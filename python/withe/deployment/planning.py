@@ -34,6 +34,7 @@ PlanController = Literal["exact", "least_friction", "optimised", "network", "int
 _TAIL_SHARES = (1.0, 0.5, 0.5, 0.5)  # of the one before, where a tail crosses
 _TAIL = 4.0  # [Lgb] of cable beyond the pattern, where there is so much: shorter ends need much friction
 _OPTIMISING_SPEED, _OPTIMISING_STEP = 0.025, 0.04  # [m/s], [s]: of quasi-static runs, where only the way counts
+_MUCH_LONGER = 50.0  # than its cable: a pattern in millimetres
 _MOST_FRICTION = 3.0  # no floor has more
 
 
@@ -392,6 +393,8 @@ def _held(cable: Cable, pattern: Pattern, tail: float | None) -> tuple[Cable, fl
     room = cable.length - 0.5 * JAW - pattern.length
     if room < 0.0:
         holds = f"; a jaw holds {1e3 * JAW:g} mm of it"
+        if pattern.length > _MUCH_LONGER * cable.length:
+            holds = ": is the pattern in metres?"
         raise ValueError(f"the cable is {cable.length:g} m long, the pattern {pattern.length:.4g} m{holds}")
     if tail is None:
         tail = min(room, _TAIL * cable.gravito_bending_length)

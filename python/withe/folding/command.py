@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-import warnings
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,7 +16,10 @@ _PAPERS = {"a4": Paper.a4, "us_letter": Paper.us_letter, "cardboard": Paper.card
 
 
 def _target(text: str) -> float | str:
-    return text if text == "half" else float(text)
+    try:
+        return text if text == "half" else float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"must be half, or a place along the sheet in m, got {text!r}") from None
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -27,7 +29,10 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         help="plan how a gripper folds paper",
         description="Plan how a gripper folds paper; write poses and times as CSV, or everything as JSON.",
     )
-    parser.add_argument("--paper", choices=sorted(_PAPERS), default="a4")
+    parser.add_argument("--paper", choices=sorted(_PAPERS), default="a4", help="a known one (default: a4)")
+    parser.add_argument("--length", type=float, metavar="M", help="of the sheet, along the fold's way [m]")
+    parser.add_argument("--width", type=float, metavar="M", help="of the sheet [m]")
+    parser.add_argument("--thickness", type=float, metavar="M", help="of the sheet [m] (default: 1e-4)")
     parser.add_argument("--lgb", type=float, metavar="M", help="gravito-bending length [m], if not the paper's")
     parser.add_argument("--friction", type=float, help="coefficient between sheet and table (default: 0.12)")
     parser.add_argument("--target", type=_target, default="half", help="where the edge comes down [m], or half")
@@ -42,25 +47,24 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def run(arguments: argparse.Namespace) -> int:
     """Plan, write the file and say what was planned."""
-    paper = _PAPERS[arguments.paper]()
-    paper = replace(
+    _require_writable(arguments.out)
+    given = {
+        "length": arguments.length,
+        "width": arguments.width,
+        "thickness": arguments.thickness,
+        "gravito_bending_length": arguments.lgb,
+        "friction": arguments.friction,
+    }
+    paper = replace(_PAPERS[arguments.paper](), **{name: value for name, value in given.items() if value is not None})
+    found = plan(
         paper,
-        gravito_bending_length=paper.gravito_bending_length if arguments.lgb is None else arguments.lgb,
-        friction=paper.friction if arguments.friction is None else arguments.friction,
+        arguments.target,
+        method=arguments.method,
+        grasp=arguments.grasp,
+        curvature=arguments.curvature,
+        manifold=arguments.manifold,
+        ending=arguments.ending,
     )
-    with warnings.catch_warnings(record=True) as said:
-        warnings.simplefilter("always")
-        found = plan(
-            paper,
-            arguments.target,
-            method=arguments.method,
-            grasp=arguments.grasp,
-            curvature=arguments.curvature,
-            manifold=arguments.manifold,
-            ending=arguments.ending,
-        )
-    for warning in said:
-        sys.stderr.write(f"withe: {warning.message}\n")
     file = found.save(arguments.out)
     jump = found.jumps_at
     end = f"slides {1e3 * found.slide[-1]:.1f} mm" if jump is None else f"jumps at {jump:.1f} s, before the end"
@@ -68,3 +72,11 @@ def run(arguments: argparse.Namespace) -> int:
         end = f"slides {1e3 * found.slide[found.times <= found.plunges_at][-1]:.1f} mm, plunges at {jump:.1f} s"
     sys.stdout.write(f"{found!r}\npredicted: {end}\n{file}\n")
     return 0
+
+
+def _require_writable(out: Path) -> None:
+    """Refuse a file that could not be written before anything is planned for it."""
+    if out.suffix not in (".csv", ".json"):
+        raise ValueError(f"out must end in .csv or .json, got {out.name!r}")
+    if not out.parent.is_dir():
+        raise ValueError(f"out must be in a folder that there is, got {str(out)!r}")

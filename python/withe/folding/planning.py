@@ -204,9 +204,7 @@ def _least_sliding(task: _Task, goal: Elastica, start: Elastica | None, count: i
     return _smoothed(task, nodes, count)
 
 
-def _with_friction(
-    task: _Task, enough: float, goal: Elastica, start: Elastica | None, count: int
-) -> Elastica | None:
+def _with_friction(task: _Task, enough: float, goal: Elastica, start: Elastica | None, count: int) -> Elastica | None:
     """Poses without moment that ask for no more friction at nodes than is enough, or for the least that there is."""
     return _smoothed(task, moment_free.least_ratio(task.solve, task.holding, enough, goal, start), count)
 
@@ -362,8 +360,9 @@ def _reachable(task: _Task) -> str:
 
     def reaches(target: float) -> bool:
         goal = _goal(replace(task, target=target))
-        fits = goal is not None and SHORTEST < float(goal.suspended[0]) < task.length
-        return fits and moment_free.connects(task.solve, task.holding, goal)
+        if goal is None or not SHORTEST < float(goal.suspended[0]) < task.length:
+            return False
+        return moment_free.connects(task.solve, task.holding, goal)
 
     targets = np.linspace(0.0, task.paper.length, _TARGETS + 1)[1:]
     there = np.flatnonzero([reaches(float(target)) for target in targets])
