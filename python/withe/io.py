@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from withe.common import validation
 from withe.common.frames import Frames, edges_to_nodes, stencils_to_nodes
 
 __all__ = [
@@ -77,7 +78,7 @@ def save_arrays(
     Parameters
     ----------
     path : path
-        Where to; written exactly there, whatever its suffix.
+        Where to, ending in .npz.
     kind : str
         What the file holds, such as "record"; `load_arrays` refuses any other kind.
     version : int
@@ -95,11 +96,11 @@ def save_arrays(
     Raises
     ------
     ValueError
-        An array that holds objects.
+        Another suffix, or an array that holds objects.
     OSError
         The file cannot be written.
     """
-    path = Path(path)
+    path = validation.file_path(path, ".npz")
     for name, array in arrays.items():
         if array.dtype.hasobject:
             raise ValueError(f"array {name!r} for {path} must hold numbers, got objects")

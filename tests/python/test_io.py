@@ -5,6 +5,7 @@ import json
 import os
 import pathlib
 import pickle
+import re
 import zipfile
 from dataclasses import fields
 
@@ -269,6 +270,25 @@ def test_a_header_that_no_tokenizer_reads_is_a_damaged_file(tmp_path):
         archive.writestr("header.npy", b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header + bytes(24))
     with pytest.raises(ValueError, match=r"file.npz is not a withe file, or damaged"):
         Record.load(path)
+
+
+@pytest.mark.parametrize("name", ["tip.csv", "arm.h5", "arm.vtk", "arm.json", "arm.txt", "arm"])
+def test_records_and_snapshots_are_saved_as_npz_alone_and_say_so(name, record, tmp_path):
+    _, _, simulation = cantilever(nodes=4)
+    with pytest.raises(ValueError, match=rf"end in \.npz, got '.*{name}'; to_vtk writes for ParaView; a table"):
+        record.save(tmp_path / name)
+    with pytest.raises(ValueError, match=rf"path must end in \.npz, got '.*{name}'$"):
+        simulation.snapshot().save(tmp_path / name)
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_table_that_a_refused_record_names_is_one(record, tmp_path):
+    with pytest.raises(ValueError, match=r"must end in .npz") as refused:
+        record.save(tmp_path / "tip.csv")
+    call = re.search(r"numpy.savetxt\(.*delimiter=','\)", str(refused.value))[0]
+    eval(call, {"numpy": np, "record": record, "rod": record.rods[0].name, "path": tmp_path / "tip.csv"})
+    rows = np.loadtxt(tmp_path / "tip.csv", delimiter=",")
+    np.testing.assert_allclose(rows[:, 1:], record.positions(record.rods[0].name)[:, -1], rtol=1e-15)
 
 
 def test_a_full_disk_leaves_the_file_that_was_there(record, tmp_path, monkeypatch):

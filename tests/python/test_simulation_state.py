@@ -146,8 +146,8 @@ def test_a_load_function_of_the_scene_serves_snapshots_from_files(tmp_path):
 
     one, two = build(), build()
     one.step(4)
-    one.snapshot().save(tmp_path / "s")
-    two.restore(withe.Snapshot.load(tmp_path / "s"))
+    one.snapshot().save(tmp_path / "s.npz")
+    two.restore(withe.Snapshot.load(tmp_path / "s.npz"))
     one.step(4)
     two.step(4)
     assert same_state(one, two)

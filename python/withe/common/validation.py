@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 import numbers
+import os
 import reprlib
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +16,7 @@ import numpy.typing as npt
 __all__ = [
     "broadcast_arrays",
     "choice",
+    "file_path",
     "function",
     "has_masked",
     "integer",
@@ -110,6 +113,14 @@ def choice(value: Any, what: str, options: Sequence[str]) -> str:
     if not isinstance(value, str) or value not in options:
         raise ValueError(f"{what} must be {' or '.join(map(repr, options))}, got {_short(value)}")
     return value
+
+
+def file_path(value: str | os.PathLike[str], *suffixes: str, instead: str = "") -> Path:
+    """Where a file is to be written, whose suffix says what is in it; `instead` names the way to other formats."""
+    path = Path(value)
+    if path.suffix.lower() not in suffixes:
+        raise ValueError(f"path must end in {' or '.join(suffixes)}, got {str(path)!r}{instead and f'; {instead}'}")
+    return path
 
 
 def function(value: Any, what: str) -> Callable[..., Any]:

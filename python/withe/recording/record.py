@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe import io, view
+from withe.common import validation
 from withe.common.frames import ENERGIES, EnergyHistory
 from withe.common.outlines import Named, ObstacleOutline, RodOutline, SpringOutline, index_of
 
@@ -35,6 +36,10 @@ _UNITS = {
     "energy": "J",
     "radii": "m",
 }
+_OTHER_FORMATS = (
+    "to_vtk writes for ParaView; a table is numpy.savetxt(path, "
+    "numpy.column_stack([record.times, record.positions(rod)[:, -1]]), delimiter=','), of a tip say"
+)
 ROD_READOUTS = ("directors", "curvatures", "twists", "tensions", "spins")
 
 
@@ -317,11 +322,17 @@ class Record:
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the record to one .npz file that NumPy alone can read.
 
+        For ParaView there is `to_vtk`; a table is what its columns are to be:
+        ``numpy.savetxt("tip.csv", numpy.column_stack([record.times, record.positions("arm")[:, -1]]), delimiter=",")``.
+
         Raises
         ------
+        ValueError
+            A path with another suffix.
         OSError
             The file cannot be written.
         """
+        path = validation.file_path(path, ".npz", instead=_OTHER_FORMATS)
         header = {
             "units": _UNITS,
             "rods": [{"name": rod.name, "closed": rod.closed} for rod in self._rods],

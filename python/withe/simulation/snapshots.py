@@ -100,6 +100,8 @@ class Snapshot:
 
         Raises
         ------
+        ValueError
+            A path with another suffix.
         OSError
             The file cannot be written.
         """

@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from withe.common import validation
 from withe.common.extras import require
 from withe.common.frames import Frames
 from withe.common.keywords import keyword_hints
@@ -79,7 +80,7 @@ def picture(
     RuntimeError
         Nothing can be rendered here; the message names the package to install.
     """
-    path = _path(path, ".png")
+    path = validation.file_path(path, ".png")
     number = _frame(record, frame)
     others = [_frame(record, ghost) for ghost in ghosts]
     stage = Stage(
@@ -148,7 +149,7 @@ def animate(
         Nothing can be rendered here, or ffmpeg fails, as on a full disk; the message says why, and what was in
         the file before is left.
     """
-    path = _path(path, ".mp4", ".gif")
+    path = validation.file_path(path, ".mp4", ".gif")
     fps = float(fps if fps is not None else (30.0 if path.suffix.lower() == ".mp4" else 20.0))
     for name, value in (("fps", fps), ("speed", speed)):
         if not (np.isfinite(value) and value > 0.0):
@@ -230,13 +231,6 @@ def _frame(record: Frames, frame: int) -> int:
     if int(frame) != frame or not -count <= frame < count:
         raise ValueError(f"frame must lie in {-count}..{count - 1}, got {frame!r}")
     return int(frame) % count
-
-
-def _path(path: str | os.PathLike[str], *suffixes: str) -> Path:
-    path = Path(path)
-    if path.suffix.lower() not in suffixes:
-        raise ValueError(f"path must end in {' or '.join(suffixes)}, got {str(path)!r}")
-    return path
 
 
 def _even(size: Sequence[int]) -> Sequence[int]:
