@@ -15,7 +15,6 @@ python examples/follow_by_gradients.py [STEPS] [SEED] [FOLDER]; 300,000 control 
 from __future__ import annotations
 
 import sys
-import warnings
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -167,7 +166,6 @@ def main() -> None:
     check_tools()
     steps, seed = int(sys.argv[1]) if len(sys.argv) > 1 else 300_000, int(sys.argv[2]) if len(sys.argv) > 2 else 0
     folder = Path(sys.argv[3]) if len(sys.argv) > 3 else Path("out/follow_by_gradients")
-    warnings.simplefilter("ignore", withe.CoarseStepWarning)  # steps are as long as a tip within 1 cm allows
     policy = learn(steps, seed, Curve(folder, between=10_000, task=Aimed()))
     draw_curve(folder, "analytic policy gradients")
     film(lambda seen, _: policy.predict(seen, deterministic=True)[0], folder / "learned.mp4", task=Aimed())

@@ -13,7 +13,6 @@ from __future__ import annotations
 import importlib.util
 import sys
 import time
-import warnings
 from pathlib import Path
 from typing import Any
 
@@ -129,7 +128,6 @@ def main() -> None:
     check_tools()
     steps, seed = int(sys.argv[1]) if len(sys.argv) > 1 else 1_300_000, int(sys.argv[2]) if len(sys.argv) > 2 else 0
     folder = Path(sys.argv[3]) if len(sys.argv) > 3 else Path("out/learn_follow")
-    warnings.simplefilter("ignore", withe.CoarseStepWarning)  # steps are as long as a tip within 1 cm allows
     policy = withe.learning.train_policy(
         Aimed(),
         steps,

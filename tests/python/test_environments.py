@@ -1,6 +1,7 @@
 """Environments for reinforcement learning: Gymnasium's checker, equal seeds, what is refused."""
 
 import itertools
+import pickle
 import random
 
 import numpy as np
@@ -23,7 +24,7 @@ SIZES = {
 }
 
 pytestmark = [
-    pytest.mark.filterwarnings("ignore::withe.CoarseStepWarning"),  # random actions make arms whip
+    pytest.mark.filterwarnings("error::withe.CoarseStepWarning"),
     pytest.mark.filterwarnings("ignore:.*Box observation space.*:UserWarning"),
 ]
 
@@ -394,6 +395,37 @@ def test_what_a_task_returns_in_another_shape_or_not_finite_is_refused(method, f
     with pytest.raises(ValueError, match=r"Careless") as error:
         stepped()
     assert str(error.value).startswith(f"Careless.{method} {message}")
+
+
+@pytest.mark.parametrize("name", ["Follow", "Reach", "Obstacles2D", "Obstacles3D"])
+def test_steps_that_are_long_on_purpose_are_no_reason_for_a_warning_and_longer_ones_are(name):
+    class Longer(getattr(withe.learning, name)):
+        """Steps that nobody has measured."""
+
+        time_step = 0.1
+
+    def whip(task):
+        many = withe.learning.VectorEnvironment(task, 8, workers=1)
+        many.reset(seed=0)
+        many.action_space.seed(0)
+        alone = pickle.loads(pickle.dumps(many.robots[0])).copy()
+        for _ in range(30):
+            actions = many.action_space.sample()
+            many.step(actions)
+            alone.set_natural_curvature("arm", many.robots[0].get("arm", "natural_curvature"))
+            alone.step()
+
+    whip(getattr(withe.learning, name)())
+    with pytest.raises(withe.CoarseStepWarning, match=r"are too long for what moves"):
+        whip(Longer())
+
+
+@pytest.mark.filterwarnings("ignore:.*:DeprecationWarning")
+def test_environments_by_name_say_which_options_they_have_and_how_to_make_others():
+    for make, environment in ((gymnasium.make, "Environment"), (gymnasium.make_vec, "VectorEnvironment")):
+        with pytest.raises(TypeError, match=r"withe/Follow-v0 has no option 'speed', only .*render_mode") as it:
+            make("withe/Follow-v0", speed=1.0)
+        assert f"class Other(withe.learning.Follow): ..., then withe.learning.{environment}(Other())" in str(it.value)
 
 
 def test_a_control_step_is_a_whole_number_of_time_steps():

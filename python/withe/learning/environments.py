@@ -313,16 +313,17 @@ def environment_class(name: str) -> Any:
     return type(name, (own, base), {"__doc__": own.__doc__, "__module__": "withe.learning"})
 
 
-def maker(task: Callable[..., Task]) -> Callable[..., Any]:
-    """What `gymnasium.make` calls: options of the environment, the rest are the task's."""
+def maker(task: type[Task]) -> Callable[..., Any]:
+    """What `gymnasium.make` calls, with options of the environment; a task has none."""
 
-    def make(render_mode: str | None = None, **options: Any) -> Any:
-        return environment_class("Environment")(task(**options), render_mode)
+    def make(render_mode: str | None = None, **others: Any) -> Any:
+        _refuse(task, others, "Environment", "render_mode")
+        return environment_class("Environment")(task(), render_mode)
 
     return make
 
 
-def vector_maker(task: Callable[..., Task]) -> Callable[..., Any]:
+def vector_maker(task: type[Task]) -> Callable[..., Any]:
     """What `gymnasium.make_vec` calls; as for `gymnasium.make`, max_episode_steps=-1 is no limit but the task's."""
 
     def make(
@@ -331,9 +332,19 @@ def vector_maker(task: Callable[..., Task]) -> Callable[..., Any]:
         render_mode: str | None = None,
         autoreset: str = "next_step",
         max_episode_steps: int | None = None,
-        **options: Any,
+        **others: Any,
     ) -> Any:
+        _refuse(task, others, "VectorEnvironment", "num_envs, workers, render_mode, autoreset, max_episode_steps")
         most = None if max_episode_steps == -1 else max_episode_steps
-        return environment_class("VectorEnvironment")(task(**options), num_envs, workers, render_mode, autoreset, most)
+        return environment_class("VectorEnvironment")(task(), num_envs, workers, render_mode, autoreset, most)
 
     return make
+
+
+def _refuse(task: type[Task], others: dict[str, Any], environment: str, known: str) -> None:
+    """Say of options that there are none of these names, and how a task of other numbers is made."""
+    for name in others:
+        raise TypeError(
+            f"withe/{task.__name__}-v0 has no option {name!r}, only {known}; a task is another by its class: "
+            f"class Other(withe.learning.{task.__name__}): ..., then withe.learning.{environment}(Other())"
+        )

@@ -53,6 +53,8 @@ class Session:
         Rings that the engine has released since rods have left them, by name, and when [s]; not reported yet.
     restorations : int
         How often it went back to a snapshot or to a frame of a record.
+    longest_meant : float [s]
+        Time steps up to this are as long as they are on purpose, by what was measured: no `CoarseStepWarning` of them.
     """
 
     scene: Directory
@@ -67,6 +69,7 @@ class Session:
     contact_then: _core.ContactDescription | None = None
     left_rings: list[tuple[str, float]] = field(default_factory=list)
     restorations: int = 0
+    longest_meant: float = 0.0
 
     @classmethod
     def begin(cls, scene: Directory, gravity: FloatArray, options: BuildOptions) -> Session:

@@ -382,6 +382,7 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
             "functions": session.settings.functions,
             "paths": session.settings.paths,
             "frictions": session.settings.frictions,
+            "longest_meant": session.longest_meant,
         }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -390,6 +391,7 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
         self._session.settings.functions = state["functions"]
         self._session.settings.paths = state["paths"]
         self._session.settings.frictions = state["frictions"]
+        self._session.longest_meant = state["longest_meant"]
         self.restore(state["snapshot"])
 
     # Pictures

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -166,7 +166,7 @@ class Stepping:
         finally:
             forget_left_rings(self.session, world.take_left_rings())
             left, self.session.left_rings = self.session.left_rings, []
-            pass_on(*world.take_warnings())
+            pass_on([self.session], *world.take_warnings())
             if left:
                 rings = " and ".join(f"ring {name!r} (time {time:.6g} s)" for name, time in left)
                 report_left(f"{rings}: released")
@@ -179,11 +179,11 @@ def convergence_error(session: Session, numbers: tuple[Any, ...]) -> Convergence
     return ConvergenceError(message, time, step, name, node if node >= 0 else None, residual)
 
 
-def pass_on(mesh: str, steps: str, branch: str) -> None:
+def pass_on(sessions: Iterable[Session], mesh: str, steps: str, branch: str) -> None:
     """Give warnings of the engine, of coarse meshes, coarse steps and branches that were left, where there are any."""
     if mesh:
         warnings.warn(mesh, CoarseMeshWarning, stacklevel=_levels_to_user())
-    if steps:
+    if steps and any(session.options.time_step > session.longest_meant for session in sessions):
         warnings.warn(steps, CoarseStepWarning, stacklevel=_levels_to_user())
     if branch:
         warnings.warn(branch, BranchChangedWarning, stacklevel=_levels_to_user())
