@@ -318,7 +318,9 @@ BAD = [
     (lambda env: env.step(np.full(2, 1.5)), ValueError, "action must lie in -1..1, got 1.5"),
     (lambda env: env.step([0, -1.00001]), ValueError, "action must lie in -1..1, got -1.00001"),
     (lambda env: env.step([0, 1.0000015]), ValueError, "action must lie in -1..1, got 1.0000015"),
-    (lambda env: env.step(np.ones(3)), ValueError, "action must have shape (1, 2), got (1, 3)"),
+    (lambda env: env.step(np.ones(3)), ValueError, "action must have shape (2,), got (3,)"),
+    (lambda env: env.step(0.1), ValueError, "action must have shape (2,), got a single number"),
+    (lambda env: env.step([[0.0, 0.0]]), ValueError, "action must have shape (2,), got (1, 2)"),
     (lambda env: env.step([np.nan, 0]), ValueError, "action must be finite, got nan"),
     (lambda env: closed(env).step(np.ones(2)), gymnasium.error.ClosedEnvironmentError, "the environment is closed"),
     (lambda env: closed(env).reset(), gymnasium.error.ClosedEnvironmentError, "the environment is closed"),
@@ -346,7 +348,22 @@ BAD = [
         ValueError,
         "seed must be one number, or one for each of 2 robots, got 3",
     ),
+    (lambda env: many().reset(seed=1.5), ValueError, "seed must be a whole number, got 1.5"),
+    (lambda env: many().reset(seed="ab"), ValueError, "seed must be a whole number, got 'ab'"),
+    (lambda env: many().reset(seed=-1), ValueError, "seed must lie in 0..9223372036854775807, got -1"),
+    (lambda env: many().reset(seed=[1, 0.5]), ValueError, "seed of robot 1 must be a whole number, got 0.5"),
+    (lambda env: withe.learning.Environment(Touch), ValueError, "withe.learning.Task, got the class Touch itself"),
 ]
+
+
+def many():
+    return withe.learning.VectorEnvironment(Touch(), 2, workers=1)
+
+
+def test_seeds_are_one_for_all_or_one_each_in_any_kind_of_row():
+    seen = [many().reset(seed=seed)[0] for seed in (7, np.int64(7), [7, 8], (7, 8), np.array([7, 8]), [7, None])]
+    for other in seen[1:]:
+        np.testing.assert_array_equal(seen[0], other)
 
 
 @pytest.mark.parametrize(("call", "kind", "message"), BAD)
@@ -372,6 +389,8 @@ WRONG = [
     ("reward", lambda robots: 1.0, "must return shape (4,), got ()"),
     ("reward", lambda robots: np.array([0.0, 1.0, np.nan, 2.0]), "must be finite, got nan of robot 2"),
     ("finished", lambda robots: np.array([True]), "must return shape (4,), got (1,)"),
+    ("observe", lambda robots: {"tip": 1.0}, "must return an array of numbers, got dict: float() argument"),
+    ("reward", lambda robots: [None] * 3 + ["a"], "must return an array of numbers, got list"),
     ("observe", lambda robots: robots.positions("arm")[0, -1], "must return shape (4, ...), got (3,)"),
     ("observe", lambda robots: robots.positions("arm")[:, -1] * np.inf, "must be finite, got"),
     (
@@ -395,6 +414,21 @@ def test_what_a_task_returns_in_another_shape_or_not_finite_is_refused(method, f
     with pytest.raises(ValueError, match=r"Careless") as error:
         stepped()
     assert str(error.value).startswith(f"Careless.{method} {message}")
+
+
+@pytest.mark.parametrize("redraw", [False, True])
+def test_a_task_that_builds_no_simulation_is_told_what_to_return(redraw):
+    class Drawn(Touch):
+        """Forgets to build what it has drawn, always or from the second episode on."""
+
+        def build(self, generator):
+            drawn = withe.Scene()
+            self.builds = getattr(self, "builds", 0) + 1
+            return super().build(generator) if self.redraw and self.builds == 1 else drawn
+
+    Drawn.redraw = redraw
+    with pytest.raises(ValueError, match=r"Drawn.build must return a withe.Simulation, as scene.build\(...\) does"):
+        withe.learning.Environment(Drawn())
 
 
 @pytest.mark.parametrize("name", ["Follow", "Reach", "Obstacles2D", "Obstacles3D"])

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from withe.common import validation
 from withe.common.extras import require
 from withe.learning.episodes import Episodes
 from withe.learning.rendering import Screen
@@ -102,7 +103,7 @@ class _Environment:
     def step(self, action: npt.ArrayLike) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Do an action, for one control step."""
         self._check(True)
-        outcome = self._episodes.act(self._episodes.checked(np.asarray(action)[None], 1), self._lane)
+        outcome = self._episodes.act(self._episodes.checked(action)[None], self._lane)
         self._show()
         info = {"failed": True} if outcome.failed[0] else {}
         return (
@@ -216,7 +217,7 @@ class _VectorEnvironment:
         return self._episodes.robots
 
     def reset(
-        self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         """Begin episodes of all robots, or of those of ``options["reset_mask"]``, shape (n,), bool.
 
@@ -231,19 +232,27 @@ class _VectorEnvironment:
                     f"reset_mask must be bool of shape ({self.num_envs},), got {mask.dtype} of shape {mask.shape}"
                 )
             chosen = self._all[mask]
-        seeds: list[int | None] = [None] * self.num_envs
-        if isinstance(seed, int | np.integer):
-            seeds = [int(seed) + i for i in range(self.num_envs)]
-        elif seed is not None:
-            seeds = list(seed)
-        if len(seeds) != self.num_envs:
-            raise ValueError(f"seed must be one number, or one for each of {self.num_envs} robots, got {len(seeds)}")
+        seeds = self._seeds(seed)
         for lane in chosen:
             if seeds[lane] is not None:
                 self._generators[lane] = np.random.default_rng(seeds[lane])
         self._begin(chosen)
         self._show()
         return self._episodes.observe(), {}
+
+    def _seeds(self, seed: Any) -> list[int | None]:
+        """One for each robot, None where its numbers go on."""
+        if seed is None:
+            return [None] * self.num_envs
+        if isinstance(seed, str) or (not isinstance(seed, Sequence) and np.ndim(seed) == 0):
+            first = validation.integer(seed, "seed", 0, 2**63 - 1)
+            return [first + i for i in range(self.num_envs)]
+        if len(seed) != self.num_envs:
+            raise ValueError(f"seed must be one number, or one for each of {self.num_envs} robots, got {len(seed)}")
+        return [
+            None if each is None else validation.integer(each, f"seed of robot {i}", 0, 2**63 - 1)
+            for i, each in enumerate(seed)
+        ]
 
     def step(self, actions: npt.ArrayLike) -> tuple[Any, FloatArray, Any, Any, dict[str, Any]]:
         """Do an action with every robot, for one control step; one whose episode is over begins another instead."""
@@ -313,7 +322,7 @@ def environment_class(name: str) -> Any:
     return type(name, (own, base), {"__doc__": own.__doc__, "__module__": "withe.learning"})
 
 
-def maker(task: type[Task]) -> Callable[..., Any]:
+def maker(task: Callable[..., Task]) -> Callable[..., Any]:
     """What `gymnasium.make` calls, with options of the environment; a task has none."""
 
     def make(render_mode: str | None = None, **others: Any) -> Any:
@@ -323,7 +332,7 @@ def maker(task: type[Task]) -> Callable[..., Any]:
     return make
 
 
-def vector_maker(task: type[Task]) -> Callable[..., Any]:
+def vector_maker(task: Callable[..., Task]) -> Callable[..., Any]:
     """What `gymnasium.make_vec` calls; as for `gymnasium.make`, max_episode_steps=-1 is no limit but the task's."""
 
     def make(
@@ -341,7 +350,7 @@ def vector_maker(task: type[Task]) -> Callable[..., Any]:
     return make
 
 
-def _refuse(task: type[Task], others: dict[str, Any], environment: str, known: str) -> None:
+def _refuse(task: Callable[..., Task], others: dict[str, Any], environment: str, known: str) -> None:
     """Say of options that there are none of these names, and how a task of other numbers is made."""
     for name in others:
         raise TypeError(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -12,11 +12,13 @@ import numpy.typing as npt
 from withe.batch import Batch
 from withe.common import validation
 from withe.learning.task import Task
+from withe.simulation.simulation import Simulation
 
 __all__ = ["Episodes", "Outcome"]
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.intc]
+Number = TypeVar("Number", np.float32, np.float64, np.bool_)
 BoolArray = npt.NDArray[np.bool_]
 
 _ROUNDING = 1e-6  # of numbers about 1 in a few operations of single precision
@@ -56,13 +58,14 @@ class Episodes:
 
     def __init__(self, task: Task, count: int, workers: int | None, most: int | None = None) -> None:
         if not isinstance(task, Task):
-            raise ValueError(f"task must be a withe.learning.Task, got {type(task).__name__}")
+            got = f"the class {task.__name__} itself" if isinstance(task, type) else type(task).__name__
+            raise ValueError(f"task must be a withe.learning.Task, got {got}")
         number = validation.integer(count, "number of environments", 1, 1_000_000)
         try:
             self.task = task = copy.deepcopy(task)
         except TypeError as error:
             raise ValueError(f"task must be one that copy.deepcopy can copy: {type(task).__name__}, {error}") from error
-        first = task.build(np.random.default_rng(0))
+        first = self._built(np.random.default_rng(0))
         self.robots = Batch([first, *(first.copy() for _ in range(number - 1))], workers)
         self.begun = np.zeros(number, bool)
         self._taken = np.zeros(number, np.int64)
@@ -87,7 +90,7 @@ class Episodes:
         """Begin episodes of some robots, with a generator of random numbers for each of them."""
         if self.task.redraw:
             for lane, generator in zip(chosen, generators, strict=True):
-                self.robots[int(lane)] = self.task.build(generator)
+                self.robots[int(lane)] = self._built(generator)
         else:
             self.robots.reset(chosen)
         self._taken[chosen] = 0
@@ -100,9 +103,9 @@ class Episodes:
         Raises
         ------
         ValueError
-            The task returns another shape than (n, ...) or than at first, or what is not finite.
+            The task returns another shape than (n, ...) or than at first, or what are no numbers or not finite.
         """
-        seen = np.asarray(self.task.observe(self.robots), np.float32)
+        seen = self._returned(self.task.observe(self.robots), "observe", np.float32)
         if seen.shape[:1] != (len(self),):
             raise ValueError(f"{self._name('observe')} must return shape ({len(self)}, ...), got {seen.shape}")
         if self._seen is None:
@@ -123,14 +126,33 @@ class Episodes:
             self.robots.step(self._count, chosen)
             self._taken[chosen] += 1
         failed = self.robots.failed
-        reward = np.asarray(self.task.reward(self.robots), np.float64)
-        finished = np.asarray(self.task.finished(self.robots), bool)
+        reward = self._returned(self.task.reward(self.robots), "reward", np.float64)
+        finished = self._returned(self.task.finished(self.robots), "finished", np.bool_)
         self._check(reward, "reward", (len(self),))
         self._check(finished, "finished", (len(self),))
         return Outcome(reward, finished & ~failed, (self._taken >= self.steps) | failed, failed)
 
     def _name(self, method: str) -> str:
         return f"{type(self.task).__name__}.{method}"
+
+    def _built(self, generator: np.random.Generator) -> Simulation:
+        """A robot of the task as it begins."""
+        built: Any = self.task.build(generator)
+        if not isinstance(built, Simulation):
+            raise ValueError(
+                f"{self._name('build')} must return a withe.Simulation, as scene.build(...) does, "
+                f"got {type(built).__name__}"
+            )
+        return built
+
+    def _returned(self, found: Any, method: str, kind: type[Number]) -> npt.NDArray[Number]:
+        """What a method of the task returned, as an array."""
+        try:
+            return np.asarray(found, kind)
+        except (TypeError, ValueError) as error:
+            raise ValueError(
+                f"{self._name(method)} must return an array of numbers, got {type(found).__name__}: {error}"
+            ) from error
 
     def _check(self, found: npt.NDArray[Any], method: str, shape: tuple[int, ...]) -> None:
         """Refuse what a method of the task returned, of another shape or not finite."""
@@ -141,15 +163,15 @@ class Episodes:
             robot = int(np.argwhere(~finite)[0, 0])
             raise ValueError(f"{self._name(method)} must be finite, got {found[~finite][0]} of robot {robot}")
 
-    def checked(self, actions: npt.ArrayLike, count: int) -> FloatArray:
-        """Actions as numbers from -1 to 1; what single precision rounds beyond is cut off.
+    def checked(self, actions: npt.ArrayLike, *robots: int) -> FloatArray:
+        """Actions of so many robots, or of one, from -1 to 1; what single precision rounds beyond is cut off.
 
         Raises
         ------
         ValueError
             Another shape, not finite, or outside of the box.
         """
-        values = validation.number_array(actions, "action", (count, self.action_size))
+        values = validation.number_array(actions, "action", (*robots, self.action_size))
         if np.abs(values).max(initial=0.0) > 1.0 + _ROUNDING:
             raise ValueError(f"action must lie in -1..1, got {values.flat[np.abs(values).argmax()]:.9g}")
         return np.clip(values, -1.0, 1.0)
