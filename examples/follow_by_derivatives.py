@@ -13,6 +13,7 @@ python examples/follow_by_derivatives.py [EPISODES [FILM.gif]]
 
 from __future__ import annotations
 
+import argparse
 import sys
 from pathlib import Path
 
@@ -112,14 +113,17 @@ def tip_of_state(arm: withe.Simulation, size: int) -> np.ndarray:
 
 def main() -> int:
     """Discounted returns of both, beside the published one; and a film."""
-    if len(sys.argv) > 2:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("episodes", type=int, nargs="?", default=4, help="over which returns are means; 4")
+    parser.add_argument("film", type=Path, nargs="?", help="file of a film, .gif or .mp4")
+    arguments = parser.parse_args()
+    if arguments.film:
         check_tools()
-    episodes = int(sys.argv[1]) if len(sys.argv) > 1 else 4
-    found = {ahead: discounted_return(Controller(ahead), episodes) for ahead in (1, 5)}
+    found = {ahead: discounted_return(Controller(ahead), arguments.episodes) for ahead in (1, 5)}
     for ahead, value in found.items():
         print(f"{ahead} action(s) ahead: discounted return {value:.1f}; published for a learned one {PUBLISHED:.0f}")
-    if len(sys.argv) > 2:
-        film(Controller(5), Path(sys.argv[2]), seconds=6.0)
+    if arguments.film:
+        film(Controller(5), arguments.film, seconds=6.0)
     return 0 if found[5] > found[1] else 1
 
 

@@ -14,14 +14,13 @@ python examples/follow_by_gradients.py [STEPS] [SEED] [FOLDER]; 300,000 control 
 
 from __future__ import annotations
 
-import sys
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
-from learn_follow import Aimed, Curve, check_tools, draw_curve, film
+from learn_follow import Aimed, Curve, asked, check_tools, draw_curve, film
 
 import withe
 
@@ -163,9 +162,8 @@ def learn(steps: int, seed: int, curve: Curve) -> Policy:
 
 def main() -> None:
     """Learn, draw, film."""
+    steps, seed, folder = asked(__doc__, 300_000, Path("out/follow_by_gradients"))
     check_tools()
-    steps, seed = int(sys.argv[1]) if len(sys.argv) > 1 else 300_000, int(sys.argv[2]) if len(sys.argv) > 2 else 0
-    folder = Path(sys.argv[3]) if len(sys.argv) > 3 else Path("out/follow_by_gradients")
     policy = learn(steps, seed, Curve(folder, between=10_000, task=Aimed()))
     draw_curve(folder, "analytic policy gradients")
     film(lambda seen, _: policy.predict(seen, deterministic=True)[0], folder / "learned.mp4", task=Aimed())

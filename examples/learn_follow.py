@@ -10,8 +10,8 @@ some 20 minutes of one processor.
 
 from __future__ import annotations
 
+import argparse
 import importlib.util
-import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -116,6 +116,16 @@ def film(choose: Any, path: Path, seconds: float = 20.0, seed: int = 5, task: An
     writer.close()
 
 
+def asked(text: str, steps: int, folder: Path) -> tuple[int, int, Path]:
+    """Steps, seed and folder of the command line."""
+    parser = argparse.ArgumentParser(description=text.splitlines()[0])
+    parser.add_argument("steps", type=int, nargs="?", default=steps, help=f"control steps; {steps:,}")
+    parser.add_argument("seed", type=int, nargs="?", default=0, help="0")
+    parser.add_argument("folder", type=Path, nargs="?", default=folder, help=f"of the curve and the film; {folder}")
+    arguments = parser.parse_args()
+    return arguments.steps, arguments.seed, arguments.folder
+
+
 def check_tools() -> None:
     """Says before a long run what the film at its end would lack."""
     missing = [name for name in ("imageio_ffmpeg", "matplotlib") if importlib.util.find_spec(name) is None]
@@ -125,9 +135,8 @@ def check_tools() -> None:
 
 def main() -> None:
     """Learn, draw, film."""
+    steps, seed, folder = asked(__doc__, 1_300_000, Path("out/learn_follow"))
     check_tools()
-    steps, seed = int(sys.argv[1]) if len(sys.argv) > 1 else 1_300_000, int(sys.argv[2]) if len(sys.argv) > 2 else 0
-    folder = Path(sys.argv[3]) if len(sys.argv) > 3 else Path("out/learn_follow")
     policy = withe.learning.train_policy(
         Aimed(),
         steps,

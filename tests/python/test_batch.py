@@ -318,6 +318,10 @@ BAD = [
     (lambda b: b.step(1, lanes=[True, False]), r"lanes must have shape (4,) as a mask, got (2,)"),
     (lambda b: b.step(1, lanes=[4]), "lanes must lie in -4..3, got 4"),
     (lambda b: b.step(1, lanes=[1, -3]), "lanes must differ, got [1, -3]"),
+    (
+        lambda b: b.reset([0, 1, 0, 0]),
+        "mask must differ, got [0, 1, 0, 0]: numbers of simulations, where a mask is of bool",
+    ),
     (lambda b: b.step(1, lanes=[0.5]), "lanes must be a mask of shape (4,), or numbers of simulations, got [0.5]"),
     (lambda b: b.reset([True] * 5), "mask must have shape (4,) as a mask, got (5,)"),
     (lambda b: b.positions("leg"), "rod 'leg' is not in the scene, which has 'arm', 'wall'"),

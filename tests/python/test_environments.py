@@ -3,6 +3,9 @@
 import itertools
 import pickle
 import random
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -619,3 +622,12 @@ def test_training_refuses_what_is_no_task():
         withe.learning.train_policy(3, 10)
     with pytest.raises(ValueError, match=r"seed must lie in 0"):
         withe.learning.train_policy(Touch(), 10, seed=-1)
+
+
+@pytest.mark.parametrize("name", ["learn_follow", "follow_by_gradients", "follow_by_derivatives"])
+def test_examples_of_learning_say_what_they_take(name):
+    pytest.importorskip("torch")
+    path = Path(__file__).resolve().parents[2] / "examples" / f"{name}.py"
+    asked = subprocess.run([sys.executable, path, "--help"], capture_output=True, text=True, check=True)
+    assert asked.stdout.startswith(f"usage: {name}.py")
+    assert subprocess.run([sys.executable, path, "many"], capture_output=True, check=False).returncode == 2
