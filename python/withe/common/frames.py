@@ -9,14 +9,15 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common.outlines import Named, ObstacleOutline, RodOutline, SpringOutline
+from withe.common.short_repr import ShortRepr
 
 __all__ = ["ENERGIES", "EnergyHistory", "Frames", "edges_to_nodes", "stencils_to_nodes"]
 
 FloatArray = npt.NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class EnergyHistory:
+@dataclass(frozen=True, repr=False)
+class EnergyHistory(ShortRepr):
     """Energies of every frame, arrays of shape (frames,) [J].
 
     `total` is the sum of kinetic, stretch, bend, twist, gravity, loads, contact and spring. `work`, done by

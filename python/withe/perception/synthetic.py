@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from withe.common.short_repr import ShortRepr
 from withe.perception.disturbances import add_frays, add_specks, strip_across
 
 __all__ = ["SyntheticScene", "TrueCrossing", "make_case", "render", "render_mask"]
@@ -46,8 +47,8 @@ class TrueCrossing:
     under: tuple[int, float]
 
 
-@dataclass
-class SyntheticScene:
+@dataclass(repr=False)
+class SyntheticScene(ShortRepr):
     """A mask and the truth behind it.
 
     Attributes

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from withe.common import validation
 from withe.common.extras import require
+from withe.common.short_repr import ShortRepr
 from withe.perception.camera import Camera
 from withe.perception.tag_edges import refine_square
 from withe.perception.tracing import check_image, read_image
@@ -22,8 +23,8 @@ Array = NDArray[np.float64]
 Family = Literal["16h5", "25h9", "36h10", "36h11"]
 
 
-@dataclass(frozen=True, eq=False)
-class TagDetection:
+@dataclass(frozen=True, eq=False, repr=False)
+class TagDetection(ShortRepr):
     """Tags of a picture, in the order of their numbers.
 
     Attributes

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.short_repr import ShortRepr
 from withe.parts.handles import Rod
 from withe.perception.camera import Camera
 from withe.real2sim.fitting import fit
@@ -23,8 +24,8 @@ __all__ = ["Centrelines", "rest_shape"]
 FloatArray = npt.NDArray[np.float64]
 
 
-@dataclass(eq=False)
-class Centrelines(Target):
+@dataclass(eq=False, repr=False)
+class Centrelines(ShortRepr, Target):
     """Points seen along rods, without knowing which point of the rod each is.
 
     A residual is the way from a seen point to the nearest one of the simulated line; in pixels the distance, to the

@@ -12,14 +12,15 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.short_repr import ShortRepr
 
 __all__ = ["Log", "read_log"]
 
 FloatArray = npt.NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class Log:
+@dataclass(frozen=True, eq=False, repr=False)
+class Log(ShortRepr):
     """What a camera saw of tags.
 
     Attributes

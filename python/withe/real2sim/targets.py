@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.short_repr import ShortRepr
 from withe.perception.camera import Camera
 from withe.real2sim.places import Place, Places, turning_axis
 from withe.simulation.simulation import Simulation
@@ -85,8 +86,8 @@ def _turns_of(chords: FloatArray) -> FloatArray:
     return np.asarray(np.arctan2(cross, along))
 
 
-@dataclass(eq=False)
-class Curvatures(Target):
+@dataclass(eq=False, repr=False)
+class Curvatures(ShortRepr, Target):
     """Discrete curvatures 2 tan(turn / 2) at tags, averaged over groups of them.
 
     The turn at a tag is the angle between the chords to the tags before and after it, in a plane
@@ -210,8 +211,8 @@ class _CurvatureResidual(Residual):
         return np.asarray(self._chords.T @ by_chord)
 
 
-@dataclass(eq=False)
-class Tags(Target):
+@dataclass(eq=False, repr=False)
+class Tags(ShortRepr, Target):
     """Where tags on rods were seen, in pixels or in metres.
 
     Parameters

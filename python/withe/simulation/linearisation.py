@@ -34,7 +34,7 @@ _NEUTRAL = 1e-6  # of a frequency squared, what is none
 _RESIDUAL = 1e-9  # of an eigenvalue of the inverse
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Linearisation:
     """Equations linearised about a configuration, mass x'' + stiffness x = 0, without what supports hold.
 
@@ -58,6 +58,10 @@ class Linearisation:
     _stiffnesses: FloatArray
     _mass: Any
     _displacement: Any
+
+    def __repr__(self) -> str:
+        nodes, unknowns = self._displacement.shape[0] // 3, self._mass.shape[0]
+        return f"Linearisation({unknowns} unknowns of {nodes} nodes)"
 
     @property
     def stiffness(self) -> FloatArray:

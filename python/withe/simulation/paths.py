@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from withe import _core
 from withe.common import validation
+from withe.common.short_repr import ShortRepr
 from withe.parts.directory import Directory
 from withe.parts.handles import Load, NodeHandle, Rod, Support
 from withe.parts.kinds import LoadPart
@@ -21,8 +22,8 @@ FloatArray = npt.NDArray[np.float64]
 _MAX_STEPS = 2**31 - 2
 
 
-@dataclass(frozen=True, eq=False)
-class EquilibriumPath:
+@dataclass(frozen=True, eq=False, repr=False)
+class EquilibriumPath(ShortRepr):
     """Equilibria one after another, through limit points.
 
     Attributes
