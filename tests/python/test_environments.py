@@ -312,6 +312,25 @@ def test_pictures_are_drawn():
     assert many.render()[0].shape == (480, 640, 3)
 
 
+def test_the_floor_that_a_robot_stands_on_is_in_its_picture_and_labels_are_apart():
+    pytest.importorskip("matplotlib")
+    env = withe.learning.Environment(withe.learning.Crawl(), render_mode="rgb_array")
+    env.reset(seed=0)
+    env.render()
+    axes = env._screen._axes
+    feet = min(env.simulation.positions(f"leg {i}")[-1, 2] for i in range(6))
+    floor = [z for *_, z in (line.get_data_3d() for line in axes.lines) if np.allclose(z, feet - 5e-3, atol=1e-3)]
+    assert len(floor) > 10
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        low, high = axis.get_view_interval()
+        boxes = [tick.label1.get_window_extent() for tick in axis.get_major_ticks() if low <= tick.get_loc() <= high]
+        assert len(boxes) >= 3
+        # Upright labels on a slanted axis: their middles are as far apart as a label is high, or wide.
+        for one, other in itertools.pairwise(boxes):
+            apart = np.abs(np.subtract([one.x0 + one.x1, one.y0 + one.y1], [other.x0 + other.x1, other.y0 + other.y1]))
+            assert apart[0] >= one.width + other.width or apart[1] >= one.height + other.height
+
+
 def closed(env):
     env.close()
     return env

@@ -11,11 +11,17 @@ import numpy.typing as npt
 
 from withe.batch import Batch
 from withe.common.extras import require
+from withe.common.outlines import ObstacleOutline
 from withe.simulation.obstacles import obstacle_outlines
+from withe.view.scenery import patch
 
 __all__ = ["Screen"]
 
 _SIZE = (640, 480)  # [px]
+_TICKS = 5
+_HALF = 0.5 / 3.0**0.5  # side of a cube over twice its diagonal
+_LINES = 13
+_FLOOR = "#b98b5e"
 _COLORS = ("#00798c", "#edae49", "#66a182", "#8d96a3", "#d1495b", "#2e4057")
 
 
@@ -72,6 +78,8 @@ class Screen:
         low, high = self._reach
         for axis, bottom, top in zip("xyz", low, high, strict=True):
             axes.set(**{f"{axis}lim": (bottom, top), f"{axis}label": f"{axis} [m]"})
+            # More ticks than this run into each other along the axes that go into the picture.
+            getattr(axes, f"{axis}axis").get_major_locator().set_params(nbins=_TICKS)
         axes.set_box_aspect(high - low)
         scale = 0.55 * _SIZE[1] * 0.72 / float((high - low).max())  # points a metre, about
         for number, rod in enumerate(simulation.rods):
@@ -84,9 +92,10 @@ class Screen:
 
     def _obstacles(self, simulation: Any, scale: float) -> None:
         for outline in obstacle_outlines(simulation._session.directory):
-            if outline.kind == "plane":
-                continue
             start = simulation.obstacle_position(outline.name)
+            if outline.kind == "plane":
+                self._plane(outline, start)
+                continue
             width = float(np.clip(2.0 * outline.radius * scale, 1.5, 80.0))
             look: dict[str, Any] = {"color": "#9aa5b1", "alpha": 0.45}
             if not outline.axis.any():  # a sphere
@@ -94,6 +103,21 @@ class Screen:
             else:
                 ends = np.array([start, start + outline.axis])
                 self._axes.plot(*ends.T, linewidth=width, solid_capstyle="round", **look)
+
+    def _plane(self, outline: ObstacleOutline, place: npt.NDArray[np.float64]) -> None:
+        """What of a plane is in the box; nothing of one that does not cross it."""
+        low, high = self._reach
+        normal = outline.axis / np.linalg.norm(outline.axis)
+        if abs(normal @ (0.5 * (low + high) - place)) < 0.5 * float(np.abs(normal) @ (high - low)):
+            first, second, _, fourth = patch(outline, place, np.stack([low, high]), _HALF)
+            # matplotlib draws surfaces over all lines, whichever is nearer: a filled one would veil the robot.
+            for corner, along, across in (
+                (first, second - first, fourth - first),
+                (first, fourth - first, second - first),
+            ):
+                for share in np.linspace(0.0, 1.0, _LINES):
+                    start = corner + share * across
+                    self._axes.plot(*np.stack([start, start + along]).T, color=_FLOOR, linewidth=0.8, zorder=1)
 
     def _extent(self) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
         """A box that the robot stays in, for all it is known: as far as its rods reach from where they are held."""
