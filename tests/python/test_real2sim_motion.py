@@ -1,5 +1,7 @@
 """Stiffness, damping and the delay between two clocks are found from how a rod rings."""
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -192,6 +194,29 @@ def test_the_shape_of_what_rings_is_told_with_its_stiffness(unknown):
 def test_bad_input_is_refused(targets, unknowns, options, message):
     with pytest.raises(ValueError, match=message):
         fit_motion(ringing(), targets, unknowns, progress=False, **options)
+
+
+def test_times_in_milliseconds_are_asked_about_and_long_runs_that_are_seen_often_are_not():
+    class RunError(Exception):
+        """A run has begun."""
+
+    def begin(simulation):
+        raise RunError
+
+    def asked(times):
+        target = Tags(np.zeros((len(times), 1, 3)), ["arm.end"], times=times)
+        with pytest.raises(RunError):
+            fit_motion(ringing(), target, UNKNOWNS, begin=begin, progress=False)
+
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        asked(np.arange(0.04, 2.0, 0.04))
+        asked(np.arange(0.04, 2000.0, 0.04))
+        asked(np.arange(40.0, 120.0, 40.0))  # rarely seen, but no long run
+    assert not caught
+    with pytest.warns(UserWarning, match=r"40 s apart or more, .* periods of the .* in milliseconds\?") as caught:
+        asked(1e3 * np.arange(0.04, 2.0, 0.04))
+    assert caught[0].filename == __file__
 
 
 def test_a_run_that_fails_with_the_first_guess_says_why():

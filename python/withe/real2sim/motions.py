@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from typing import Any, Literal
 
@@ -29,6 +30,8 @@ FloatArray = npt.NDArray[np.float64]
 
 _DIFFERENCE = 1e-4  # of the scale of an unknown
 _RUNS = 8  # iterations that a progress bar counts on
+_MANY_STEPS = 100_000  # of a run
+_MANY_SWINGS = 10.0  # between frames: what rings is seen several times a swing
 _CHANGE = 1e-9  # of the sum of squares: an iteration of L-BFGS that changes it by less is the last
 
 
@@ -90,6 +93,12 @@ def fit_motion(
     ConvergenceError
         The run fails with the first guess.
 
+    Warns
+    -----
+    UserWarning
+        Frames are more than ten periods of the slowest mode apart, and a run has 100,000 time steps or more: times
+        that are not in seconds look so.
+
     Examples
     --------
     >>> ringing = withe.real2sim.Tags(record.positions(arm)[1:, -1:], [arm.end], times=record.times[1:])
@@ -123,6 +132,7 @@ def fit_motion(
     by_gradients = method == "lbfgs"
     if by_gradients:
         _check_gradients(copy, parsed, begin)
+    _check_unit(copy, times)
     with progress_bar(_RUNS + 2 * len(parsed), "fitting", progress, unit="runs") as bar:
         motion = _Motion(copy, parsed, bind(listed, copy), times, late, begin, bar)
         free = np.ones(len(motion.names), bool)
@@ -133,6 +143,22 @@ def fit_motion(
             solution = lone_frame(motion, 0, motion.begin(), free, 1e-12, limit, Secants())
     motion.per_frame = free
     return gather(motion, listed, {0: solution}, {0: motion.solves}, len(solution.residual), 1)
+
+
+def _check_unit(simulation: Simulation, times: FloatArray) -> None:
+    """Warn of times that may be in milliseconds: runs of very many steps, seen once in many of the slowest swings."""
+    steps = float(times[-1]) / simulation.time_step
+    between = float(np.diff(times).min() if len(times) > 1 else times[0])
+    if steps < _MANY_STEPS:
+        return
+    slowest = abs(simulation.linearise().frequencies(1)[0])
+    if between * slowest > _MANY_SWINGS:
+        warnings.warn(
+            f"times of targets [s] are {between:.3g} s apart or more, {between * slowest:.3g} periods of the slowest "
+            f"mode, and each run goes on for {steps:,.0f} time steps: are they in milliseconds?",
+            UserWarning,
+            stacklevel=3,
+        )
 
 
 def _check_gradients(
