@@ -172,6 +172,19 @@ def test_statistics_count_the_work():
     assert statistics.total_time > 0
 
 
+def test_the_plan_says_how_long_and_heavy_a_scene_is_by_which_millimetres_are_noticed():
+    def plan(length, radius):
+        scene = withe.Scene()
+        arm = scene.add_rod(start=(0, 0, 0), end=(length, 0, 0), nodes=5, radius=radius,
+                            material=withe.Material(youngs_modulus=1e6, density=1000.0))  # fmt: skip
+        scene.add_mass(arm.end, 0.5)
+        return scene.build().plan
+
+    assert plan(200.0, 5.0).notes[0] == "200 m of rod, 1.571e+07 kg in all"
+    assert plan(0.2, 5e-3).notes[0] == "0.2 m of rod, 0.5157 kg in all"
+    assert "- 0.2 m of rod, 0.5157 kg in all" in str(plan(0.2, 5e-3)).splitlines()
+
+
 def test_planar_and_spatial_simulations_agree():
     results = []
     for planar in (True, False):

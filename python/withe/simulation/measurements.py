@@ -10,7 +10,7 @@ import numpy.typing as npt
 from withe.knots import link
 from withe.parts.contacts import contact_table
 from withe.parts.handles import Hand, NodeHandle, Obstacle, Rod, Spring, Support
-from withe.parts.kinds import ObstaclePart, SpringPart
+from withe.parts.kinds import ObstaclePart, RodPart, SpringPart
 from withe.simulation.hands import (
     Deflection,
     HeldPose,
@@ -166,9 +166,9 @@ class Measurements:
 
         In motion, the means over the last time step, of all its parts where it was cut (`statistics.steps` counts
         parts): with all other forces, those by which momentum grew in that time. Times the way and the turn of a step
-        that was not cut they are what ``energy().work`` counts, to second order in the step. A support that starts or stops at full speed gives
-        what it holds its speed by an impulse, which is part of the force of that step: its work is that times the mean
-        of both speeds, half of what the way of the step would say.
+        that was not cut they are what ``energy().work`` counts, to second order in the step. A support that starts or
+        stops at full speed gives what it holds its speed by an impulse, which is part of the force of that step: its
+        work is that times the mean of both speeds, half of what the way of the step would say.
 
         Parameters
         ----------
@@ -274,12 +274,16 @@ class Measurements:
     @property
     def plan(self) -> Plan:
         """What was decided for this scene: ``print(simulation.plan)``."""
-        plan = self._session.world.plan
+        plan, parts = self._session.world.plan, self._session.directory.all(RodPart)
+        length = sum(float(part.lengths.sum()) for part in parts)
+        rods = zip(parts, self._session.settings.rods, strict=True)
+        mass = sum(float(np.sum(numbers.line_density * part.lengths)) for part, numbers in rods)
+        mass += sum(self._session.settings.masses.values())
         return Plan(
             planar=plan.planar,
             plane_normal=np.array(plan.plane_normal) if plan.planar else None,
             unknowns=plan.unknowns,
             solver=plan.solver,
             stable_step=plan.stable_step or None,
-            notes=tuple(plan.notes),
+            notes=(f"{length:.4g} m of rod, {mass:.4g} kg in all", *plan.notes),
         )
