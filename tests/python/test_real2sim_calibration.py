@@ -52,6 +52,32 @@ def test_a_made_camera_and_the_places_of_tags_are_found_again():
     assert curvatures.values * LIMB == pytest.approx(TURNS, abs=1e-4)
 
 
+def test_sigmas_of_a_fit_take_the_camera_for_exact_as_their_documentation_says():
+    scene = withe.Scene()
+    silicone = withe.Material(youngs_modulus=1e6, poisson_ratio=0.5, density=1100.0)
+    arm = scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=21, radius=5e-3, material=silicone, name="arm")
+    scene.clamp(arm.start)
+    still = scene.build(integrator="static", planar=True)
+    places, curvatures, seen = [arm.node(i) for i in range(0, 21, 4)], np.linspace(-6.0, 9.0, 6), []
+    for curvature in curvatures:
+        still.set_natural_curvature(arm, (0.0, curvature))
+        still.equilibrium()
+        seen.append(np.array([300.0, 200.0]) + 1500.0 * still.positions(arm)[::4, [0, 2]] * (1.0, -1.0))
+    still.set_natural_curvature(arm, (0.0, 0.0))
+    exact = calibrate(still, Tags(seen, places), progress=False)
+    errors = {"exact": [], "calibrated": []}
+    for seed in range(8):
+        noisy = seen + np.random.default_rng(seed).normal(0.0, 0.3, np.shape(seen))
+        calibrated = calibrate(still, Tags(noisy, places), progress=False)
+        for name, camera in (("exact", exact), ("calibrated", calibrated)):
+            tags = Tags(noisy, camera.places, camera, sigma=0.3)
+            found = fit(still, tags, [(arm, "natural_curvature", "constant")], progress=False)
+            errors[name].append((found.values[:, 0] - curvatures) / np.sqrt(found.covariance[:, 0, 0]))
+    factor = {name: np.sqrt(np.mean(np.square(each))) for name, each in errors.items()}
+    assert factor["exact"] == pytest.approx(1.0, abs=0.25)
+    assert factor["calibrated"] == pytest.approx(2.2, abs=0.6)
+
+
 def test_a_robot_seen_from_behind_is_not_mirrored():
     simulation, places = robot()
     pixels = made(places, TURNS, level(roll=0.1)) * (-1.0, 1.0)

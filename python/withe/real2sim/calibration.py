@@ -93,6 +93,11 @@ def calibrate(
     as small, as for a robot that is drawn straight down, `Calibration.unobservable` says so, and the side is that from
     which the robot appears, on the mean, as it is drawn.
 
+    What is found has errors, which `Fit.covariance` of a fit through this camera does not know of; all frames share
+    them. With natural curvature constant along an arm, calibrated and fitted in the same frames, errors were 1.5 times
+    the sigmas of the fit for nine tags in 12 frames, and 2.2 times for six tags in 6. They lessen with the root of the
+    number of frames here.
+
     Parameters
     ----------
     simulation : Simulation

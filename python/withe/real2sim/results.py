@@ -95,7 +95,8 @@ class Fit:
     covariance : ndarray of shape (frames, unknowns, unknowns)
         Of the values, for independent errors of the targets. Their variance is that of sigma, or what all frames
         leave, divided by the degrees of freedom; NaN without either, infinite where the targets tell nothing. In a
-        planar scene what lies across its plane counts for neither.
+        planar scene what lies across its plane counts for neither. A camera counts for exact: with one that `calibrate`
+        found, errors are greater, see there.
     solves : ndarray of int of shape (frames,)
         Equilibria that the search took in each frame.
     iterations : ndarray of int of shape (frames,)
