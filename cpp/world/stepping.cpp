@@ -238,11 +238,17 @@ World::Implementation::Attempt World::Implementation::try_step(double dt) {
   return may_grow(dt, std::exp2(1.0 / levels_per_halving())) ? Attempt::easy : Attempt::hard;
 }
 
-/// Whether supports in space may turn rods about themselves.
+/// Whether supports in space may turn rods about themselves in the coming step.
 bool World::Implementation::turns_rods() const {
-  return !model.planar() && std::any_of(model.supports.begin(), model.supports.end(), [](const Support& s) {
-    return s.active && (s.frame >= 0 || !s.edges.empty());
-  });
+  if (model.planar()) return false;
+  for (std::size_t s = 0; s < model.supports.size(); ++s) {
+    const Support& support = model.supports[s];
+    const SupportMotion& motion = motions[s];
+    if (support.active && (support.frame >= 0 || !support.edges.empty()) &&
+        (callback || state.time < motion.turn.end || motion.rotation != motion.to_rotation))
+      return true;
+  }
+  return false;
 }
 
 /// Undoes an accepted step.
