@@ -408,9 +408,10 @@ bool ContactStiffness::begins_anew(const Touching& t, bool struck, ContactRecord
   return true;
 }
 
-/// Whether the obstacle that a rod rests on jumps to a velocity at which it strikes the rod.
+/// Whether the obstacle that a rod rests on jumps to a velocity at which it strikes the rod, which then parts by its
+/// restitution. What is elastic it sends off in any case.
 bool ContactStiffness::is_struck(const ContactPair& pair) const {
-  if (pair.key.b >= 0 || problem_.velocity.empty()) return false;
+  if (pair.key.b >= 0 || problem_.velocity.empty() || pair.restitution >= 1.0) return false;
   const Vec3d jump = problem_.velocity_of(pair) - problem_.start->obstacles[at(-1 - pair.key.b)].velocity;
   const double rest = rest_speed(problem_, pair);
   return dot(jump, jump) > rest * rest && approach_speed(problem_, pair) > rest;

@@ -67,7 +67,9 @@ struct World::Implementation : Running {
   Moving kept;                         ///< at the start of a step that may be taken back
   EnergyGuard guard_before;            ///< likewise
   double turned = 0, held_turned = 0;  ///< of an edge, of a held frame in the last step at most [rad]
-  ComponentGains gained;               ///< in the last step, all of its parts
+  double cut_turn = 0,
+         cut_way = 0;     ///< `held_turned` over its most, way of an obstacle [m], where a step was cut for it
+  ComponentGains gained;  ///< in the last step, all of its parts
   std::vector<SupportMotion> motions_before, kept_motions;  ///< at the start of a time step, of a part of it
   Plan plan;
   bool plan_current = false;  ///< made when it is asked for
@@ -212,6 +214,7 @@ struct World::Implementation : Running {
   bool may_grow(double dt, double times) const;
   Attempt try_step(double dt);
   bool turns_rods() const;
+  double farthest_obstacle(const State& since) const;
   void take_back();
   void commit_step();
   void return_to_start();

@@ -50,8 +50,8 @@ void World::Implementation::set_motion_at(SupportMotion& motion, double time) co
   motion.fed = motion.fed_before + motion.feed_rate * (time - motion.feeds_since);
 }
 
-/// A support that is to be elsewhere at once gets there evenly in the course of the time step: shorter steps meet less
-/// of a jump, or cutting them would be in vain.
+/// A support or an obstacle that is to be elsewhere at once gets there evenly in the course of the time step: shorter
+/// steps meet less of a jump, or cutting them would be in vain.
 void World::Implementation::spread_jumps(double duration) {
   const Span step{state.time, state.time + duration};
   for (SupportMotion& m : motions) {
@@ -63,6 +63,16 @@ void World::Implementation::spread_jumps(double duration) {
       m.from_rotation = m.rotation;
       m.turn = step;
     }
+  }
+  // One that has come there already, in an equilibrium say, is not where it set out from.
+  const auto jumps = [&](const Span& way, const Vector3& now, const Vector3& from, const Vector3& to) {
+    return way.start == way.end && way.end == state.time && (now - from).norm() < 0.5 * (to - from).norm();
+  };
+  for (std::size_t o = 0; o < obstacle_motions.size(); ++o) {
+    ObstacleMotion& m = obstacle_motions[o];
+    const ObstacleWay now = obstacle_way(static_cast<int>(o));
+    if (jumps(m.shift, now.shift, m.from.shift, m.to.shift)) m.shift = step;
+    if (jumps(m.turn, now.turn, m.from.turn, m.to.turn)) m.turn = step;
   }
 }
 

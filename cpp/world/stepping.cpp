@@ -25,6 +25,10 @@ constexpr double kMostHeldTurn = 0.25, kMostHeldTurnOfPart = 0.15;
 // Share of the tolerance that is kept for events, and of the duration, over what steps are averaged.
 constexpr double kEventShare = 0.2, kAverage = 1.0 / 64.0;
 
+/// Whether cutting a step lessened something: not where a function of the user's jumps within it, by as much in a
+/// shorter one.
+bool lessens(double now, double before) { return before == 0.0 || now < 0.9 * before; }
+
 }  // namespace
 
 /// One time step of `duration`, in equal parts where it does not converge or is not accurate enough.
@@ -211,10 +215,15 @@ World::Implementation::Attempt World::Implementation::try_step(double dt) {
   Contact* contact = watched ? equations_of_step().contact() : nullptr;
   const double held_turn =
       options.adaptive && conserving() ? held_turned / (fourth ? kMostHeldTurnOfPart : kMostHeldTurn) : 0.0;
-  const bool unresolved = held_turn > 1.0 || (contact && (contact->unresolved(dt) || contact->missed(kept.state.q)));
+  const double way = contact && !obstacle_motions.empty() ? farthest_obstacle(kept.state) : 0.0;
+  const bool unresolved =
+      (held_turn > 1.0 && lessens(held_turn, cut_turn)) ||
+      (contact && ((contact->unresolved(dt) && lessens(way, cut_way)) || contact->missed(kept.state.q)));
   const bool gains = !unresolved && guarded && gains_energy(),
              pumped = !unresolved && !gains && watched && asks && contact_pumps(dt);
   if (unresolved && may_cut()) {
+    cut_turn = held_turn;
+    cut_way = way;
     take_back();
     return Attempt::inaccurate;
   }
@@ -251,6 +260,16 @@ bool World::Implementation::turns_rods() const {
   return false;
 }
 
+/// How far an obstacle has moved since [m].
+double World::Implementation::farthest_obstacle(const State& since) const {
+  double square = 0.0;
+  for (std::size_t o = 0; o < state.obstacles.size(); ++o) {
+    const Vec3d way = state.obstacles[o].point - since.obstacles[o].point;
+    square = std::max(square, dot(way, way));
+  }
+  return std::sqrt(square);
+}
+
 /// Undoes an accepted step.
 void World::Implementation::take_back() {
   return_to_start();
@@ -266,6 +285,7 @@ void World::Implementation::return_to_start() {
 
 /// What only steps that stay may do.
 void World::Implementation::commit_step() {
+  cut_turn = cut_way = 0.0;
   statistics.steps += 1;
   steps_taken += 1;
   statistics.largest_turn = std::max(statistics.largest_turn, turned);

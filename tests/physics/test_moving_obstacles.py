@@ -169,3 +169,39 @@ def test_what_rests_on_a_floor_is_sent_off_by_restitution_when_the_floor_jumps_u
     parted = simulation.momentum().linear[2] / (1000.0 * np.pi * 25e-6 * 0.2) / speed
     fallen = duration / speed if restitution > 0.0 else 0.0
     assert parted + fallen == pytest.approx(1.0 + restitution, abs=0.03)
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("how", ["at once", "over a step", "by a function that jumps"])
+def test_what_an_obstacle_does_at_once_it_does_within_a_time_step(how: str, restitution: float) -> None:
+    """However the step is cut: 1 mm in 5 ms are .2 m/s, and a rod that rests on it parts with (1 + e) times that."""
+    scene = withe.Scene(gravity=(0, 0, -9.81))
+    rubber = withe.Material(youngs_modulus=1e7, density=1000.0)
+    rod = scene.add_rod(start=(-0.1, 0, 0.005), end=(0.1, 0, 0.005), nodes=6, radius=5e-3, material=rubber)
+    floor = scene.add_floor(restitution=restitution)
+    simulation = scene.build(time_step=5e-3)
+    simulation.equilibrium()
+    simulation.step(20)
+    start = simulation.time
+    if how == "by a function that jumps":  # to the same place within a shorter part at most
+        simulation.move(floor, path=lambda t: (0.0, 0.0, 1e-3 if t > start else 0.0))
+    else:
+        simulation.move(floor, position=(0, 0, 1e-3), over=0.0 if how == "at once" else 5e-3)
+    simulation.step()
+    assert simulation.obstacle_position(floor)[2] == pytest.approx(1e-3, rel=1e-9)
+    speed = simulation.velocities(rod)[:, 2].max()
+    assert speed < (1.0 if how == "by a function that jumps" else (1.0 + restitution) * 0.2 + 0.02)
+
+
+def test_an_obstacle_that_an_equilibrium_went_along_with_stays_there() -> None:
+    scene = withe.Scene()
+    rod = scene.add_rod(start=(-0.1, 0, 0.005), end=(0.1, 0, 0.005), nodes=6, radius=5e-3, material=RUBBER)
+    floor = scene.add_floor()
+    simulation = scene.build(time_step=5e-3)
+    simulation.equilibrium()
+    simulation.move(floor, position=(0, 0, 1e-3))
+    simulation.equilibrium()
+    assert simulation.obstacle_position(floor)[2] == pytest.approx(1e-3, rel=1e-12)
+    simulation.step()
+    assert simulation.obstacle_position(floor)[2] == pytest.approx(1e-3, rel=1e-12)
+    assert abs(simulation.velocities(rod)).max() < 1e-2

@@ -224,3 +224,45 @@ def test_a_shaft_that_its_clamp_spins_fast_turns_as_fast(integrator, hold, nodes
     assert simulation.spins(rod) == pytest.approx(300.0, rel=0.08)
     energy = simulation.energy()
     assert energy.total - energy.work == pytest.approx(0.0, abs=3e-3 * energy.kinetic)
+
+
+@pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum"])
+@pytest.mark.parametrize("hold", ["frame", "edge"])
+@pytest.mark.parametrize("word", ["roll", "tangent and roll"])
+def test_a_clamp_turns_at_once_evenly_within_a_time_step(integrator, hold, word):
+    """However the step is cut: in its first part alone it would do many times the work."""
+    works = []
+    for over in (0.0, 5e-3):
+        scene = withe.Scene(gravity=(0, 0, 0))
+        rubber = withe.Material(youngs_modulus=1e6, density=1000.0, viscosity=100.0)
+        rod = scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=21, radius=5e-3, material=rubber)
+        wall = scene.clamp(rod.start, hold=hold)
+        simulation = scene.build(integrator=integrator, time_step=5e-3, planar=False)
+        where = {"tangent": (1.0, 0.01, 0.0)} if word != "roll" else {}
+        simulation.move(wall, roll=1.0, over=over, **where)
+        simulation.step()
+        works.append(simulation.energy().work)
+        after = simulation.get(wall, "rotation")
+        simulation.step(3)
+        np.testing.assert_allclose(simulation.get(wall, "rotation"), after, atol=1e-12)
+    assert works[0] == pytest.approx(works[1], rel=0.02)
+
+
+def test_a_roll_that_is_led_on_at_once_before_every_step_counts_full_turns():
+    spins = []
+    for at_once in (True, False):
+        scene = withe.Scene(gravity=(0, 0, 0))
+        rubber = withe.Material(youngs_modulus=1e6, density=1000.0, viscosity=100.0)
+        rod = scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=11, radius=5e-3, material=rubber)
+        wall = scene.clamp(rod.start)
+        simulation = scene.build(time_step=5e-3, planar=False)
+        if not at_once:
+            simulation.move(wall, roll=9.0, over=0.15)
+        for k in range(1, 31):
+            if at_once:
+                simulation.move(wall, roll=0.3 * k)
+            simulation.step()
+        c, s = np.cos(9.0), np.sin(9.0)
+        np.testing.assert_allclose(simulation.get(wall, "rotation"), [(1, 0, 0), (0, c, -s), (0, s, c)], atol=1e-9)
+        spins.append(simulation.spins(rod))
+    np.testing.assert_allclose(spins[0], spins[1], rtol=1e-6)

@@ -165,7 +165,8 @@ class Measurements:
         """Force and moment of a support on the rod.
 
         In motion, the means over the last time step, of all its parts where it was cut (`statistics.steps` counts
-        parts): with all other forces, those by which momentum grew in that time. Times the way and the turn of a step
+        parts): with all other forces, those by which momentum grew in that time. The moment is about the node,
+        wherever that goes. Times the way and the turn of a step
         that was not cut they are what ``energy().work`` counts, to second order in the step. A support that starts or
         stops at full speed gives what it holds its speed by an impulse, which is part of the force of that step: its
         work is that times the mean of both speeds, half of what the way of the step would say.

@@ -87,6 +87,15 @@ class Turn:
         share = self._share(1, time)
         return (1.0 - share) * float(self.rolls[0]) + share * float(self.rolls[1])
 
+    def arrived(self, time: float) -> Turn:
+        """One that came to its end by then, and leads nowhere: it tells full turns."""
+        return Turn(
+            tangents=np.stack([self.tangents[1]] * 2),
+            rolls=np.full(2, self.rolls[1]),
+            times=np.array([(time - 1.0, time)] * 2),
+            drawn=self.drawn,
+        )
+
     def _share(self, way: int, time: float) -> float:
         begin, end = self.times[way]
         return float(min(max((time - begin) / (end - begin), 0.0), 1.0)) if end > begin else 1.0

@@ -114,6 +114,9 @@ def move_support(
     if matrix is not None and session.journal is not None:
         axis, angle = axis_angle(matrix @ np.array(session.world.support_rotation(index)).T)
         given["rotation"] = angle * axis
+    if turn is not None and turn.times.max() <= session.world.time:
+        # The engine leads what is to be there at once evenly through the next time step, however that is cut.
+        matrix, turn = turn(session.world.time), turn.arrived(session.world.time)
     session.world.move_support(index, target, matrix, over)
     # What is not given goes on as it does.
     if target is not None:
