@@ -8,10 +8,10 @@ import json
 import os
 import uuid
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +30,8 @@ __all__ = [
     "write_vtk",
     "written_beside",
 ]
+
+Content = TypeVar("Content")
 
 _HEADER = "header"
 _POSE_COLUMNS = ("t", "x", "y", "z", "qx", "qy", "qz", "qw")
@@ -186,13 +188,16 @@ def save_json(path: str | os.PathLike[str], kind: str, version: int, content: Ma
     return path
 
 
-def load_json(path: str | os.PathLike[str], kind: str, version: int) -> dict[str, Any]:
-    """Read what `save_json` wrote.
+def load_json(
+    path: str | os.PathLike[str], kind: str, version: int, read: Callable[[dict[str, Any]], Content]
+) -> Content:
+    """What `read` makes of the content that `save_json` wrote.
 
     Raises
     ------
     ValueError
-        A file that is damaged, not ours, of another kind or of another version; the message names it.
+        A file that is damaged, not ours, of another kind or of another version; the message names it. Damaged is also
+        what `read` misses something in, or refuses.
     OSError
         The file cannot be opened.
     """
@@ -201,7 +206,13 @@ def load_json(path: str | os.PathLike[str], kind: str, version: int) -> dict[str
         content = json.loads(path.read_text(encoding="utf-8"))
     except (json.JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise ValueError(f"{path} is not a withe file, or damaged: it is no JSON ({error})") from error
-    return _checked_header(path, content, kind, version)
+    content = _checked_header(path, content, kind, version)
+    try:
+        return read(content)
+    except KeyError as error:
+        raise ValueError(f"{path} is a damaged {kind}: it has no {error}") from error
+    except (AttributeError, TypeError, ValueError) as error:
+        raise ValueError(f"{path} is a damaged {kind}: {error}") from error
 
 
 def save_poses(path: str | os.PathLike[str], times: npt.NDArray[np.float64], poses: npt.NDArray[np.float64]) -> Path:

@@ -151,11 +151,11 @@ def test_a_plan_is_read_back_as_it_was(options, tmp_path):
     [
         (lambda text: text[:-200], "is not a withe file, or damaged: it is no JSON"),
         (lambda text: text.replace("plan of a deployment", "plan of a fold"), "expected a withe plan of a deployment"),
-        (lambda text: text.replace('"laid"', '"lain"'), "is a damaged plan: it has no 'laid'"),
-        (lambda text: text.replace('"radius": 0.0016', '"radius": -1'), "damaged plan: radius must be positive"),
-        (lambda text: text.replace('"name": "lay"', '"name": "fly"'), "damaged plan: name of a phase must be"),
-        (lambda text: text.replace('"t": [', '"t": [-1.0, '), "damaged plan: quaternion_xyzw must have shape"),
-        (lambda text: text.replace('"arc_length": [', '"arc_length": [-1.0, '), "damaged plan: arc_length must grow"),
+        (lambda text: text.replace('"laid"', '"lain"'), "is a damaged plan of a deployment: it has no 'laid'"),
+        (lambda text: text.replace('"radius": 0.0016', '"radius": -1'), "damaged .*: radius must be positive"),
+        (lambda text: text.replace('"name": "lay"', '"name": "fly"'), "damaged .*: name of a phase must be"),
+        (lambda text: text.replace('"t": [', '"t": [-1.0, '), "damaged .*: quaternion_xyzw must have shape"),
+        (lambda text: text.replace('"arc_length": [', '"arc_length": [-1.0, '), "damaged .*: arc_length must grow"),
     ],
 )
 def test_a_plan_that_is_damaged_is_refused(damage, message, motion, tmp_path):

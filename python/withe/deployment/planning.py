@@ -149,13 +149,7 @@ class Plan:
         >>> motion.save("motion.json")  # doctest: +SKIP
         >>> withe.deployment.Plan.load("motion.json").feasibility(0.4)  # doctest: +SKIP
         """
-        content = load_json(path, KIND, VERSION)
-        try:
-            return cls(**parts_of(content))
-        except KeyError as error:
-            raise ValueError(f"{path} is a damaged plan: it has no {error}") from error
-        except (AttributeError, TypeError, ValueError) as error:
-            raise ValueError(f"{path} is a damaged plan: {error}") from error
+        return load_json(path, KIND, VERSION, lambda content: cls(**parts_of(content)))
 
     def plot(self, friction: float) -> Any:
         """Draw the pattern coloured by the friction that it needs, the jaw's way, and each test along the cable.

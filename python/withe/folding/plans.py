@@ -406,10 +406,4 @@ class Plan:
         >>> plan.save("fold.json")  # doctest: +SKIP
         >>> withe.folding.Plan.load("fold.json").plot()  # doctest: +SKIP
         """
-        content = load_json(path, KIND, VERSION)
-        try:
-            return cls(**parts_of(content))
-        except KeyError as error:
-            raise ValueError(f"{path} is a damaged plan: it has no {error}") from error
-        except (AttributeError, TypeError, ValueError) as error:
-            raise ValueError(f"{path} is a damaged plan: {error}") from error
+        return load_json(path, KIND, VERSION, lambda content: cls(**parts_of(content)))
