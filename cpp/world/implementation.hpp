@@ -77,6 +77,7 @@ struct World::Implementation : Running {
   Statistics statistics;
   CustomFunction force_function;
   std::function<void(double, double)> callback;  ///< StepCallback, bound to its world
+  bool prescribes = false;                       ///< whether it may lead supports and obstacles
   std::function<void()> poll;
   std::atomic<bool> interrupted{false};
   double separated = 0;  ///< how far overlapping rods were moved before the start [m]

@@ -254,7 +254,7 @@ bool World::Implementation::turns_rods() const {
     const Support& support = model.supports[s];
     const SupportMotion& motion = motions[s];
     if (support.active && (support.frame >= 0 || !support.edges.empty()) &&
-        (callback || state.time < motion.turn.end || motion.rotation != motion.to_rotation))
+        (prescribes || state.time < motion.turn.end))
       return true;
   }
   return false;

@@ -129,7 +129,8 @@ EquilibriumResult World::equilibrium() {
   return self.equilibrium(0.0);
 }
 
-void World::set_step_callback(const StepCallback& callback) {
+void World::set_step_callback(const StepCallback& callback, bool prescribes) {
+  implementation_->prescribes = callback && prescribes;
   if (!callback) {
     implementation_->callback = nullptr;
     return;

@@ -200,9 +200,9 @@ class World {
   void interrupt();
 
   // Called before every inner step. `force_time`: when loads act in this step; `end_time`: where supports
-  // shall be at its end. May call set_load and prescribe. Empty: none.
+  // shall be at its end. May call set_load and, if it `prescribes`, prescribe. Empty: none.
   using StepCallback = std::function<void(World&, double force_time, double end_time)>;
-  void set_step_callback(const StepCallback& callback);
+  void set_step_callback(const StepCallback& callback, bool prescribes = true);
   /// Asked before every inner step and Newton iteration; what it throws ends the call, with the state the last
   /// accepted one. Must leave the world alone. Empty: none.
   void set_poll(const std::function<void()>& poll);

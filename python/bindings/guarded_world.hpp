@@ -47,14 +47,16 @@ class GuardedWorld {
       polled = Clock::now();
       if (PyErr_CheckSignals() != 0) throw py::error_already_set();
     };
-    world_.set_step_callback([&](World&, double force_time, double end_time) {
-      const bool poll = Clock::now() - polled >= std::chrono::milliseconds(50);
-      if (!poll && callback.is_none()) return;
-      const py::gil_scoped_acquire gil;
-      const InCallback mark(*this);
-      if (poll) check_signals();
-      if (!callback.is_none()) callback(force_time, end_time);
-    });
+    world_.set_step_callback(
+        [&](World&, double force_time, double end_time) {
+          const bool poll = Clock::now() - polled >= std::chrono::milliseconds(50);
+          if (!poll && callback.is_none()) return;
+          const py::gil_scoped_acquire gil;
+          const InCallback mark(*this);
+          if (poll) check_signals();
+          if (!callback.is_none()) callback(force_time, end_time);
+        },
+        !callback.is_none());
     if (!forces.is_none()) ask(forces);
     world_.set_poll([&] {
       if (Clock::now() - polled < std::chrono::milliseconds(100)) return;
