@@ -87,7 +87,8 @@ TEST(Batch, PassesOverALaneThatFailedUntilItIsForgiven) {
 }
 
 TEST(Batch, EndsWithinAStepWhatACheckThrowsAndLeavesEveryLaneWhereItWas) {
-  const Worlds lanes = arms(4);
+  // which come to rest: however far they get by then, none of them swings until its few edges fold
+  const Worlds lanes = arms(4, options(Integrator::backward_euler));
   for (const int workers : {1, 3}) {
     Batch batch(pointers(lanes), workers);
     int asked = 0;
