@@ -221,8 +221,10 @@ Contact::TouchingComponents Contact::touching_components() const {
   TouchingComponents out{std::vector<bool>(at(model.component_count), false)};
   for (const Touching& t : set_) {
     out.which[at(model.component_of_edge(t.pair.key.a))] = true;
-    if (t.pair.key.b >= 0) out.which[at(model.component_of_edge(t.pair.key.b))] = true;
-    if (t.pair.key.b >= 0) continue;
+    if (t.pair.key.b >= 0) {
+      out.which[at(model.component_of_edge(t.pair.key.b))] = true;
+      continue;
+    }
     const Vec3d velocity = problem_.velocity_of(t.pair);
     const auto same = [&](const Vec3d& other) { return dot(velocity - other, velocity - other) == 0.0; };
     if (std::none_of(out.obstacles.begin(), out.obstacles.end(), same)) out.obstacles.push_back(velocity);

@@ -114,7 +114,7 @@ class Contact {
   /// Predicts the friction of a step of Newton's method by which `change` is to be added to q1.
   void predict_friction(const VectorX& change, ContactLinearisation& linearisation) const;
 
-  /// Which connected components touch anything, and whether that is an obstacle.
+  /// Which connected components touch anything, and how fast obstacles go that they touch.
   struct TouchingComponents {
     std::vector<bool> which;
     std::vector<Vec3d> obstacles;  ///< velocities in the step of those that are touched, which all differ [m/s]

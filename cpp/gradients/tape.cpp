@@ -253,7 +253,7 @@ void Tape::walk_back(Player& player, const std::function<void(const Passage&)>& 
   }
 }
 
-/// What a scalar depends on, by the number of steps before, and by the step whose reactions it takes.
+/// What a scalar depends on, by the number of steps before, and by the steps whose reactions it takes.
 class Tape::Moments {
  public:
   Moments(const Tape& tape, const std::vector<MomentAdjoint>& moments, const ParameterVisitor& visit, bool by_poses)

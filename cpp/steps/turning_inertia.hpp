@@ -2,9 +2,6 @@
 /// Inertia of an edge about itself, on any scalar: doubles, or dual numbers for its derivatives. Inlined into loops
 /// over edges, whose vectors would go through memory otherwise.
 
-#include <cmath>
-
-#include "common/dual.hpp"
 #include "geometry/finite_turn.hpp"
 #include "geometry/frames.hpp"
 

@@ -67,9 +67,9 @@ struct World::Implementation : Running {
   Moving kept;                         ///< at the start of a step that may be taken back
   EnergyGuard guard_before;            ///< likewise
   double turned = 0, held_turned = 0;  ///< of an edge, of a held frame in the last step at most [rad]
-  double cut_turn = 0,
-         cut_way = 0;     ///< `held_turned` over its most, way of an obstacle [m], where a step was cut for it
-  ComponentGains gained;  ///< in the last step, all of its parts
+  /// Of steps that were cut for them, until one is accepted: `held_turned` over its most, way of an obstacle [m].
+  double cut_turn = 0, cut_way = 0;
+  ComponentGains gained;                                    ///< in the last step, all of its parts
   std::vector<SupportMotion> motions_before, kept_motions;  ///< at the start of a time step, of a part of it
   Plan plan;
   bool plan_current = false;  ///< made when it is asked for
@@ -154,6 +154,7 @@ struct World::Implementation : Running {
   const Configuration& configuration() const;
   void retire_ramps();
   bool actuated() const;
+  bool turns_rods() const;
   void aim_supports(double time);
   void spread_jumps(double duration);
   void hold_now(HeldTarget& target) const;
@@ -214,8 +215,6 @@ struct World::Implementation : Running {
   void account_for_error(double error, double dt);
   bool may_grow(double dt, double times) const;
   Attempt try_step(double dt);
-  bool turns_rods() const;
-  double farthest_obstacle(const State& since) const;
   void take_back();
   void commit_step();
   void return_to_start();
@@ -228,11 +227,6 @@ struct World::Implementation : Running {
   Equations& equations_of_step();
   StepRule rule_of_step() const;
   StepResult step_by_rule(double dt, int slot);
-  void note_reactions();
-  void note_residual();
-  Wrench reaction_of(int support, const VectorX& held) const;
-  void keep_reactions(double dt, bool begins);
-  void make_frame_moments();
   void check_impacts(const ContactDescription& contact) const;
   void check_reversible(const Parameters& p) const;
 
@@ -270,6 +264,11 @@ struct World::Implementation : Running {
   SupportMotion standing(const Support& support) const;
   void check_pose(int support, const std::optional<Vector3>& position, const std::optional<Matrix3>& rotation);
   void lump_held();
+  void note_reactions();
+  void note_residual();
+  void keep_reactions(double dt, bool begins);
+  void make_frame_moments();
+  Wrench reaction_of(int support, const VectorX& held) const;
 
   // equilibrium.cpp
   EquilibriumResult equilibrium(double dt);
@@ -294,6 +293,7 @@ struct World::Implementation : Running {
   void aim_obstacles(Equations& system, double time) const;
   static void release_obstacles(Equations& system);
   ObstacleWay obstacle_way(int obstacle) const;
+  double farthest_obstacle(const State& since) const;
   std::vector<ObstaclePlace> obstacle_places(const std::function<ObstacleWay(int)>& way) const;
   void check_turn(int obstacle, const Vector3& turn) const;
 

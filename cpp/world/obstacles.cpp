@@ -1,5 +1,6 @@
 /// Obstacles that move.
 
+#include <algorithm>
 #include <cmath>
 
 #include <Eigen/Geometry>
@@ -28,6 +29,16 @@ std::vector<ObstaclePlace> World::Implementation::obstacle_places(const std::fun
   for (const ObstacleDescription& drawn : description.contact.obstacles)
     places.push_back(obstacle_place(model, drawn, way(static_cast<int>(places.size()))));
   return places;
+}
+
+/// How far an obstacle has moved since [m].
+double World::Implementation::farthest_obstacle(const State& since) const {
+  double square = 0.0;
+  for (std::size_t o = 0; o < state.obstacles.size(); ++o) {
+    const Vec3d way = state.obstacles[o].point - since.obstacles[o].point;
+    square = std::max(square, dot(way, way));
+  }
+  return std::sqrt(square);
 }
 
 void World::Implementation::aim_obstacles(Equations& system, double time) const {

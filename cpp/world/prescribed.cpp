@@ -76,6 +76,19 @@ void World::Implementation::spread_jumps(double duration) {
   }
 }
 
+/// Whether supports in space may turn rods about themselves in the coming step.
+bool World::Implementation::turns_rods() const {
+  if (model.planar()) return false;
+  for (std::size_t s = 0; s < model.supports.size(); ++s) {
+    const Support& support = model.supports[s];
+    const SupportMotion& motion = motions[s];
+    if (support.active && (support.frame >= 0 || !support.edges.empty()) &&
+        (prescribes || state.time < motion.turn.end))
+      return true;
+  }
+  return false;
+}
+
 /// Moves supports to where they shall be at a time, and notes what that says of the held unknowns.
 void World::Implementation::aim_supports(double time) {
   for (SupportMotion& motion : motions) set_motion_at(motion, time);

@@ -2,10 +2,7 @@
 #include <cmath>
 #include <utility>
 
-#include <Eigen/LU>
-
 #include "common/check.hpp"
-#include "geometry/rotation.hpp"
 #include "world/implementation.hpp"
 
 namespace withe {
@@ -63,6 +60,7 @@ void World::Implementation::advance_in_parts(double duration) {
   const double base = state.time;
   Division division;
   divide_rest(division);
+  cut_turn = cut_way = 0.0;
   for (;;) {
     work.newton.poll();
     const double dt = duration * ((1.0 - division.from) / static_cast<double>(division.parts));
@@ -247,29 +245,6 @@ World::Implementation::Attempt World::Implementation::try_step(double dt) {
   return may_grow(dt, std::exp2(1.0 / levels_per_halving())) ? Attempt::easy : Attempt::hard;
 }
 
-/// Whether supports in space may turn rods about themselves in the coming step.
-bool World::Implementation::turns_rods() const {
-  if (model.planar()) return false;
-  for (std::size_t s = 0; s < model.supports.size(); ++s) {
-    const Support& support = model.supports[s];
-    const SupportMotion& motion = motions[s];
-    if (support.active && (support.frame >= 0 || !support.edges.empty()) &&
-        (prescribes || state.time < motion.turn.end))
-      return true;
-  }
-  return false;
-}
-
-/// How far an obstacle has moved since [m].
-double World::Implementation::farthest_obstacle(const State& since) const {
-  double square = 0.0;
-  for (std::size_t o = 0; o < state.obstacles.size(); ++o) {
-    const Vec3d way = state.obstacles[o].point - since.obstacles[o].point;
-    square = std::max(square, dot(way, way));
-  }
-  return std::sqrt(square);
-}
-
 /// Undoes an accepted step.
 void World::Implementation::take_back() {
   return_to_start();
@@ -449,41 +424,6 @@ StepResult World::Implementation::step_by_rule(double dt, int slot) {
   work.gains.small_turn = euler ? 0.3 : 0.01;
   if (own.watched) work.gains.small_gain = (euler ? 1e-3 : 1e-6) * guard.scale;
   return implicit_step(system, *newton, options, parameters, own, state, predictor, work);
-}
-
-/// Of a part of a time step, whose reactions are the means over all parts.
-void World::Implementation::keep_reactions(double dt, bool begins) {
-  note_residual();
-  make_frame_moments();
-  if (begins) {
-    impulses.clear();
-    impulse_time = 0.0;
-  }
-  if (part.only || model.supports.empty()) return;
-  impulses.resize(model.supports.size());
-  impulse_time += dt;
-  VectorX& held = work.assumed;
-  held.setZero(model.dof_count);
-  equations->assembler().set_held_part(reaction_residual, held);
-  for (std::size_t s = 0; s < model.supports.size(); ++s) {
-    if (!model.supports[s].active) continue;
-    const Wrench found = reaction_of(static_cast<int>(s), held);
-    impulses[s].force += dt * found.force;
-    impulses[s].moment += dt * found.moment;
-  }
-}
-
-/// The residual of a frame's unknowns is J(w)^T moment, w its turn where the forces act; of an energy-momentum step,
-/// the moment.
-void World::Implementation::make_frame_moments() {
-  if (model.planar() || rule_of_step() == StepRule::energy_momentum) return;
-  for (const Support& support : model.supports) {
-    if (!support.active || support.frame < 0) continue;
-    const int dof = model.frame_dof[at(support.frame)];
-    const Matrix3 J = cayley_spin((conserving() ? 0.5 : 1.0) * work.held.q.segment<3>(dof));
-    const Vector3 moment = reaction_residual.segment<3>(dof);
-    reaction_residual.segment<3>(dof) = J.transpose().inverse() * moment;
-  }
 }
 
 /// The explicit scheme loses nothing in impacts.

@@ -3,8 +3,10 @@
 #include <algorithm>
 
 #include <Eigen/Geometry>
+#include <Eigen/LU>
 
 #include "common/check.hpp"
+#include "geometry/rotation.hpp"
 #include "model/edge_vectors.hpp"
 #include "world/implementation.hpp"
 
@@ -180,6 +182,41 @@ void World::Implementation::note_residual() {
   reaction_place = work.newton.data.z;
   hand_wrenches = work.newton.data.hands;
   reaction_current = true;
+}
+
+/// Of a part of a time step, whose reactions are the means over all parts.
+void World::Implementation::keep_reactions(double dt, bool begins) {
+  note_residual();
+  make_frame_moments();
+  if (begins) {
+    impulses.clear();
+    impulse_time = 0.0;
+  }
+  if (part.only || model.supports.empty()) return;
+  impulses.resize(model.supports.size());
+  impulse_time += dt;
+  VectorX& held = work.assumed;
+  held.setZero(model.dof_count);
+  equations->assembler().set_held_part(reaction_residual, held);
+  for (std::size_t s = 0; s < model.supports.size(); ++s) {
+    if (!model.supports[s].active) continue;
+    const Wrench found = reaction_of(static_cast<int>(s), held);
+    impulses[s].force += dt * found.force;
+    impulses[s].moment += dt * found.moment;
+  }
+}
+
+/// The residual of a frame's unknowns is J(w)^T moment, w its turn where the forces act; of an energy-momentum step,
+/// the moment.
+void World::Implementation::make_frame_moments() {
+  if (model.planar() || rule_of_step() == StepRule::energy_momentum) return;
+  for (const Support& support : model.supports) {
+    if (!support.active || support.frame < 0) continue;
+    const int dof = model.frame_dof[at(support.frame)];
+    const Matrix3 J = cayley_spin((conserving() ? 0.5 : 1.0) * work.held.q.segment<3>(dof));
+    const Vector3 moment = reaction_residual.segment<3>(dof);
+    reaction_residual.segment<3>(dof) = J.transpose().inverse() * moment;
+  }
 }
 
 /// Of a support on the rod in the last evaluation: about its node, of a hand about the origin. `held`: its rows of what
