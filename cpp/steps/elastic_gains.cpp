@@ -102,10 +102,8 @@ void ElasticForces::add_bend_gains(const StepProblem& problem, StepData& data, c
   };
   add_energies(start, -1.0);
   add_energies(end, 1.0);
-  VectorX& z = data.change;  // which these steps do not use
-  z = end;
-  if (problem.in_middle()) z = 0.5 * (start + end);
-  compute_configuration(model, *problem.start, z, c);
+  // The data are those of the solution.
+  const Configuration& acting = data.configuration;
   Local local;
   const auto work = [&](const ElementTable& table, int element) {
     const int* dofs = table.dofs(element);
@@ -116,11 +114,11 @@ void ElasticForces::add_bend_gains(const StepProblem& problem, StepData& data, c
   };
   each(
       [&](int b) {
-        bend_local(model, bend_coefficients(k, b), c, b, false, local);
+        bend_local(model, bend_coefficients(k, b), acting, b, false, local);
         return -work(assembler.bend, b);
       },
       [&](int h) {
-        half_local(model, z, half_coefficients(k, h), c, h, false, local);
+        half_local(model, data.z, half_coefficients(k, h), acting, h, false, local);
         return -work(assembler.half, h);
       });
 }

@@ -190,6 +190,8 @@ def test_robots_begin_again_by_themselves_as_gymnasium_has_it(autoreset):
     mode = gymnasium.vector.AutoresetMode[autoreset.upper()]
     reference = gymnasium.vector.SyncVectorEnv([lambda: withe.learning.Environment(Touch())] * 2, autoreset_mode=mode)
     many = withe.learning.VectorEnvironment(Touch(), 2, workers=1, autoreset=autoreset)
+    by_mode = withe.learning.VectorEnvironment(Touch(), 2, workers=1, autoreset=mode)
+    assert by_mode.metadata["autoreset_mode"] == many.metadata["autoreset_mode"] == mode
     np.testing.assert_array_equal(reference.reset(seed=4)[0], many.reset(seed=4)[0])
     for step in range(9):
         actions = np.random.default_rng(step).uniform(-1, 1, (2, 2)).astype(np.float32)

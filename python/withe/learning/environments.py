@@ -153,7 +153,7 @@ class _VectorEnvironment:
         Number of threads; by default one a processor.
     render_mode : {"rgb_array", "human"}, optional
         Pictures of the first robot.
-    autoreset : {"next_step", "same_step", "disabled"}
+    autoreset : {"next_step", "same_step", "disabled"} or gymnasium.vector.AutoresetMode
         As Gymnasium has it: when the next episode of a robot begins. With "disabled" by
         ``reset(options={"reset_mask": mask})``.
     max_episode_steps : int, optional
@@ -179,11 +179,13 @@ class _VectorEnvironment:
         num_envs: int = 1,
         workers: int | None = None,
         render_mode: str | None = None,
-        autoreset: str = "next_step",
+        autoreset: Any = "next_step",
         max_episode_steps: int | None = None,
     ) -> None:
         gymnasium = _require()
         modes = {mode.name.lower(): mode for mode in gymnasium.vector.AutoresetMode}
+        if isinstance(autoreset, gymnasium.vector.AutoresetMode):
+            autoreset = autoreset.name.lower()
         if autoreset not in modes:
             raise ValueError(f"autoreset must be {' or '.join(map(repr, modes))}, got {autoreset!r}")
         self._episodes = Episodes(task, num_envs, workers, max_episode_steps)
@@ -339,7 +341,7 @@ def vector_maker(task: Callable[..., Task]) -> Callable[..., Any]:
         num_envs: int = 1,
         workers: int | None = None,
         render_mode: str | None = None,
-        autoreset: str = "next_step",
+        autoreset: Any = "next_step",
         max_episode_steps: int | None = None,
         **others: Any,
     ) -> Any:
