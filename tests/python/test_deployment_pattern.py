@@ -205,6 +205,7 @@ def test_bad_patterns_say_what_is_wrong(arguments, message):
     [
         (lambda: Cable(0.0, 1e-3, 0.03), "length must be positive"),
         (lambda: Cable(1.0, -1e-3, 0.03), "radius must be positive"),
+        (lambda: Cable(800.0, 1.6, 32.0), "1.6 m: are all sizes in metres"),
         (lambda: Cable(1.0, 1e-3, float("nan")), "gravito_bending_length"),
         (lambda: Cable(1e-3, 1e-3, 0.03), "thickness"),
         (lambda: Cable.dlo(6), "number"),

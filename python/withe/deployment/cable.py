@@ -15,7 +15,7 @@ from withe.perception.tracing import check_image, read_image
 __all__ = ["JAW", "Cable", "MeasuredCable", "measure"]
 
 JAW = 0.010  # [m] of a cable that a jaw holds
-_HIGHEST_LOOP = 10.0  # [m]
+_HIGHEST_LOOP, _THICKEST = 10.0, 0.5  # [m]
 LOOP_HEIGHT = 1.142240  # of a loop that hangs on a floor, touching it tangentially [Lgb]: .90660 (EI / w)^(1/3)
 _TABLE = {  # Lgb, radius, length [m] [Choi, dissertation, table 9.1]
     1: (0.018, 1.6e-3, 0.875),
@@ -42,7 +42,8 @@ class Cable:
     Raises
     ------
     ValueError
-        A length that is not positive, a cable that is no longer than it is thick, or bent tighter by itself than that.
+        A length that is not positive, a radius that no cable has, as are those in millimetres, a cable that is no
+        longer than it is thick, or bent tighter by itself than that.
 
     Examples
     --------
@@ -60,6 +61,8 @@ class Cable:
     def __post_init__(self) -> None:
         for name in ("length", "radius", "gravito_bending_length"):
             object.__setattr__(self, name, validation.positive(getattr(self, name), name))
+        if self.radius > _THICKEST:
+            raise ValueError(f"radius must be at most {_THICKEST:g} m, got {self.radius:g} m: are all sizes in metres?")
         bent = validation.number_array(self.natural_curvature, "natural_curvature", (2,))
         object.__setattr__(self, "natural_curvature", (float(bent[0]), float(bent[1])))
         if np.hypot(*bent) * self.radius >= 1.0:
