@@ -39,6 +39,8 @@ constexpr int kMostJumps = 20;
 constexpr double kBeyond = 4.0;
 // A turn that is greater than this between two points of a path is a jump [rad].
 constexpr double kJump = 0.25 * kFarthestTurn;
+// Potentials on the two sides of a saddle that differ by less of what they fall by are alike.
+constexpr double kAlike = 1e-6;
 
 class Statics {
  public:
@@ -370,12 +372,22 @@ class Statics {
     return direction;
   }
 
-  void leave_saddle(double factor, int seed) {
+  /// Goes off along the lowest mode, to the side where the potential is lower, whichever way the scene lies in space;
+  /// every other try to the other one. The sides of a symmetric scene are alike but for rounding.
+  void leave_saddle(double factor, int tries) {
     evaluate(factor);
-    VectorX direction = lowest_mode(seed);
-    direction *= 1e-3 * equations_.model().length_scale / std::max(newton_.norms().displacement(direction), 1e-300);
-    direction *= newton_.norms().cap(direction);
-    path_.accept(state_.q + direction);
+    const double here = work_.data.potential;
+    VectorX way = lowest_mode(tries);
+    way *= 1e-3 * equations_.model().length_scale / std::max(newton_.norms().displacement(way), 1e-300);
+    way *= newton_.norms().cap(way);
+    const VectorX ahead = state_.q + way, behind = state_.q - way;
+    const auto gain = [&](const VectorX& q) {
+      path_.evaluate(q, false, nullptr);
+      return work_.data.potential - here;
+    };
+    const double gain_ahead = gain(ahead), gain_behind = gain(behind);
+    const bool falls_ahead = gain_ahead - gain_behind <= kAlike * std::abs(gain_ahead), first = tries % 2 == 0;
+    path_.accept(falls_ahead == first ? ahead : behind);
   }
 
   /// What the potential rounds to where little of it is left: a coil that relaxes into its natural shape ends at none.
