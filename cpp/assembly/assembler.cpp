@@ -356,9 +356,17 @@ double Assembler::greatest_diagonal() const {
   return greatest;
 }
 
-double Assembler::greatest_diagonal(const VectorX& weight) const {
+double Assembler::greatest_stiffness(const VectorX& weight) const {
   double greatest = 0.0;
-  for (int i = 0; i < model_.dof_count; ++i) greatest = std::max(greatest, diagonal(i) / std::max(weight(i), 1e-300));
+  const auto consider = [&](int first, int size) {
+    double sum = 0.0;
+    for (int i = first; i < first + size; ++i) sum += diagonal(i);
+    greatest = std::max(greatest, sum / std::max(weight.segment(first, size).sum(), 1e-300));
+  };
+  for (const int dof : model_.node_dof) consider(dof, model_.dimension);
+  for (const int dof : model_.frame_dof) consider(dof, model_.frame_size());
+  for (const int dof : model_.edge_dof) consider(dof, 1);
+  for (const Hinge& hinge : model_.hinges) consider(hinge.dof, 1);
   return greatest;
 }
 

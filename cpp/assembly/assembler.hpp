@@ -103,8 +103,9 @@ class Assembler {
   void multiply_held_transposed(const VectorX& x, VectorX& out) const;
 
   double greatest_diagonal() const;
-  /// Its greatest entry over that of `weight`.
-  double greatest_diagonal(const VectorX& weight) const;
+  /// Greatest mean of a node's diagonal entries, a frame's, or of an angle, over that of `weight`: the same however the
+  /// scene lies in space.
+  double greatest_stiffness(const VectorX& weight) const;
 
   /// Takes in the unknowns of contacts, one after the other (-1: none), and finds a new order of elimination where they
   /// couple what was not coupled yet. The solver is then another one.

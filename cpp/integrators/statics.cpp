@@ -216,7 +216,7 @@ class Statics {
   bool settle(double factor, NewtonResult& last) {
     const Model& model = equations_.model();
     evaluate(factor);
-    const double stiffness = equations_.assembler().greatest_diagonal(equations_.mass().rows);
+    const double stiffness = equations_.assembler().greatest_stiffness(equations_.mass().rows);
     double potential = work_.data.potential;
     energy_scale_ = std::max(energy_scale_, std::abs(potential));
     double h = 1e2 / std::sqrt(stiffness);
@@ -259,7 +259,7 @@ class Statics {
       const StepData here = work_.data;
       const Balance balance = newton_.balance(here, last);
       if (damping == 0.0) {
-        const double stiffness = equations_.assembler().greatest_diagonal(weight);
+        const double stiffness = equations_.assembler().greatest_stiffness(weight);
         damping = 1e-6 * stiffness;
         lowest_ = 1e-12 * stiffness;
       }
@@ -352,7 +352,7 @@ class Statics {
     const Model& model = equations_.model();
     LinearSolver& solver = equations_.assembler().solver();
     const VectorX weight = equations_.mass().rows.cwiseMax(1e-300);
-    const double stiffness = equations_.assembler().greatest_diagonal(weight);
+    const double stiffness = equations_.assembler().greatest_stiffness(weight);
     VectorX shift;
     for (double damping = 1e-16 * stiffness; damping < 1e3 * stiffness; damping *= 2.0) {
       shift = damping * weight;

@@ -137,3 +137,48 @@ def test_micrometre_millimetre_and_metre_scenes_move_alike(integrator):
     assert max(iterations) <= 1.05 * min(iterations), iterations
     for shape in shapes[:-1]:
         np.testing.assert_allclose(shape, shapes[-1], atol=1e-8)
+
+
+def limp_tree(seed, turn):
+    """Three soft rods on one joint, with loads and natural shapes that lead them far from where they were drawn."""
+    draw = np.random.default_rng(seed)
+    scene = withe.Scene(gravity=turn @ (0.0, 0.0, -9.81))
+
+    def anywhere(length):
+        way = draw.normal(size=3)
+        return length * way / np.linalg.norm(way)
+
+    knot = anywhere(0.25)
+    for name, start, length, nodes in (("trunk", np.zeros(3), 0.25, 11), ("leg", knot, 0.2, 9), ("arm", knot, 0.15, 8)):
+        way = knot if name == "trunk" else anywhere(length)
+        scene.add_rod(
+            start=turn @ start,
+            end=turn @ (start + way),
+            nodes=nodes,
+            normal=turn @ np.cross(way, draw.normal(size=3)),
+            section=withe.Rectangle(width=8e-3, height=5e-3),
+            material=withe.Material(youngs_modulus=10.0 ** draw.uniform(5.5, 6.5), poisson_ratio=0.4, density=1000.0),
+            name=name,
+        )
+    scene.join("trunk.end", "leg.start")
+    scene.join("trunk.end", "arm.start")
+    scene.clamp("trunk.start")
+    scene.add_force("leg.end", turn @ (0.05 * draw.normal(size=3)))
+    scene.add_mass("arm.end", 0.01)
+    simulation = scene.build(integrator="static", planar=False)
+    for name in ("trunk", "leg", "arm"):
+        simulation.set_natural_curvature(name, 3.0 * draw.normal(size=2))
+        simulation.set_natural_twist(name, 3.0 * draw.normal())
+    return simulation
+
+
+@pytest.mark.filterwarnings("ignore::withe.BranchChangedWarning")
+@pytest.mark.parametrize("seed", [5, 20, 79, 85, 95])
+def test_what_falls_far_to_its_equilibrium_comes_to_the_same_one_when_turned(seed):
+    """Steps of the way there are as long in all directions. Others of these trees buckle at once, by rounding."""
+    ends = []
+    for turn in (np.eye(3), TURN, TURN @ TURN):
+        simulation = limp_tree(seed, turn)
+        assert simulation.equilibrium().stable
+        ends.append(simulation.positions() @ turn)
+    np.testing.assert_allclose(ends[1:], [ends[0]] * 2, atol=1e-8)
