@@ -4,7 +4,6 @@ A small side load measures the stiffness that is left; it is read off where it w
 then loaded just below and just above, where they must stay straight and must not.
 """
 
-import warnings
 from functools import partial
 
 import numpy as np
@@ -95,9 +94,8 @@ def test_column_stands_below_its_load_and_leaves_the_saddle_above(case, slendern
         assert sway < 1e-9 if straight else sway > 0.01
 
 
-def swayed_tip(rotation, stronger):
+def swayed_tip(turn, stronger):
     """Tip of a column that falls, in axes of the scene; oblique stays pull it alike, but one is ten times as stiff."""
-    turn = rotation.as_matrix()
     scene = rods.weightless()
 
     def rod(start, end, nodes, name):
@@ -120,16 +118,16 @@ def swayed_tip(rotation, stronger):
         scene.add_spring(column.end, post.start, stiffness=stiffness, rest_length=0.15 * np.sqrt(2.0) - stretch)
     scene.add_force(column.end, turn @ (0.0, 0.0, -1.3))
     simulation = scene.build(integrator="static", planar=False)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", withe.BranchChangedWarning)
-        assert simulation.equilibrium().stable
+    assert simulation.equilibrium().stable
     return simulation.positions(column)[-1] @ turn
 
 
 def test_to_which_side_a_column_falls_does_not_depend_on_how_the_scene_lies_in_space():
-    first = swayed_tip(Rotation.identity(), 1.0)
+    """The saddle is left on its lower side in any rotation; in some, the first steps from there cross it again."""
+    first = swayed_tip(np.eye(3), 1.0)
     assert abs(first[0]) > 0.1
     for seed in range(1, 5):
-        np.testing.assert_allclose(swayed_tip(Rotation.random(random_state=seed), 1.0), first, atol=1e-8)
-        mirrored = swayed_tip(Rotation.random(random_state=seed), -1.0)
+        turn = Rotation.random(random_state=seed).as_matrix()
+        np.testing.assert_allclose(swayed_tip(turn, 1.0), first, atol=1e-8)
+        mirrored = swayed_tip(turn, -1.0)
         np.testing.assert_allclose(mirrored, first * (-1.0, 1.0, 1.0), atol=1e-8)

@@ -172,10 +172,9 @@ def limp_tree(seed, turn):
     return simulation
 
 
-@pytest.mark.filterwarnings("ignore::withe.BranchChangedWarning")
 @pytest.mark.parametrize("seed", [5, 20, 79, 85, 95])
 def test_what_falls_far_to_its_equilibrium_comes_to_the_same_one_when_turned(seed):
-    """Steps of the way there are as long in all directions. Others of these trees buckle at once, by rounding."""
+    """Steps of the way there are as long in all directions. Of the first 100 of these trees 5 still part, at a jump."""
     ends = []
     for turn in (np.eye(3), TURN, TURN @ TURN):
         simulation = limp_tree(seed, turn)

@@ -84,7 +84,8 @@ class Arm(Task):
         self.add_obstacles(scene, generator)
         built = scene.build(
             # Edges turn by more in a step than midpoint conserves energy for. Its steps, at 0.7 of the cost, lead the
-            # tip as well, but velocities are twice as far off, and extreme actions make it blow up.
+            # tip as well where energy is not watched, but velocities are twice as far off, and extreme actions make
+            # the arm blow up.
             integrator="energy_momentum",
             time_step=self.time_step,
             planar=self.planar,
