@@ -317,13 +317,10 @@ void Assembler::project_matrix(const Before& before) {
     for (const Coupling& c : block.columns) apply(c);
     Matrix3 own = Matrix3::Zero(), p = Matrix3::Zero();
     p.topLeftCorner(n, n) = P.topLeftCorner(n, n);
-    double scale = 0.0;
     for (int i = 0; i < n; ++i)
-      for (int j = 0; j < n; ++j) {
-        own(i, j) = values[static_cast<std::size_t>(block.own[i][j])];
-        if (i == j) scale = std::max(scale, std::abs(own(i, i)));
-      }
-    if (scale == 0.0) scale = 1.0;
+      for (int j = 0; j < n; ++j) own(i, j) = values[static_cast<std::size_t>(block.own[i][j])];
+    // Rows of what is held get a number of the size of the others, whichever way they lie in space.
+    const double size = own.norm() / std::sqrt(n), scale = size > 0.0 ? size : 1.0;
     own = p * own * p + scale * (Matrix3::Identity() - p);
     for (int i = 0; i < n; ++i)
       for (int j = 0; j < n; ++j) put(block.own[i][j], own(i, j));

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <span>
 
 namespace withe {
@@ -12,6 +13,8 @@ namespace {
 constexpr double kLittleTurn = 1e-6;
 // A factor of that kind for hands that yield.
 constexpr double kLittleFactor = 1e-6;
+// Places of supports at rest, found twice, differ by no more than this, over the farthest coordinate.
+constexpr double kRounding = 64.0 * std::numeric_limits<double>::epsilon();
 
 bool turns(const LoadPiece& piece) { return piece.shape != LoadShape::dead_node && piece.load >= 0; }
 
@@ -89,8 +92,11 @@ void Homotopy::find_pull(const VectorX& z, VectorX& pull, VectorX& held) {
     if (turn <= kLittleTurn) break;
     little *= std::isfinite(turn) ? 0.9 * kLittleTurn / turn : 1e-3;
   }
-  held /= little;
-  moves_ = boundary_.aim || !held.isZero(0.0);
+  const double farthest = z.cwiseProduct(newton_.norms().coordinates()).lpNorm<Eigen::Infinity>();
+  const bool supports_move = newton_.norms().displacement(held) > kRounding * farthest;
+  if (!supports_move) moved_ = z;
+  held = supports_move ? (held / little).eval() : VectorX::Zero(z.size());
+  moves_ = boundary_.aim || supports_move;
   equations_.evaluate(z, false, nullptr, work_.data);
   pull = work_.data.residual;
   apply(factor_ + little);

@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <random>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "steps/elastic_forces.hpp"
+#include "steps/strain_parts.hpp"
 
 namespace withe {
 namespace {
@@ -39,6 +42,14 @@ constexpr int kMostJumps = 20;
 constexpr double kBeyond = 4.0;
 // A turn that is greater than this between two points of a path is a jump [rad].
 constexpr double kJump = 0.25 * kFarthestTurn;
+// What moves by less than this in an interval, over the length of the scene, is taken to its equilibrium at once; where
+// that fails, again when it moves by less than this share of what it did.
+constexpr double kNear = 1e-4, kCloser = 0.1;
+// Intervals in which a scene settles; and where loads without a potential drive it round, after how many they may be
+// twice as long.
+constexpr int kMostIntervals = 400, kTurns = 50;
+// Eigenvalues of the stiffness against masses that are below this share of the greatest have no digits in its sums.
+constexpr double kDoubtful = 64.0 * std::numeric_limits<double>::epsilon();
 // Potentials on the two sides of a saddle that differ by less of what they fall by are alike.
 constexpr double kAlike = 1e-6;
 
@@ -65,14 +76,14 @@ class Statics {
       path_.go_to(1.0);
       if (!path_.hold(1.0, state_.q)) return result;
       path_.accept(state_.q);
-      result.converged = settle(1.0, result.newton) || (equations_.has_potential() && descend(1000, result.newton));
+      result.converged = settle(1.0, result) || (equations_.has_potential() && descend(1000, result.newton));
     }
     if (!result.converged) return result;
     result.stable = stable(1.0);
     for (int tries = 0; tries < 4 && !result.stable && equations_.has_potential(); ++tries) {
       result.branch_changed = true;
       leave_saddle(1.0, tries);
-      result.converged = settle(1.0, result.newton) || descend(1000, result.newton);
+      result.converged = settle(1.0, result) || descend(1000, result.newton);
       if (!result.converged) return result;
       result.stable = stable(1.0);
     }
@@ -98,7 +109,7 @@ class Statics {
           if (was_stable && equations_.has_potential() && !stable(reached)) {
             result.branch_changed = true;
             leave_saddle(reached, 0);
-            if (!settle(reached, last)) return false;
+            if (!settle(reached, result)) return false;
             was_stable = false;
             continue;
           }
@@ -203,7 +214,7 @@ class Statics {
       if (!path_.hold(next, z_) || !clear_way(z_)) return false;
     }
     path_.accept(z_);
-    if (!settle(next, result.newton)) return false;
+    if (!settle(next, result)) return false;
     VectorX change = state_.q - before;
     for (int dof : equations_.model().frame_dof) change.segment(dof, equations_.model().frame_size()).setZero();
     if (newton_.norms().turn(change) > kJump) result.branch_changed = true;
@@ -211,47 +222,103 @@ class Statics {
   }
 
   /// Pseudo-transient: backward Euler from rest, over and over, with intervals that grow as the scene settles. Each
-  /// one minimises the potential plus M |z - q|^2 / (2 h^2), so the potential falls; mixed Newton keeps slender
-  /// rods from crawling. Where turning loads leave no potential, inertia still keeps each interval solvable.
-  bool settle(double factor, NewtonResult& last) {
-    const Model& model = equations_.model();
+  /// one minimises the potential plus M |z - q|^2 / (2 h^2), which is convex where the interval begins: Newton's method
+  /// is not drawn back to a saddle, nor across it. Mixed Newton keeps slender rods from crawling. Where next to nothing
+  /// moves any more, Newton's method without inertia ends it, unless it leads away, as back to a saddle.
+  /// Loads without a potential drive the scene round its equilibria, if not for ever: what is monotone where the
+  /// interval begins takes the place of what is convex, only until the scene is slow, and after every kTurns intervals
+  /// they may be twice as long as that, as longer ones damp more.
+  bool settle(double factor, StaticResult& result) {
+    const bool conservative = equations_.has_potential();
     evaluate(factor);
     const double stiffness = equations_.assembler().greatest_stiffness(equations_.mass().rows);
     double potential = work_.data.potential;
     energy_scale_ = std::max(energy_scale_, std::abs(potential));
-    double h = 1e2 / std::sqrt(stiffness);
-    const double longest = 1e12 * h, shortest = 1e-6 * h;
-    VectorX z;
-    for (int k = 0; k < 400 && h > shortest; ++k) {
+    double h = 1e2 / std::sqrt(stiffness), moved = INFINITY;
+    const double longest = 1e12 * h, shortest = 1e-6 * h, slow = kNear * equations_.model().length_scale;
+    double near = slow;
+    for (int k = 0; k < kMostIntervals && h > shortest; ++k) {
       state_.v.setZero();
-      const bool at_rest = h >= longest;
-      equations_.begin(state_, parameters_, at_rest ? StepRule::statics : StepRule::backward_euler, at_rest ? 0.0 : h);
-      z = state_.q;
+      const bool at_rest = moved < near && (!conservative || stable(factor));
+      const double beyond = conservative ? 1.0 : std::exp2(k / kTurns);
+      if (!at_rest && (conservative || moved >= slow)) h = beyond * definite_interval(factor, h / beyond, shortest);
       const int border = border_iterations();
-      const int most = at_rest ? 40 : kMostIterations;
-      const NewtonResult r = newton_.solve(
-          equations_, z, {.target = &path_.target(), .max_iterations = most, .free_steps = border}, work_);
-      note(r, last);
-      const double found = work_.data.potential - path_.target().dot(z);
+      const NewtonResult r = solve_interval(at_rest ? 0.0 : h, border, result.newton);
+      const double found = work_.data.potential - path_.target().dot(z_);
       const double rounding = 1e-10 * (std::abs(potential) + std::abs(found)) + least_energy();
-      const bool falls = !equations_.has_potential() || found <= potential + rounding;
-      if (r.converged && falls && !turned_too_far(state_, work_.data.configuration, model.planar())) {
-        path_.accept(z);
+      const double way = newton_.norms().displacement(z_ - state_.q);
+      const bool downhill = found <= potential + rounding && (!at_rest || way <= slow);
+      if (r.converged && (!conservative || downhill)) {
+        path_.accept(z_);
         if (at_rest) return true;
+        moved = way;
         potential = found;
-        h *= r.iterations <= 4 + border ? 10.0 : r.iterations <= 8 + border ? 3.0 : 1.0;
+        h = std::min(longest, h * (r.iterations <= 4 + border ? 10.0 : r.iterations <= 8 + border ? 3.0 : 1.0));
+      } else if (at_rest) {
+        near = kCloser * moved;
       } else {
-        h = std::min(h, longest) * 0.25;
+        h *= 0.25;
       }
     }
+    result.restless = !conservative && h > shortest;
     return false;
+  }
+
+  /// An interval of backward Euler from rest, which ends in z; of no length: equilibrium.
+  NewtonResult solve_interval(double h, int border, NewtonResult& last) {
+    equations_.begin(state_, parameters_, h > 0.0 ? StepRule::backward_euler : StepRule::statics, h);
+    z_ = state_.q;
+    NewtonResult r = newton_.solve(
+        equations_, z_, {.target = &path_.target(), .max_iterations = kMostIterations, .free_steps = border}, work_);
+    note(r, last);
+    r.converged = r.converged && !turned_too_far(state_, work_.data.configuration, equations_.model().planar());
+    return r;
+  }
+
+  /// The longest of h and its halves in which the symmetric part of the stiffness plus M / h^2 is positive definite at
+  /// the present state; `shortest` or less where it is so in none.
+  double definite_interval(double factor, double h, double shortest) {
+    evaluate(factor);
+    const VectorX weight = equations_.mass().rows.cwiseMax(1e-300);
+    LinearSolver& stiffness = symmetric_part();
+    while (h > shortest && !definite(stiffness, 1.0 / (h * h), weight)) h *= 0.5;
+    return h;
+  }
+
+  /// The matrix of the last evaluation if it is symmetric, otherwise its symmetric part.
+  LinearSolver& symmetric_part() {
+    LinearSolver& matrix = equations_.assembler().solver();
+    if (matrix.symmetry() == Symmetry::symmetric) return matrix;
+    const SparsityPattern& pattern = equations_.assembler().pattern();
+    if (generation_ != equations_.assembler().generation()) {
+      generation_ = equations_.assembler().generation();
+      symmetric_ = make_linear_solver(pattern, Symmetry::symmetric);
+    }
+    const std::span<const double> from = std::as_const(matrix).values();
+    const std::span<double> to = symmetric_->values();
+    std::fill(to.begin(), to.end(), 0.0);
+    for (int column = 0, k = 0; column < pattern.size; ++column)
+      for (; k < pattern.column_starts[static_cast<std::size_t>(column) + 1]; ++k) {
+        const int row = pattern.row_indices[static_cast<std::size_t>(k)];
+        to[static_cast<std::size_t>(symmetric_->place(row, column))] +=
+            (row == column ? 1.0 : 0.5) * from[static_cast<std::size_t>(matrix.place(row, column))];
+      }
+    return *symmetric_;
+  }
+
+  /// Factorises a symmetric matrix plus `damping` of the masses; whether all its eigenvalues are positive.
+  bool definite(LinearSolver& stiffness, double damping, const VectorX& weight) {
+    shift_ = damping * weight;
+    ++work_.counters.factorizations;
+    const Factorization f = stiffness.factorize({shift_.data(), static_cast<std::size_t>(shift_.size())});
+    return f.status == FactorStatus::ok && f.negative_pivots == 0;
   }
 
   /// Levenberg-Marquardt on the potential: every accepted step lowers it.
   bool descend(int max_steps, NewtonResult& last) {
     VectorX z;
     path_.go_to(1.0);
-    const VectorX weight = equations_.mass().rows;
+    const VectorX weight = equations_.mass().rows.cwiseMax(1e-300);
     double damping = 0.0;
     for (int k = 0; k < max_steps; ++k) {
       work_.poll();
@@ -293,13 +360,10 @@ class Statics {
 
   /// A damped step from `here` to a lower potential, with more damping until there is one.
   bool find_lower(const StepData& here, const VectorX& weight, double& damping, VectorX& z) {
-    VectorX shift, step;
+    VectorX step;
+    LinearSolver& solver = equations_.assembler().solver();
     for (int tries = 0; tries < 40; ++tries) {
-      shift = damping * weight.cwiseMax(1e-300);
-      ++work_.counters.factorizations;
-      LinearSolver& solver = equations_.assembler().solver();
-      const Factorization f = solver.factorize({shift.data(), static_cast<std::size_t>(shift.size())});
-      if (f.status != FactorStatus::ok || f.negative_pivots > 0) {
+      if (!definite(solver, damping, weight)) {
         damping *= 8.0;
         continue;
       }
@@ -327,23 +391,25 @@ class Statics {
     path_.evaluate(state_.q, true, nullptr);
   }
 
+  /// Whether no motion lowers the potential; of unsymmetric equations, whether they can be solved.
   bool stable(double factor) {
     evaluate(factor);
-    ++work_.counters.factorizations;
     LinearSolver& solver = equations_.assembler().solver();
-    const Factorization f = solver.factorize();
-    if (solver.symmetry() == Symmetry::unsymmetric) return f.status == FactorStatus::ok;
-    if (f.status == FactorStatus::ok && f.negative_pivots == 0) return true;
-    // A neutral mode (a rod that may spin about its axis) comes out on either side of zero by rounding.
+    if (solver.symmetry() == Symmetry::unsymmetric) {
+      ++work_.counters.factorizations;
+      return solver.factorize().status == FactorStatus::ok;
+    }
+    const VectorX weight = equations_.mass().rows.cwiseMax(1e-300);
+    if (definite(solver, -kDoubtful * equations_.assembler().greatest_stiffness(weight), weight)) return true;
+    // A neutral mode (a rod that may spin about its axis) comes out on either side of zero by rounding, and by what is
+    // left out of balance, F: along q(a) on which the potential is the same, K q' . q' = -F . q'', and what turns by a
+    // has |q''| of |q'|.
     const VectorX mode = lowest_mode(0);
-    VectorX image(mode.size()), greatest(mode.size());
-    const auto view = [](VectorX& v) { return std::span<double>(v.data(), static_cast<std::size_t>(v.size())); };
-    const std::span<const double> direction(mode.data(), static_cast<std::size_t>(mode.size()));
-    solver.multiply(direction, view(image));
-    const VectorX size = mode.cwiseAbs();
-    for (double& value : solver.values()) value = std::abs(value);
-    solver.multiply({size.data(), static_cast<std::size_t>(size.size())}, view(greatest));
-    return mode.dot(image) > -64.0 * std::numeric_limits<double>::epsilon() * size.dot(greatest);
+    VectorX imbalance = work_.data.residual;
+    equations_.assembler().project(imbalance);
+    const double left = newton_.norms().turn(mode) * imbalance.cwiseAbs().dot(mode.cwiseAbs());
+    const Curvature least = curvature_along(equations_, state_, mode, work_.data);
+    return least.value > -(least.rounding + left);
   }
 
   /// Direction of most negative curvature against mass, by inverse iteration on a matrix shifted until it is
@@ -353,12 +419,8 @@ class Statics {
     LinearSolver& solver = equations_.assembler().solver();
     const VectorX weight = equations_.mass().rows.cwiseMax(1e-300);
     const double stiffness = equations_.assembler().greatest_stiffness(weight);
-    VectorX shift;
-    for (double damping = 1e-16 * stiffness; damping < 1e3 * stiffness; damping *= 2.0) {
-      shift = damping * weight;
-      const Factorization f = solver.factorize({shift.data(), static_cast<std::size_t>(shift.size())});
-      if (f.status == FactorStatus::ok && f.negative_pivots == 0) break;
-    }
+    double damping = 1e-16 * stiffness;
+    while (damping < 1e3 * stiffness && !definite(solver, damping, weight)) damping *= 2.0;
     std::mt19937 random(static_cast<unsigned>(seed + 1));
     std::normal_distribution<double> normal;
     VectorX direction(model.dof_count);
@@ -401,9 +463,11 @@ class Statics {
   NewtonWorkspace& work_;
   double energy_scale_ = 0.0;  ///< greatest potential met [J]
   double lowest_ = 0.0;
+  std::unique_ptr<LinearSolver> symmetric_;  ///< of the assembler's `generation_`
+  int generation_ = -1;
   Homotopy path_;
   Homotopy::Tangent tangent_;
-  VectorX step_, z_;
+  VectorX step_, shift_, z_;
 };
 
 }  // namespace

@@ -10,6 +10,7 @@ struct StaticResult {
   bool converged = false;
   bool stable = false;
   bool branch_changed = false;  ///< no path of equilibria without a jump or a saddle leads there
+  bool restless = false;        ///< where none was found: loads without a potential still drive the scene round
   NewtonResult newton;
 };
 

@@ -167,7 +167,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   release_hands(system);
   if (!r.converged) {
     undo();
-    fail_equilibrium(r.newton, dt);
+    fail_equilibrium(r, dt);
   }
   const EquilibriumResult found = settle(system, r, time);
   if (!release_left_rings()) return found;
@@ -190,13 +190,15 @@ void World::Implementation::static_step(double end, double dt) {
 }
 
 /// Says that none was found.
-void World::Implementation::fail_equilibrium(const NewtonResult& newton, double dt) const {
+void World::Implementation::fail_equilibrium(const StaticResult& result, double dt) const {
   const bool held =
       std::any_of(model.supports.begin(), model.supports.end(), [](const Support& s) { return s.active; });
   const bool lies = !description.contact.obstacles.empty();
-  fail(newton, dt,
+  fail(result.newton, dt,
        std::string("no static equilibrium was found") +
-           (held   ? ""
+           (result.restless ? ": the scene does not come to rest; loads without a potential, as moments and follower "
+                              "forces, may drive it round for ever"
+            : held          ? ""
             : lies ? ", and nothing but contact holds the scene, where friction may not be enough: clamp or pin a node"
                    : ", and no support holds the scene: clamp or pin a node"),
        dt > 0.0 ? "" : "Try to get there in parts: small changes of loads and supports, or time steps with viscosity");

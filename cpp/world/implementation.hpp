@@ -277,7 +277,7 @@ struct World::Implementation : Running {
   void move_between(const std::vector<SupportMotion>& from, const std::vector<SupportMotion>& to, double factor);
   Boundary boundary_between(Equations& system, const std::vector<SupportMotion>& from,
                             const std::vector<SupportMotion>& to);
-  [[noreturn]] void fail_equilibrium(const NewtonResult& newton, double dt) const;
+  [[noreturn]] void fail_equilibrium(const StaticResult& result, double dt) const;
   EquilibriumResult settle(Equations& system, StaticResult& result, double time);
   bool drifts(Equations& system);
   void rest();

@@ -2,6 +2,7 @@
 #include <utility>
 
 #include "gradients/state_vector.hpp"
+#include "steps/strain_parts.hpp"
 #include "world/implementation.hpp"
 
 namespace withe {
@@ -43,67 +44,6 @@ SparseMatrix matrix_of(const Model& model, const MassMatrix& mass) {
   return assembled(model.dof_count, model.dof_count, entries);
 }
 
-/// Splits the stiffness into sum k g g^T over the strains of all stencils, g their gradients, and what is left where
-/// their stiffnesses are taken away but their forces are kept.
-class StrainParts {
- public:
-  StrainParts(const Equations& system, const State& state, const Configuration& configuration)
-      : model_(system.model()), without_(system.elastic()) {
-    const ElasticCoefficients& k = system.elastic();
-    const Assembler& assembler = system.assembler();
-    StrainGradients strains;
-    for (int e = 0; e < model_.edge_count; ++e) {
-      if (k.stretch_stiffness(e) == 0.0) continue;
-      stretch_gradients(model_, configuration, e, strains);
-      add_row(assembler.stretch, e, strains.gradient[0], k.stretch_stiffness(e) * model_.edge_length(e));
-      take_away(strains.strain[0], without_.stretch_stiffness(e), without_.stretch_natural(e));
-    }
-    for (int b = 0; b < static_cast<int>(model_.bend.size()); ++b) {
-      bend_gradients(model_, k.measure, configuration, b, strains);
-      add_rows(assembler.bend, b, strains, k.bend_stiffness, without_.bend_stiffness, without_.bend_natural);
-    }
-    for (int h = 0; h < static_cast<int>(model_.half.size()); ++h) {
-      half_gradients(model_, state.q, k.measure, configuration, h, strains);
-      add_rows(assembler.half, h, strains, k.half_stiffness, without_.half_stiffness, without_.half_natural);
-    }
-  }
-
-  SparseMatrix gradients() const { return assembled(count(), model_.dof_count, entries_); }
-  VectorX stiffnesses() const { return Eigen::Map<const VectorX>(stiffnesses_.data(), count()); }
-  /// With stiffnesses next to nothing, and natural strains for which forces are what they were.
-  const ElasticCoefficients& without() const { return without_; }
-
- private:
-  Eigen::Index count() const { return static_cast<Eigen::Index>(stiffnesses_.size()); }
-
-  static void take_away(double strain, double& stiffness, double& natural) {
-    constexpr double kLittle = 0x1p-40;
-    natural = strain - (strain - natural) / kLittle;
-    stiffness *= kLittle;
-  }
-
-  void add_row(const ElementTable& table, int element, const double* gradient, double stiffness) {
-    const int row = static_cast<int>(stiffnesses_.size());
-    const int* dofs = table.dofs(element);
-    for (int i = 0; i < table.width(); ++i)
-      if (dofs[i] >= 0 && gradient[i] != 0.0) entries_.emplace_back(row, dofs[i], gradient[i]);
-    stiffnesses_.push_back(stiffness);
-  }
-
-  void add_rows(const ElementTable& table, int stencil, const StrainGradients& strains, const Columns3& stiffness,
-                Columns3& less, Columns3& shifted) {
-    for (int s = 0; s < strains.count; ++s) {
-      if (stiffness(stencil, s) != 0.0) add_row(table, stencil, strains.gradient[s], stiffness(stencil, s));
-      take_away(strains.strain[s], less(stencil, s), shifted(stencil, s));
-    }
-  }
-
-  const Model& model_;
-  ElasticCoefficients without_;
-  Entries entries_;
-  std::vector<double> stiffnesses_;
-};
-
 }  // namespace
 
 Linearisation World::linearise() const {
@@ -120,9 +60,11 @@ Linearisation World::linearise() const {
   StepData evaluation;
   const SparseMatrix basis = free_basis(model), back = basis.transpose();
   std::optional<StrainParts> parts;
+  VectorX imbalance;
   try {
     system.evaluate(self.state.q, false, nullptr, evaluation);
     parts.emplace(system, self.state, evaluation.configuration);
+    imbalance = evaluation.residual;
     system.elastic() = parts->without();
     system.evaluate(self.state.q, true, nullptr, evaluation);
   } catch (...) {
@@ -133,8 +75,10 @@ Linearisation World::linearise() const {
 
   Linearisation out;
   out.geometric = back * matrix_of(system.assembler()) * basis;
-  out.gradients = parts->gradients() * basis;
-  out.stiffnesses = parts->stiffnesses();
+  const auto strains = static_cast<Eigen::Index>(parts->stiffnesses().size());
+  out.gradients = assembled(strains, model.dof_count, parts->gradients()) * basis;
+  out.stiffnesses = Eigen::Map<const VectorX>(parts->stiffnesses().data(), strains);
+  out.imbalance = back * imbalance;
   out.mass = back * matrix_of(model, system.mass()) * basis;
   Entries moves;
   Matrix3 axes = Matrix3::Identity();
@@ -143,6 +87,14 @@ Linearisation World::linearise() const {
     for (int i = 0; i < model.dimension; ++i)
       for (int k = 0; k < 3; ++k) moves.emplace_back(3 * node + k, model.node_dof[at(node)] + i, axes(k, i));
   out.displacement = assembled(3 * model.node_count, model.dof_count, moves) * basis;
+  Entries turns;
+  for (int e = 0; e < model.edge_count; ++e)
+    for (int i = 0; i < model.dimension; ++i) {
+      const int row = model.dimension * e + i;
+      turns.emplace_back(row, model.head_dof[at(e)] + i, 1.0 / model.edge_length(e));
+      turns.emplace_back(row, model.tail_dof[at(e)] + i, -1.0 / model.edge_length(e));
+    }
+  out.turn = assembled(model.dimension * model.edge_count, model.dof_count, turns) * basis;
   return out;
 }
 

@@ -423,6 +423,15 @@ void World::set_natural_stretch(int rod, const VectorX& stretch, double over) {
 MatrixX2 World::natural_curvature(int rod) const { return implementation_->parameters.natural_curvature.at(at(rod)); }
 VectorX World::natural_twist(int rod) const { return implementation_->parameters.natural_twist.at(at(rod)); }
 
+std::optional<double> World::natural_shape_due(ParameterKind kind, int rod) const {
+  const NaturalRamp& ramp = implementation_->ramps.at(at(rod));
+  const auto due = [](const auto& way) { return way.active ? std::optional(way.end) : std::nullopt; };
+  if (kind == ParameterKind::natural_curvature) return due(ramp.curvature);
+  if (kind == ParameterKind::natural_twist) return due(ramp.twist);
+  require(kind == ParameterKind::natural_stretch, "no natural shape");
+  return due(ramp.stretch);
+}
+
 void World::set_added_mass(const VectorX& mass) {
   const ParameterSetting setting{ParameterKind::added_mass, 0, rows_of(mass)};
   set({&setting, 1});

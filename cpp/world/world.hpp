@@ -142,6 +142,8 @@ struct Linearisation {
   VectorX stiffnesses;        ///< per strain: [N/m], [N m]
   SparseMatrix mass;          ///< free unknowns x free unknowns
   SparseMatrix displacement;  ///< (3 nodes) x free unknowns: node displacements [m] of each unknown
+  SparseMatrix turn;          ///< (dimension x edges) x free unknowns: by how much edges turn or stretch [-]
+  VectorX imbalance;          ///< per free unknown, what is out of balance: [N], [N m]
 };
 
 /// Derivatives of scalars of an equilibrium by what acts, and by where supports hold and obstacles are.
@@ -227,6 +229,8 @@ class World {
   void set_natural_stretch(int rod, const VectorX& stretch, double over);
   MatrixX2 natural_curvature(int rod) const;  ///< present value, of the smooth rod [1/m]
   VectorX natural_twist(int rod) const;       ///< [rad/m]
+  /// When a natural shape of a rod is where it goes to [s]; nothing where it is not on its way.
+  std::optional<double> natural_shape_due(ParameterKind kind, int rod) const;
   void set_added_mass(const VectorX& mass);
   void set_gravity(const Vector3& gravity);
   /// Stiffness, rest length and damping; its nodes stay.

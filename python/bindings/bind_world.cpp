@@ -106,7 +106,9 @@ void register_results(py::module_& module) {
       .def_property_readonly("gradients", [](const Linearisation& self) { return self.gradients; })
       .def_readonly("stiffnesses", &Linearisation::stiffnesses)
       .def_property_readonly("mass", [](const Linearisation& self) { return self.mass; })
-      .def_property_readonly("displacement", [](const Linearisation& self) { return self.displacement; });
+      .def_property_readonly("displacement", [](const Linearisation& self) { return self.displacement; })
+      .def_property_readonly("turn", [](const Linearisation& self) { return self.turn; })
+      .def_readonly("imbalance", &Linearisation::imbalance);
   py::class_<Energy>(module, "Energy", "Energies [J].")
       .def_readonly("kinetic", &Energy::kinetic)
       .def_readonly("stretch", &Energy::stretch)
@@ -286,6 +288,13 @@ void define_parameters(WorldClass& world) {
   world.def(
       "natural_twist", [](const GuardedWorld& self, int rod) { return self.reading().natural_twist(rod); },
       py::arg("rod"));
+  world.def(
+      "natural_shape_due",
+      [](const GuardedWorld& self, const std::string& name, int rod) {
+        return self.reading().natural_shape_due(parameter_named(name).kind, rod);
+      },
+      py::arg("name"), py::arg("rod"),
+      "When a natural shape is where it goes to [s]; None where it is not on its way.");
   world.def(
       "set", [](GuardedWorld& self, int rod, const py::dict& values) { set_parameters(self.changing(), rod, values); },
       py::arg("rod"), py::arg("values"),

@@ -335,3 +335,41 @@ def test_gradient_by_where_supports_were_moved_is_that_of_differences(integrator
             for h in (2.0 * size, size)
         ]
         assert gradient @ way == pytest.approx((4.0 * ends[1] - ends[0]) / 3.0, rel=2e-6, abs=1e-8), name
+
+
+@pytest.mark.parametrize("integrator", ["backward_euler", "implicit_midpoint", "energy_momentum"])
+@pytest.mark.parametrize("word", ["natural_curvature", "natural_twist", "natural_stretch"])
+@pytest.mark.parametrize("over", [5e-3, 12e-3, 50e-3])
+def test_gradient_by_a_natural_shape_that_was_on_its_way_as_the_run_began_is_by_where_it_was_then(
+    integrator, word, over
+):
+    rubber = withe.Material(youngs_modulus=1e6, poisson_ratio=0.4, density=1200.0, viscosity=300.0)
+    scene = withe.Scene()
+    shape = {"natural_curvature": (1.0, 0.5), "natural_twist": 1.0}
+    arm = scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=9, radius=4e-3, material=rubber, **shape)
+    scene.clamp(arm.start)
+    goal = {"natural_curvature": np.array([3.0, -2.0]), "natural_twist": -4.0, "natural_stretch": 1.05}[word]
+
+    def run(start, twice, **options):
+        simulation = scene.build(
+            integrator=integrator, time_step=STEP, planar=False, step_tolerance=1e-12, force_tolerance=1e-12
+        )
+        simulation.set(arm, **{word: start})
+        getattr(simulation, f"set_{word}")(arm, goal, over=over)
+        steps = iter(range(1000))
+
+        def before_step(simulation):  # sets out anew from where it has come
+            if next(steps) == 4 and twice:
+                getattr(simulation, f"set_{word}")(arm, 0.5 * (1.0 + goal), over=over)
+
+        return simulation.run(DURATION, record_every=2 * STEP, progress=False, before_step=before_step, **options)
+
+    start = scene.build().get(arm, word)
+    for twice in (False, True):
+        record = run(start, twice, differentiable=True)
+        weights = np.random.default_rng(3).normal(size=record.positions().shape)
+        (found,) = record.gradient({"positions": weights}, [(arm, word)])
+        way = np.random.default_rng(4).uniform(0.5, 1.0, size=np.shape(start))
+        h = 1e-4
+        ends = [(weights * run(start + sign * h * way, twice).positions()).sum() for sign in (1.0, -1.0)]
+        assert (found * way).sum() == pytest.approx((ends[0] - ends[1]) / (2.0 * h), rel=1e-5, abs=1e-10)

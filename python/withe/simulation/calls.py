@@ -104,9 +104,10 @@ class _Call:
 class RunJournal:
     """Notes what is set while a run goes; see `Session.journal`."""
 
-    def __init__(self, tape: _core.Tape) -> None:
+    def __init__(self, tape: _core.Tape, session: Session) -> None:
         self._tape = tape
         self.calls: list[_Call] = []
+        self.ramps = _ramps_on_their_way(session)
 
     def note(
         self, session: Session, method: str, part: Part | BodyPair | None, values: Mapping[str, Any], over: float
@@ -118,7 +119,9 @@ class RunJournal:
 
 
 _Key = tuple[str, str]  # name of a part ("": the scene), and word
-_Weights = dict[int, float]  # of calls in a value that acts; -1: that of the start
+_Weights = dict[int, float]  # of calls in a value that acts; _START: that of the start
+_START = -1
+_BEFORE = -2  # a call before the run
 
 
 @dataclass
@@ -135,6 +138,17 @@ class _Ramp:
         weights = {call: (1.0 - share) * weight for call, weight in self.start.items() if share < 1.0}
         weights[self.call] = share
         return weights
+
+
+def _ramps_on_their_way(session: Session) -> dict[_Key, _Ramp]:
+    """Natural shapes that go, as a run starts, to what was set before it."""
+    out, now = {}, session.world.time
+    for rod in session.directory.rods:
+        for word in NATURAL_WORDS:
+            due = session.world.natural_shape_due(word, rod.index)
+            if due is not None and due > now:
+                out[rod.name, word] = _Ramp({_START: 1.0}, _BEFORE, now, due - now)
+    return out
 
 
 @dataclass
@@ -167,7 +181,7 @@ class _Epoch:
         for word in POSE_WORDS:
             if word in call.values:
                 before = self.ways.get((name, word))
-                start = before.weights(before.reached(call.time)) if before is not None else {-1: np.eye(3)}
+                start = before.weights(before.reached(call.time)) if before is not None else {_START: np.eye(3)}
                 turn = call.values[word] if word == "rotation" else np.zeros(3)
                 self.ways[name, word] = Way(word, index, call.time, call.over, turn, start)
             elif (name, word) in call.session.settings.paths:
@@ -175,11 +189,11 @@ class _Epoch:
 
     def weights(self, key: _Key, time: float) -> _Weights:
         """How much each call has in a natural shape at a time."""
-        return self.ramps[key].at(time) if key in self.ramps else {-1: 1.0}
+        return self.ramps[key].at(time) if key in self.ramps else {_START: 1.0}
 
     def share_of_start(self, key: _Key, time: float) -> float:
         """How much of what a word had at the start of the run acts at a time."""
-        return 0.0 if key in self.live else self.weights(key, time).get(-1, 0.0)
+        return 0.0 if key in self.live else self.weights(key, time).get(_START, 0.0)
 
     def arrays(self, rod: RodPart, word: str, *, initial: bool) -> set[str]:
         """Those of a rod that depend on a word as it was set, or as it was at the start of the run."""
@@ -196,7 +210,7 @@ class Ledger:
     def __init__(
         self,
         session: Session,
-        calls: Sequence[_Call],
+        journal: RunJournal,
         frames: Sequence[int],
         wrt: Sequence[Any],
         readers: list[Reader],
@@ -205,10 +219,11 @@ class Ledger:
         by_moves: bool,
     ) -> None:
         """`frames`: how many calls came before each; `by_moves`: whether derivatives by poses are known."""
+        calls = journal.calls
         self._session, self._calls, self._frames, self._drawn = session, calls, frames, drawn
         self._unknowns = list(zip(wrt, readers, strict=True))
         self.sums: list[Any] = [None] * len(self._unknowns)
-        self._epochs = [_Epoch(session)]
+        self._epochs = [_Epoch(session, ramps=journal.ramps)]
         for index, call in enumerate(calls):
             self._epochs.append(self._epochs[-1].follow(index, call))
         self._steps = [call.step for call in calls]
@@ -308,7 +323,7 @@ class Ledger:
         part, word = part_of(self._session, unknown[0]), unknown[1]
         key = (part.name, word)
         if isinstance(part, RodPart) and word in NATURAL_WORDS:
-            return reader(OfRun(found)) * epoch.weights(key, time).get(-1, 0.0)
+            return reader(OfRun(found)) * epoch.weights(key, time).get(_START, 0.0)
         if isinstance(part, RodPart):
             if not any(name == part.name for name, _ in epoch.made_of):
                 return reader(OfRun(found))

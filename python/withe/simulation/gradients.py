@@ -133,7 +133,7 @@ class RunDerivatives:
         self._running = session
         self._begin = Moment.now(session)
         self._tape = session.world.start_tape()
-        self._journal = session.journal = RunJournal(self._tape)
+        self._journal = session.journal = RunJournal(self._tape, session)
         self._steps: list[int] = []
         self._calls: list[int] = []
 
@@ -157,7 +157,7 @@ class RunDerivatives:
         adjoints = readout_adjoints(self._session, by, len(self._steps))
         ledger = Ledger(
             self._session,
-            self._journal.calls,
+            self._journal,
             self._calls,
             kept,
             [unknown_reader(self._session, unknown) for unknown in kept],

@@ -31,6 +31,7 @@ _BLOCK = 8
 _FULL = 8  # share of all modes, one in so many, from which on matrices are full
 _LOOK = 16  # slow modes among which stability is looked for
 _NEUTRAL = 1e-6  # of a frequency squared, what is none
+_ROUNDING = 64.0 * np.finfo(float).eps  # of the parts of a stiffness, as in the engine's `curvature_along`
 _RESIDUAL = 1e-9  # of an eigenvalue of the inverse
 
 
@@ -58,6 +59,8 @@ class Linearisation:
     _stiffnesses: FloatArray
     _mass: Any
     _displacement: Any
+    _turn: Any
+    _imbalance: FloatArray
 
     def __repr__(self) -> str:
         nodes, unknowns = self._displacement.shape[0] // 3, self._mass.shape[0]
@@ -122,11 +125,9 @@ class Linearisation:
         """
         if self._mass.shape[0] == 0:
             return "stable"
-        squares, _ = self._solve(min(_LOOK, self._mass.shape[0]))
+        squares, shapes = self._solve(min(_LOOK, self._mass.shape[0]))
         rates = np.sqrt(-squares.astype(complex))
-        growth = np.abs(rates.real)
-        neutral = np.abs(squares) <= _NEUTRAL * np.median(np.abs(squares))
-        growth = np.where(neutral, 0.0, growth)
+        growth = np.where(np.abs(squares) <= self._neutral(shapes), 0.0, np.abs(rates.real))
         if not growth.any():
             return "stable"
         return "flutters" if squares[np.argmax(growth)].imag != 0.0 else "diverges"
@@ -168,6 +169,19 @@ class Linearisation:
         twice = (shapes * (self._geometric @ shapes)).sum(axis=0) + self._stiffnesses @ strains**2
         return np.asarray(twice / (shapes * (self._mass @ shapes)).sum(axis=0))
 
+    def _neutral(self, shapes: npt.NDArray[Any]) -> FloatArray:
+        """Squares that are no greater than this may be of neutral motions.
+
+        By what rounding leaves of the parts of the stiffness; and by what is left out of balance, F: along q(a) on
+        which the energy is the same, K q' . q' = -F . q'', and what turns by a has |q''| of |q'|.
+        """
+        sizes = np.abs(shapes)
+        strains = np.abs(self._gradients @ shapes) * (abs(self._gradients) @ sizes)
+        twice = _ROUNDING * ((sizes * (abs(self._geometric) @ sizes)).sum(axis=0) + self._stiffnesses @ strains)
+        turns = np.abs(self._turn @ shapes).max(axis=0, initial=0.0)
+        twice += np.abs(self._imbalance) @ sizes * turns
+        return np.asarray(twice / np.abs((shapes.conj() * (self._mass @ shapes)).sum(axis=0)))
+
     def _shift(self) -> float:
         """A square of a frequency s near that of the slowest motion that is not neutral, and above any that diverges.
 
@@ -178,8 +192,8 @@ class Linearisation:
         shift = float(np.median(np.abs(self._assembled.diagonal()) / self._mass.diagonal())) / nodes**4
         count = _BLOCK
         for _ in range(40):
-            squares, _, _ = self._krylov(shift, count, rounds=2)
-            moving = np.abs(squares[np.abs(squares) > _NEUTRAL * shift])
+            squares, shapes, _ = self._krylov(shift, count, rounds=2)
+            moving = np.abs(squares[np.abs(squares) > np.maximum(_NEUTRAL * shift, self._neutral(shapes))])
             if not len(moving) and count < self._mass.shape[0]:
                 count *= 2  # every free rod has six that are neutral
                 continue

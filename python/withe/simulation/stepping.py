@@ -135,7 +135,15 @@ class Stepping:
     def linearise(self) -> Linearisation:
         """Equations of motion linearised about the present configuration."""
         found = self.session.world.linearise(force_function(self.session))
-        return Linearisation(found.geometric, found.gradients, found.stiffnesses, found.mass, found.displacement)
+        return Linearisation(
+            found.geometric,
+            found.gradients,
+            found.stiffnesses,
+            found.mass,
+            found.displacement,
+            found.turn,
+            found.imbalance,
+        )
 
     @contextmanager
     def in_run(self) -> Iterator[None]:
