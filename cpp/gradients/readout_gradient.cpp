@@ -1,5 +1,7 @@
 #include "gradients/readout_gradient.hpp"
 
+#include <algorithm>
+
 #include "common/check.hpp"
 #include "model/drawn_frame.hpp"
 #include "model/edge_vectors.hpp"
@@ -213,6 +215,42 @@ void ReadoutAdjoint::check(const Model& model) const {
   const auto supports = static_cast<Eigen::Index>(model.supports.size());
   for (const MatrixX3* table : {&reactions.forces, &reactions.moments})
     require(table->rows() <= supports, "derivatives by reactions need so many rows at most: ", supports);
+}
+
+bool leaves_plane(const Model& model, const State& state, const ReadoutAdjoint& by) {
+  if (!model.planar()) return false;
+  constexpr double kRounded = 1e-9;
+  const Vector3& normal = model.plane->normal;
+  const auto beyond = [](const auto& off, const auto& all) {
+    return off.size() > 0 && off.cwiseAbs().maxCoeff() > kRounded * std::max(all.cwiseAbs().maxCoeff(), 1e-300);
+  };
+  for (const MatrixX3* by_vectors : {&by.positions, &by.velocities, &by.reactions.forces})
+    if (beyond((*by_vectors * normal).eval(), *by_vectors)) return true;
+  const MatrixX3& moments = by.reactions.moments;
+  if (beyond((moments - moments * normal * normal.transpose()).eval(), moments)) return true;
+  if (beyond(by.twists, by.twists) || beyond(by.spins, by.spins)) return true;
+  if (by.curvatures.size() != 0) {
+    VectorX off(by.curvatures.rows());
+    Eigen::Index row = 0;
+    for (std::size_t rod = 0; rod < model.place.size(); ++rod)
+      for (std::size_t s = 0; s < model.place[rod].size(); ++s, ++row) {
+        const Vector2& p = model.planar_components[rod];
+        off(row) = by.curvatures(row, 0) * p(1) - by.curvatures(row, 1) * p(0);
+      }
+    if (beyond(off, by.curvatures)) return true;
+  }
+  if (by.directors.size() == 0) return false;
+  // Turns of an edge about an axis w change the scalar by w . sum d x dL/dd.
+  Configuration c;
+  compute_configuration(model, state, state.q, c);
+  MatrixX3 turns(by.directors.rows(), 3);
+  for (int e = 0; e < model.edge_count; ++e) {
+    const Matrix3 d = edge_directors(model, c, e);
+    Vector3 turn = Vector3::Zero();
+    for (int i = 0; i < 3; ++i) turn += d.col(i).cross(Vector3(by.directors.row(e).segment<3>(3 * i)));
+    turns.row(e) = (turn - turn.dot(normal) * normal).transpose();
+  }
+  return beyond(turns, by.directors);
 }
 
 void add_unknowns(const Model& model, const ReadoutAdjoint& by, StateAdjoint& out) {

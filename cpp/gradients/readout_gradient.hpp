@@ -26,6 +26,9 @@ struct ReadoutAdjoint {
   }
 };
 
+/// Whether a scalar of a planar scene goes by what would leave the plane, which its unknowns do not have.
+bool leaves_plane(const Model& model, const State& state, const ReadoutAdjoint& by);
+
 /// Adds what positions, velocities and spins say, which are unknowns.
 void add_unknowns(const Model& model, const ReadoutAdjoint& by, StateAdjoint& out);
 

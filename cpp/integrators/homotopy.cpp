@@ -18,11 +18,10 @@ constexpr double kRounding = 64.0 * std::numeric_limits<double>::epsilon();
 
 bool turns(const LoadPiece& piece) { return piece.shape != LoadShape::dead_node && piece.load >= 0; }
 
-}  // namespace
-
-LoadPath growing_loads(Equations& equations, Parameters& parameters, const State& state, NewtonWorkspace& work) {
+/// Loads that turn with the rod grow from the share of them that the state carries already.
+ActingPath growing_loads(Equations& equations, Parameters& parameters, const State& state, NewtonWorkspace& work) {
   const std::vector<LoadPiece>& pieces = equations.loads().pieces;
-  if (std::none_of(pieces.begin(), pieces.end(), turns)) return [](double, MatrixX3&) {};
+  if (std::none_of(pieces.begin(), pieces.end(), turns)) return nullptr;
   const auto scale = [&pieces, full = parameters.loads](double share, MatrixX3& loads) {
     for (const LoadPiece& piece : pieces)
       if (turns(piece)) loads.row(piece.load) = share * full.row(piece.load);
@@ -37,7 +36,21 @@ LoadPath growing_loads(Equations& equations, Parameters& parameters, const State
   const VectorX without = out_of_balance(0.0), change = out_of_balance(1.0) - without;
   const double square = change.squaredNorm();
   const double carried = square > 0.0 ? std::clamp(-without.dot(change) / square, 0.0, 1.0) : 0.0;
-  return [scale, carried](double factor, MatrixX3& loads) { scale(carried + factor * (1.0 - carried), loads); };
+  return [scale, carried](double factor, Parameters& p) { scale(carried + factor * (1.0 - carried), p.loads); };
+}
+
+}  // namespace
+
+ActingPath growing(Equations& equations, Parameters& parameters, const State& state, NewtonWorkspace& work,
+                   const NaturalShape* before) {
+  if (!before) return growing_loads(equations, parameters, state, work);
+  const ActingPath shape = [&model = equations.model(), from = *before, to = natural_shape(parameters)](
+                               double factor, Parameters& p) { set_natural_between(model, from, to, factor, p); };
+  shape(0.0, parameters);
+  return [shape, loads = growing_loads(equations, parameters, state, work)](double factor, Parameters& p) {
+    shape(factor, p);
+    if (loads) loads(factor, p);
+  };
 }
 
 void Homotopy::start_out_of_balance() {
@@ -49,18 +62,14 @@ void Homotopy::start_out_of_balance() {
 }
 
 void Homotopy::apply(double factor) {
-  loads_(factor, parameters_.loads);
-  if (!boundary_.aim) return;
-  boundary_.aim(factor);
-  begin();
+  if (acting_) acting_(factor, parameters_);
+  if (boundary_.aim) boundary_.aim(factor);
+  equations_.begin(state_, parameters_, StepRule::statics, 0.0);
 }
-
-void Homotopy::begin() { equations_.begin(state_, parameters_, StepRule::statics, 0.0); }
 
 void Homotopy::go_to(double factor) {
   factor_ = factor;
   apply(factor);
-  if (!boundary_.aim) begin();
   if (imbalance_.size() == 0) imbalance_.setZero(state_.q.size());
   target_ = (1.0 - factor) * imbalance_;
 }
@@ -93,10 +102,10 @@ void Homotopy::find_pull(const VectorX& z, VectorX& pull, VectorX& held) {
     little *= std::isfinite(turn) ? 0.9 * kLittleTurn / turn : 1e-3;
   }
   const double farthest = z.cwiseProduct(newton_.norms().coordinates()).lpNorm<Eigen::Infinity>();
-  const bool supports_move = newton_.norms().displacement(held) > kRounding * farthest;
-  if (!supports_move) moved_ = z;
-  held = supports_move ? (held / little).eval() : VectorX::Zero(z.size());
-  moves_ = boundary_.aim || supports_move;
+  const bool any_moves = newton_.norms().displacement(held) > kRounding * farthest;
+  if (!any_moves) moved_ = z;
+  held = any_moves ? (held / little).eval() : VectorX::Zero(z.size());
+  moves_ = boundary_.aim || any_moves;
   equations_.evaluate(z, false, nullptr, work_.data);
   pull = work_.data.residual;
   apply(factor_ + little);
@@ -111,7 +120,8 @@ void Homotopy::find_tangent(Tangent& out) {
   LinearSolver& solver = equations_.assembler().solver();
   ++work_.counters.iterations;
   ++work_.counters.factorizations;
-  out.factorization = solver.factorize();
+  shift_ = neutral_shift(equations_, kDoubtful);
+  out.factorization = solver.factorize({shift_.data(), static_cast<std::size_t>(shift_.size())});
   out.found = out.factorization.status == FactorStatus::ok || factorize(equations_, work_);
   if (!out.found) return;
   solver.solve({out.rate.data(), static_cast<std::size_t>(out.rate.size())});

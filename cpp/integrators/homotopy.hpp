@@ -1,11 +1,12 @@
 #pragma once
-/// Equilibria that go with a factor s, along which supports move and loads change:
-///   F(q, s) = grad V(q) - f(s) - (1 - s) r = 0, with the held unknowns of q where they are to be at s.
+/// Equilibria that go with a factor s, along which supports move, natural shapes and loads change:
+///   F(q, s) = grad V(q, s) - f(s) - (1 - s) r = 0, with the held unknowns of q where they are to be at s.
 /// r is what the start, s = 0, is out of balance by, so that the path begins there and ends, at s = 1, in equilibrium.
 
 #include <functional>
 
 #include "integrators/newton.hpp"
+#include "model/natural_shape.hpp"
 
 namespace withe {
 
@@ -16,23 +17,26 @@ struct Boundary {
   /// Tells hands that yield; nothing where none moves.
   std::function<void(double factor)> aim;
 };
-/// Sets rows of `Parameters::loads` that grow with the factor.
-using LoadPath = std::function<void(double factor, MatrixX3& loads)>;
+/// Sets what acts at a factor; nothing where it all stays.
+using ActingPath = std::function<void(double factor, Parameters& parameters)>;
 
-/// Loads that turn with the rod (moments, followers) from the share of them that the state carries already to all of
-/// them: their dead imbalance would pull where they do not. Others stay, as they are part of what is out of balance.
-LoadPath growing_loads(Equations& equations, Parameters& parameters, const State& state, NewtonWorkspace& work);
+/// Natural shapes from those `before` (if they have changed) to the present ones, so that rods bend by their muscles
+/// and are not bent to there; and loads that turn with the rod (moments, followers) from the share of them that the
+/// state carries already to all of them: a dead imbalance would pull where they do not. Other loads stay, as they are
+/// part of what is out of balance.
+ActingPath growing(Equations& equations, Parameters& parameters, const State& state, NewtonWorkspace& work,
+                   const NaturalShape* before);
 
 class Homotopy {
  public:
-  /// Loads among the parameters are those of the factor last gone to.
-  Homotopy(Equations& equations, const Newton& newton, Parameters& parameters, Boundary boundary, LoadPath loads,
+  /// What acts, among the parameters, is that of the factor last gone to.
+  Homotopy(Equations& equations, const Newton& newton, Parameters& parameters, Boundary boundary, ActingPath acting,
            State& state, NewtonWorkspace& work)
       : equations_(equations),
         newton_(newton),
         parameters_(parameters),
         boundary_(std::move(boundary)),
-        loads_(std::move(loads)),
+        acting_(std::move(acting)),
         state_(state),
         work_(work) {}
 
@@ -65,18 +69,17 @@ class Homotopy {
   void evaluate(const VectorX& z, bool with_matrix, const double* axial_force);
 
  private:
-  /// Loads at a factor, and hands, with which equations have to begin anew.
+  /// What acts at a factor, and hands, with which equations begin anew.
   void apply(double factor);
-  void begin();
 
   Equations& equations_;
   const Newton& newton_;
   Parameters& parameters_;
   Boundary boundary_;
-  LoadPath loads_;
+  ActingPath acting_;
   State& state_;
   NewtonWorkspace& work_;
-  VectorX imbalance_, target_, held_, moved_;
+  VectorX imbalance_, target_, held_, moved_, shift_;
   Configuration scratch_;
   double factor_ = 0.0;
   bool moves_ = false;

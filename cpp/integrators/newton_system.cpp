@@ -1,18 +1,38 @@
 #include "integrators/newton_system.hpp"
 
+#include <cmath>
+
 #include "common/timer.hpp"
 
 namespace withe {
 
-bool factorize(Equations& equations, NewtonWorkspace& work) {
+bool factorize(Equations& equations, NewtonWorkspace& work, bool at_rest) {
   const Timer timer(work.counters.solve_time);
   LinearSolver& solver = equations.assembler().solver();
   ++work.counters.factorizations;
-  if (solver.factorize().status == FactorStatus::ok) return true;
+  const auto shifted = [&] {
+    return solver.factorize({work.trial.data(), static_cast<std::size_t>(work.trial.size())}).status ==
+           FactorStatus::ok;
+  };
+  if (at_rest) {
+    work.trial = neutral_shift(equations, kRounded);
+    if (shifted()) return true;
+  } else if (solver.factorize().status == FactorStatus::ok) {
+    return true;
+  }
   const double greatest = equations.assembler().greatest_diagonal();
   work.trial.setConstant(equations.model().dof_count, 1e-12 * greatest);
-  return greatest > 0.0 &&
-         solver.factorize({work.trial.data(), static_cast<std::size_t>(work.trial.size())}).status == FactorStatus::ok;
+  return greatest > 0.0 && shifted();
+}
+
+VectorX neutral_shift(const Equations& equations, double share) {
+  VectorX shift(equations.model().dof_count);
+  for (int i = 0; i < equations.model().dof_count; ++i) shift[i] = share * std::abs(equations.assembler().diagonal(i));
+  return shift;
+}
+
+bool NewtonSystem::factorize() const {
+  return withe::factorize(equations, work, equations.problem().rule == StepRule::statics);
 }
 
 void NewtonSystem::evaluate(const VectorX& z, bool matrix, const double* axial_force) const {

@@ -2,6 +2,7 @@
 /// The equations as Newton's method sees them: F(z) = target, its matrix, and steps.
 
 #include <functional>
+#include <limits>
 
 #include "integrators/guess_history.hpp"
 #include "integrators/matrix_reuse.hpp"
@@ -26,9 +27,15 @@ struct NewtonWorkspace {
   std::function<void()> poll = [] {};  ///< asked once an iteration; what it throws ends the solve
 };
 
-/// Factorises the matrix as it is; a free mode (a rod that may spin about its axis) is held by a shift far below every
-/// stiffness.
-bool factorize(Equations& equations, NewtonWorkspace& work);
+/// This share of the diagonal of a stiffness, per row: added to it, it keeps what is neutral (a free body, a rod that
+/// may spin about its axis) from going anywhere by rounding; kDoubtful: taken off it leaves what is surely not neutral.
+/// Needs the matrix of the last evaluation.
+VectorX neutral_shift(const Equations& equations, double share);
+inline constexpr double kRounded = std::numeric_limits<double>::epsilon(), kDoubtful = 64.0 * kRounded;
+
+/// Factorises the matrix as it is, `at_rest` with what keeps neutral modes from going anywhere by rounding; one that is
+/// singular is held by a shift far below every stiffness.
+bool factorize(Equations& equations, NewtonWorkspace& work, bool at_rest = false);
 
 struct NewtonSystem {
   Equations& equations;
@@ -37,7 +44,7 @@ struct NewtonSystem {
 
   /// Residual, and matrix where it is asked for.
   void evaluate(const VectorX& z, bool matrix, const double* axial_force = nullptr) const;
-  bool factorize() const { return withe::factorize(equations, work); }
+  bool factorize() const;
   /// step = -A^-1 residual, with the matrix as it is factorised.
   void solve_for(VectorX& step) const;
 };

@@ -3,14 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <memory>
-#include <random>
 #include <span>
-#include <utility>
 #include <vector>
 
+#include "integrators/stiffness_signs.hpp"
 #include "steps/elastic_forces.hpp"
-#include "steps/strain_parts.hpp"
 
 namespace withe {
 namespace {
@@ -27,6 +24,8 @@ bool turned_too_far(const State& state, const Configuration& c, bool planar) {
 constexpr double kOnTheWay = 1e-6;
 // Edges turn by no more than this between two points of a path, by the linear solution [rad].
 constexpr double kFarthestTurn = 1.0;
+// Stiffnesses that a whole load would turn edges so far by are rounding [rad].
+constexpr double kSingular = 1e9;
 // What has to be cut below this share of that leads to no point of the path: it has ended.
 constexpr double kShortest = 1.0 / 64.0;
 // Where no edge turns, the path ends after so many cuts.
@@ -48,23 +47,22 @@ constexpr double kNear = 1e-4, kCloser = 0.1;
 // Intervals in which a scene settles; and where loads without a potential drive it round, after how many they may be
 // twice as long.
 constexpr int kMostIntervals = 400, kTurns = 50;
-// Eigenvalues of the stiffness against masses that are below this share of the greatest have no digits in its sums.
-constexpr double kDoubtful = 64.0 * std::numeric_limits<double>::epsilon();
 // Potentials on the two sides of a saddle that differ by less of what they fall by are alike.
 constexpr double kAlike = 1e-6;
 
 class Statics {
  public:
   Statics(Equations& equations, const Newton& newton, const Options& options, Parameters& parameters,
-          const Boundary& boundary, State& state, NewtonWorkspace& work)
+          const NaturalShape* before, const Boundary& boundary, State& state, NewtonWorkspace& work)
       : equations_(equations),
         newton_(newton),
         options_(options),
         parameters_(parameters),
         state_(state),
         work_(work),
-        path_(equations, newton, parameters, boundary, growing_loads(equations, parameters, state, work), state, work) {
-  }
+        path_(equations, newton, parameters, boundary, growing(equations, parameters, state, work, before), state,
+              work),
+        signs_(equations, newton.norms(), work.counters) {}
 
   StaticResult run() {
     StaticResult result;
@@ -116,10 +114,13 @@ class Statics {
         }
         was_stable = firm();
       }
+      // Of a mechanism, which nothing holds, the tangent is rounding: its path ends where it begins.
+      const bool singular = tangent_.found && tangent_.turn > kSingular;
+      tangent_.found = tangent_.found && !singular;
       const double by_turn = tangent_.found ? kFarthestTurn / tangent_.turn : 1.0;
       const double increment = std::min({1.0 - reached, longest, by_turn});
       const double next = increment == 1.0 - reached ? 1.0 : reached + increment;
-      if (reach(next, next - reached, last)) {
+      if (!singular && reach(next, next - reached, last)) {
         reached = next;
         longest = cuts == 0 ? std::max(2.0 * longest, 2.0 * increment) : increment;
         cuts = 0;
@@ -127,7 +128,7 @@ class Statics {
       }
       longest = increment * (cuts == 0 ? 0.25 : 0.5);
       ++cuts;
-      if (cuts <= most_cuts && increment > kShortest * std::min(by_turn, 1.0)) continue;
+      if (!singular && cuts <= most_cuts && increment > kShortest * std::min(by_turn, 1.0)) continue;
       if (++jumps > kMostJumps) return false;
       // Forces may come all at once to a scene that goes on dynamically; supports may not.
       const double beyond = path_.supports_move() ? std::min(1.0, reached + kBeyond * increment) : 1.0;
@@ -255,6 +256,7 @@ class Statics {
         potential = found;
         h = std::min(longest, h * (r.iterations <= 4 + border ? 10.0 : r.iterations <= 8 + border ? 3.0 : 1.0));
       } else if (at_rest) {
+        if (!r.converged && moved < kOnTheWay * equations_.model().length_scale && balanced(factor)) return true;
         near = kCloser * moved;
       } else {
         h *= 0.25;
@@ -262,6 +264,13 @@ class Statics {
     }
     result.restless = !conservative && h > shortest;
     return false;
+  }
+
+  /// Whether the present state is in balance but for rounding, as where what is neutral keeps Newton's method going.
+  bool balanced(double factor) {
+    evaluate(factor);
+    NewtonResult found;
+    return newton_.balance(work_.data, found).floor;
   }
 
   /// An interval of backward Euler from rest, which ends in z; of no length: equilibrium.
@@ -280,38 +289,9 @@ class Statics {
   double definite_interval(double factor, double h, double shortest) {
     evaluate(factor);
     const VectorX weight = equations_.mass().rows.cwiseMax(1e-300);
-    LinearSolver& stiffness = symmetric_part();
-    while (h > shortest && !definite(stiffness, 1.0 / (h * h), weight)) h *= 0.5;
+    LinearSolver& stiffness = signs_.symmetric_part();
+    while (h > shortest && !signs_.definite(stiffness, 1.0 / (h * h), weight)) h *= 0.5;
     return h;
-  }
-
-  /// The matrix of the last evaluation if it is symmetric, otherwise its symmetric part.
-  LinearSolver& symmetric_part() {
-    LinearSolver& matrix = equations_.assembler().solver();
-    if (matrix.symmetry() == Symmetry::symmetric) return matrix;
-    const SparsityPattern& pattern = equations_.assembler().pattern();
-    if (generation_ != equations_.assembler().generation()) {
-      generation_ = equations_.assembler().generation();
-      symmetric_ = make_linear_solver(pattern, Symmetry::symmetric);
-    }
-    const std::span<const double> from = std::as_const(matrix).values();
-    const std::span<double> to = symmetric_->values();
-    std::fill(to.begin(), to.end(), 0.0);
-    for (int column = 0, k = 0; column < pattern.size; ++column)
-      for (; k < pattern.column_starts[static_cast<std::size_t>(column) + 1]; ++k) {
-        const int row = pattern.row_indices[static_cast<std::size_t>(k)];
-        to[static_cast<std::size_t>(symmetric_->place(row, column))] +=
-            (row == column ? 1.0 : 0.5) * from[static_cast<std::size_t>(matrix.place(row, column))];
-      }
-    return *symmetric_;
-  }
-
-  /// Factorises a symmetric matrix plus `damping` of the masses; whether all its eigenvalues are positive.
-  bool definite(LinearSolver& stiffness, double damping, const VectorX& weight) {
-    shift_ = damping * weight;
-    ++work_.counters.factorizations;
-    const Factorization f = stiffness.factorize({shift_.data(), static_cast<std::size_t>(shift_.size())});
-    return f.status == FactorStatus::ok && f.negative_pivots == 0;
   }
 
   /// Levenberg-Marquardt on the potential: every accepted step lowers it.
@@ -361,9 +341,9 @@ class Statics {
   /// A damped step from `here` to a lower potential, with more damping until there is one.
   bool find_lower(const StepData& here, const VectorX& weight, double& damping, VectorX& z) {
     VectorX step;
-    LinearSolver& solver = equations_.assembler().solver();
     for (int tries = 0; tries < 40; ++tries) {
-      if (!definite(solver, damping, weight)) {
+      LinearSolver& solver = equations_.assembler().solver();
+      if (!signs_.definite(solver, damping, weight)) {
         damping *= 8.0;
         continue;
       }
@@ -391,47 +371,9 @@ class Statics {
     path_.evaluate(state_.q, true, nullptr);
   }
 
-  /// Whether no motion lowers the potential; of unsymmetric equations, whether they can be solved.
   bool stable(double factor) {
     evaluate(factor);
-    LinearSolver& solver = equations_.assembler().solver();
-    if (solver.symmetry() == Symmetry::unsymmetric) {
-      ++work_.counters.factorizations;
-      return solver.factorize().status == FactorStatus::ok;
-    }
-    const VectorX weight = equations_.mass().rows.cwiseMax(1e-300);
-    if (definite(solver, -kDoubtful * equations_.assembler().greatest_stiffness(weight), weight)) return true;
-    // A neutral mode (a rod that may spin about its axis) comes out on either side of zero by rounding, and by what is
-    // left out of balance, F: along q(a) on which the potential is the same, K q' . q' = -F . q'', and what turns by a
-    // has |q''| of |q'|.
-    const VectorX mode = lowest_mode(0);
-    VectorX imbalance = work_.data.residual;
-    equations_.assembler().project(imbalance);
-    const double left = newton_.norms().turn(mode) * imbalance.cwiseAbs().dot(mode.cwiseAbs());
-    const Curvature least = curvature_along(equations_, state_, mode, work_.data);
-    return least.value > -(least.rounding + left);
-  }
-
-  /// Direction of most negative curvature against mass, by inverse iteration on a matrix shifted until it is
-  /// definite. Needs the matrix of the last evaluation.
-  VectorX lowest_mode(int seed) {
-    const Model& model = equations_.model();
-    LinearSolver& solver = equations_.assembler().solver();
-    const VectorX weight = equations_.mass().rows.cwiseMax(1e-300);
-    const double stiffness = equations_.assembler().greatest_stiffness(weight);
-    double damping = 1e-16 * stiffness;
-    while (damping < 1e3 * stiffness && !definite(solver, damping, weight)) damping *= 2.0;
-    std::mt19937 random(static_cast<unsigned>(seed + 1));
-    std::normal_distribution<double> normal;
-    VectorX direction(model.dof_count);
-    for (Eigen::Index i = 0; i < direction.size(); ++i) direction(i) = normal(random);
-    for (int k = 0; k < 20; ++k) {
-      direction = direction.cwiseProduct(weight);
-      equations_.assembler().project(direction);
-      solver.solve({direction.data(), static_cast<std::size_t>(direction.size())});
-      direction /= direction.norm();
-    }
-    return direction;
+    return signs_.stable(state_, work_.data);
   }
 
   /// Goes off along the lowest mode, to the side where the potential is lower, whichever way the scene lies in space;
@@ -439,7 +381,7 @@ class Statics {
   void leave_saddle(double factor, int tries) {
     evaluate(factor);
     const double here = work_.data.potential;
-    VectorX way = lowest_mode(tries);
+    VectorX way = signs_.lowest_mode(tries);
     way *= 1e-3 * equations_.model().length_scale / std::max(newton_.norms().displacement(way), 1e-300);
     way *= newton_.norms().cap(way);
     const VectorX ahead = state_.q + way, behind = state_.q - way;
@@ -463,18 +405,18 @@ class Statics {
   NewtonWorkspace& work_;
   double energy_scale_ = 0.0;  ///< greatest potential met [J]
   double lowest_ = 0.0;
-  std::unique_ptr<LinearSolver> symmetric_;  ///< of the assembler's `generation_`
-  int generation_ = -1;
   Homotopy path_;
   Homotopy::Tangent tangent_;
-  VectorX step_, shift_, z_;
+  StiffnessSigns signs_;
+  VectorX step_, z_;
 };
 
 }  // namespace
 
 StaticResult find_equilibrium(Equations& equations, const Newton& newton, const Options& options,
-                              Parameters& parameters, const Boundary& boundary, State& state, NewtonWorkspace& work) {
-  return Statics(equations, newton, options, parameters, boundary, state, work).run();
+                              Parameters& parameters, const NaturalShape* before, const Boundary& boundary,
+                              State& state, NewtonWorkspace& work) {
+  return Statics(equations, newton, options, parameters, before, boundary, state, work).run();
 }
 
 }  // namespace withe

@@ -137,6 +137,24 @@ void World::Implementation::begin_as_drawn() {
         node_position(model, state.q, model.supports[s].node);
     if (model.supports[s].is_hand()) grasp(static_cast<int>(s));
   }
+  note_drawn_shape();
+}
+
+/// Where rods are not drawn as they are free of stress.
+void World::Implementation::note_drawn_shape() {
+  constexpr double kRounded = 1e-9;  // [rad] of a stencil
+  const NaturalShape now = natural_shape(parameters);
+  shape_before = relaxed_shape(model, parameters, configuration());
+  double apart = 0.0;
+  for (std::size_t r = 0; r < now.curvature.size(); ++r) {
+    if (now.twist[r].size() == 0) continue;
+    const VectorX& voronoi = model.rod_voronoi[r];
+    const MatrixX2 bent = now.curvature[r] - shape_before.curvature[r];
+    const VectorX twisted = now.twist[r] - shape_before.twist[r];
+    apart = std::max({apart, (voronoi.asDiagonal() * bent).cwiseAbs().maxCoeff(),
+                      voronoi.cwiseProduct(twisted).cwiseAbs().maxCoeff()});
+  }
+  reshaped = apart > kRounded;
 }
 
 /// The running state, of another model.

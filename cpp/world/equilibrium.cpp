@@ -115,7 +115,12 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   const Lagged lagged_before = lagged();
   const MatrixX3 loads = parameters.loads;
   const double time = state.time + dt;
-  if (actuated()) apply_ramps(time, configuration(), actuation_work);
+  const bool reshaped_before = reshaped;
+  if (actuated()) {
+    note_shape();
+    apply_ramps(time, configuration(), actuation_work);
+  }
+  const NaturalShape shape = reshaped ? natural_shape(parameters) : NaturalShape{};
   aim_supports(time);
   Equations& system = statics();
   update_custom_force(system);
@@ -125,7 +130,9 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
     release_obstacles(system);
     release_hands(system);
     static_cast<Moving&>(*this) = before;
+    if (reshaped) set_natural_between(model, shape, shape, 1.0, parameters);
     apply_ramps(state.time);
+    reshaped = reshaped_before;
     parameters.loads = loads;
     recall(lagged_before);  // and no more of `system`, which this may drop
   };
@@ -143,7 +150,8 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
     if (drifts(system))
       newton->balance(work.newton.data, r.newton);
     else
-      r = find_equilibrium(system, *newton, options, parameters, boundary, state, work.newton);
+      r = find_equilibrium(system, *newton, options, parameters, reshaped ? &shape_before : nullptr, boundary, state,
+                           work.newton);
     // Where contact turns out too soft, and is made stiffer, balance is sought anew from where the scene has settled.
     from = target;
     for (int tries = 0; r.converged && system.contact() && tries < kMostStiffenings; ++tries) {
@@ -152,7 +160,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
       else if (system.contact()->presses_alike())
         break;
       const StaticResult before_it = r;
-      r = find_equilibrium(system, *newton, options, parameters, boundary, state, work.newton);
+      r = find_equilibrium(system, *newton, options, parameters, nullptr, boundary, state, work.newton);
       r.branch_changed = r.branch_changed || before_it.branch_changed;
       r.newton.iterations += before_it.newton.iterations;
     }
@@ -271,8 +279,8 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
   check_path(wanted, self.description);
   const MatrixX3 full = self.parameters.loads;
   const bool by_loads = !wanted.loads.empty();
-  const LoadPath scaled = [&](double factor, MatrixX3& loads) {
-    scale_loads(self.description, wanted.loads, factor, full, loads);
+  const ActingPath scaled = [&](double factor, Parameters& acting) {
+    scale_loads(self.description, wanted.loads, factor, full, acting.loads);
   };
   const Moving before = self;
   const Lagged lagged_before = self.lagged();
@@ -281,7 +289,7 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
   ArcResult r;
   try {
     if (by_loads) {
-      scaled(wanted.start, self.parameters.loads);
+      scaled(wanted.start, self.parameters);
       self.reaction_current = false;
       out.iterations += equilibrium().iterations;
     }
@@ -292,8 +300,9 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
     self.solve_for_custom_at_rest(system, self.state.time);
     const Boundary boundary = self.boundary_between(system, from, target);
     self.rest();
-    const LoadPath loads = by_loads ? scaled : growing_loads(system, self.parameters, self.state, self.work.newton);
-    Homotopy path(system, *self.newton, self.parameters, boundary, loads, self.state, self.work.newton);
+    const ActingPath acting =
+        by_loads ? scaled : growing(system, self.parameters, self.state, self.work.newton, nullptr);
+    Homotopy path(system, *self.newton, self.parameters, boundary, acting, self.state, self.work.newton);
     path.keep_balance();
     if (!by_loads) path.start_out_of_balance();
     const ArcVisitor visit = [&](const ArcPoint& point) {
@@ -316,7 +325,7 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
     throw;
   }
   self.parameters.loads = full;
-  scaled(r.factor, self.parameters.loads);
+  scaled(r.factor, self.parameters);
   self.reaction_current = false;
   out.finished = r.finished;
   out.iterations += r.newton.iterations;

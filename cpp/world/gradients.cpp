@@ -39,6 +39,13 @@ bool loses_in_impacts(const ContactDescription& contact) {
 std::vector<EquilibriumGradient> World::equilibrium_gradients(const std::vector<ReadoutAdjoint>& by) const {
   const Implementation& self = *implementation_;
   const Model& model = self.model;
+  for (const ReadoutAdjoint& scalar : by) scalar.check(model);
+  const auto leaves = [&](const ReadoutAdjoint& scalar) { return leaves_plane(model, self.state, scalar); };
+  if (std::any_of(by.begin(), by.end(), leaves)) {
+    World spatial(*this);
+    spatial.implementation_->leave_plane("what the gradient is of");
+    return spatial.equilibrium_gradients(by);
+  }
   if (!self.static_gradient) {
     Options statics = self.options;
     statics.integrator = Integrator::statics;
@@ -66,7 +73,6 @@ std::vector<EquilibriumGradient> World::equilibrium_gradients(const std::vector<
           "the simulation is in no equilibrium, so that there is no gradient of one: call equilibrium() again");
   std::vector<EquilibriumGradient> out;
   for (const ReadoutAdjoint& scalar : by) {
-    scalar.check(model);
     StateAdjoint adjoint{VectorX::Zero(model.dof_count), VectorX::Zero(model.dof_count)};
     CoefficientAdjoint coefficients(model, self.parameters.loads.rows());
     HeldAdjoint held(model);

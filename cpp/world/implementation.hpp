@@ -111,6 +111,7 @@ struct World::Implementation : Running {
   Model model_of_active(Rebuild why);
   void drop_scratch();
   void begin_as_drawn();
+  void note_drawn_shape();
   void carry_over(const Model& old, Rebuild why);
   void keep_moments(const Model& old, const ElasticCoefficients& before);
   void make_plan();
@@ -153,6 +154,7 @@ struct World::Implementation : Running {
   void apply_ramps(double time, const Configuration& c, double& work);
   const Configuration& configuration() const;
   void retire_ramps();
+  void note_shape();
   bool actuated() const;
   bool turns_rods() const;
   void aim_supports(double time);

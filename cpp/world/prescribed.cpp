@@ -27,8 +27,15 @@ Eigen::VectorBlock<VectorX> World::Implementation::natural_stretch(int rod) {
   return parameters.edge_natural_stretch.segment(first, model.rod_first_edge[at(rod) + 1] - first);
 }
 
-/// Those that have come to their end are at rest from now on.
+/// What is free of stress is about to change.
+void World::Implementation::note_shape() {
+  if (!reshaped) shape_before = natural_shape(parameters);
+  reshaped = true;
+}
+
+/// The state has moved with the present shapes; those that have come to their end are at rest from now on.
 void World::Implementation::retire_ramps() {
+  reshaped = false;
   for (NaturalRamp& ramp : ramps) {
     ramp.curvature.retire(state.time);
     ramp.twist.retire(state.time);

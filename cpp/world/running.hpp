@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "integrators/dynamics.hpp"
+#include "model/natural_shape.hpp"
 #include "world/world.hpp"
 
 namespace withe {
@@ -102,6 +103,8 @@ struct Settings {
   Parameters parameters;
   std::vector<NaturalRamp> ramps;
   std::vector<ObstacleMotion> obstacle_motions;  ///< none until one moves
+  NaturalShape shape_before;                     ///< with which the state last moved,
+  bool reshaped = false;                         ///< where another has been set since, or it was drawn otherwise
 };
 
 /// What a step changes, and returns to where it is taken back.

@@ -181,7 +181,7 @@ void check_lagged(const Lagged& lagged, const Model& model) {
   }
 }
 
-/// Ramps have no size until they are used.
+/// Ramps have no size until they are used, nor has the shape before one was set.
 void give_sizes(World::Implementation& self) {
   for (std::size_t r = 0; r < self.ramps.size(); ++r) {
     NaturalRamp& ramp = self.ramps[r];
@@ -193,6 +193,7 @@ void give_sizes(World::Implementation& self) {
     for (VectorX* v : {&ramp.stretch.from, &ramp.stretch.to})
       if (v->size() != rod.rest_lengths.size()) v->setOnes(rod.rest_lengths.size());
   }
+  if (self.shape_before.curvature.empty()) self.shape_before = natural_shape(self.parameters);
   self.predictor.resize(self.model.dof_count);
   for (VectorX* v : {&self.reaction_residual, &self.reaction_place})
     if (v->size() != self.model.dof_count) v->setZero(self.model.dof_count);

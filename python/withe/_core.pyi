@@ -771,9 +771,13 @@ class Linearisation:
     @property
     def gradients(self) -> scipy.sparse.csc_matrix: ...
     @property
+    def imbalance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    @property
     def mass(self) -> scipy.sparse.csc_matrix: ...
     @property
     def stiffnesses(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    @property
+    def turn(self) -> scipy.sparse.csc_matrix: ...
 
 class Energy:
     """
@@ -1024,6 +1028,10 @@ class World:
     def natural_curvature(
         self, rod: typing.SupportsInt | typing.SupportsIndex
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]"]: ...
+    def natural_shape_due(self, name: str, rod: typing.SupportsInt | typing.SupportsIndex) -> float | None:
+        """
+        When a natural shape is where it goes to [s]; None where it is not on its way.
+        """
     def natural_twist(
         self, rod: typing.SupportsInt | typing.SupportsIndex
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...

@@ -267,3 +267,77 @@ def test_what_a_path_cannot_be_asked_for_is_refused():
     load = scene.add_force(node, lambda t: (0, 0, -t))
     with pytest.raises(ValueError, match="function of time"):
         scene.build(integrator="static").equilibrium(path="arc_length", load=load)
+
+
+@pytest.mark.parametrize("curvature", [10.0, 30.0, -60.0])
+def test_muscles_curl_an_arm_along_its_branch(curvature):
+    """Through circles of every curvature on the way, and not by a jump: nothing but the muscles bends it."""
+    scene = rods.weightless()
+    rubber = withe.Material(youngs_modulus=1e6, poisson_ratio=0.4, density=1200.0)
+    arm = scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=41, radius=4e-3, material=rubber, normal=(0, 1, 0))
+    scene.clamp(arm.start)
+    simulation = scene.build()
+    simulation.set_natural_curvature(arm, (curvature, 0.0))
+    found = simulation.equilibrium()
+    assert found.stable
+    assert not found.branch_changed
+    assert simulation.energy().total < 1e-20
+    turned = curvature * 0.2
+    tip = np.array([np.sin(turned), 1.0 - np.cos(turned)]) / curvature
+    np.testing.assert_allclose(simulation.positions(arm)[-1, [0, 1]] ** 2, tip**2, atol=3e-3 * np.abs(tip).max())
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [
+        {"natural_curvature": (30.0, 10.0)},
+        {"natural_twist": 60.0},
+        {"natural_stretch": 1.5},
+        {"natural_curvature": (-20.0, 30.0), "natural_twist": 40.0, "natural_stretch": 0.7},
+    ],
+)
+@pytest.mark.parametrize("at_once", [True, False])
+def test_muscles_move_a_heavy_arm_along_its_branch_at_once_and_in_steps(shape, at_once):
+    """One equilibrium far off is that of many on the way there."""
+    scene = withe.Scene()
+    rubber = withe.Material(youngs_modulus=2e6, poisson_ratio=0.4, density=1200.0)
+    arm = scene.add_rod(start=(0, 0, 0), end=(0.1, 0, 0.05), nodes=31, radius=4e-3, material=rubber)
+    scene.clamp(arm.start)
+    simulation = scene.build(integrator="static", time_step=1.0, planar=False)
+    simulation.equilibrium()
+    if at_once:
+        simulation.set(arm, **shape)
+        found = simulation.equilibrium()
+        assert found.stable
+        assert not found.branch_changed
+    else:
+        for word, value in shape.items():
+            getattr(simulation, f"set_{word}")(arm, value, over=20.0)
+        simulation.step(20)  # which would warn of another branch
+    small = scene.build(integrator="static", time_step=1.0, planar=False)
+    small.equilibrium()
+    for word, value in shape.items():
+        getattr(small, f"set_{word}")(arm, value, over=100.0)
+    small.step(100)
+    np.testing.assert_allclose(simulation.positions(arm), small.positions(arm), atol=1e-8)
+
+
+@pytest.mark.parametrize("twist", [0.0, 0.5, 0.9])
+@pytest.mark.parametrize("nodes", [24, 40])
+def test_a_free_ring_of_a_straight_rod_stays_where_it_is(nodes, twist):
+    """Flat below Michell's twist 2 pi sqrt(3) E I / G J, and no force moves its centre."""
+    s = np.linspace(0.0, 2.0 * np.pi, nodes, endpoint=False)
+    rubber = withe.Material(youngs_modulus=1e6, poisson_ratio=0.3, density=1000.0)
+    scene = rods.weightless()
+    points = np.stack([np.cos(s), np.sin(s), 0.0 * s], axis=1)
+    ring = scene.add_rod(points=points, closed=True, radius=0.02, material=rubber, natural="straight")
+    simulation = scene.build(planar=False)
+    simulation.set_natural_twist(ring, twist * np.sqrt(3.0) * 1.3)
+    found = simulation.equilibrium()
+    assert found.stable
+    assert not found.branch_changed
+    positions = simulation.positions(ring)
+    assert np.abs(positions.mean(axis=0)).max() < 1e-3
+    assert np.linalg.norm(positions - positions.mean(axis=0), axis=1) == pytest.approx(
+        np.full(nodes, np.linalg.norm(positions[0] - positions.mean(axis=0))), rel=1e-6
+    )

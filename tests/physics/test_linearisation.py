@@ -210,3 +210,87 @@ def test_neutral_motions_of_many_free_rods_are_all_found():
     assert (np.abs(found[:18]) < 1e-6).all()
     free = np.abs(found) > 1e-6
     assert found[free].min() == pytest.approx(89.0, rel=0.02)  # 4.730^2 / (2 pi L^2) sqrt(EI / m)
+
+
+def arc(turn, nodes, radius, youngs_modulus, closed=False, lift=0.0):
+    """A free rod along a circle or a helix of radius 0.1 m."""
+    s = np.linspace(0.0, turn, nodes, endpoint=not closed)
+    rubber = withe.Material(youngs_modulus=youngs_modulus, poisson_ratio=0.3, density=1000.0)
+    scene = rods.weightless()
+    points = 0.1 * np.stack([np.cos(s), np.sin(s), lift * s], axis=1)
+    scene.add_rod(points=points, closed=closed, radius=radius, material=rubber)
+    return scene.build(planar=False).linearise()
+
+
+@pytest.mark.parametrize(
+    "free",
+    [
+        lambda: arc(4.5, 51, 3e-4, 1e6),
+        lambda: arc(4.5, 21, 1e-3, 1e6),
+        lambda: arc(20.0, 31, 1e-4, 1e6, lift=0.2),
+        lambda: arc(2.0 * np.pi, 160, 1e-4, 1e9, closed=True),
+    ],
+)
+def test_frequencies_of_free_bent_rods_do_not_depend_on_how_many_are_asked_for(free):
+    linearisation = free()
+    assert linearisation.stability == "stable"
+    dense = np.sort(eig(linearisation.stiffness, linearisation.mass)[0].real)
+    expected = np.sqrt(dense[6:8]) / (2.0 * np.pi)
+    for count in (8, 10, 20, 40):
+        found = linearisation.frequencies(count)
+        assert (np.diff(np.sign(found) * found**2) >= 0.0).all()
+        assert np.abs(found[:6]).max() < 1e-3 * expected[0]
+        np.testing.assert_allclose(found[6:8], expected, rtol=1e-4)
+
+
+@pytest.mark.parametrize("nodes", [21, 51, 101])
+def test_a_free_bar_that_rounding_presses_is_stable(nodes):
+    scene = rods.weightless()
+    scene.add_rod(start=(0, 0, 0), end=(0.6, 0, 0), nodes=nodes, radius=1e-3, material=STEEL)
+    simulation = scene.build()
+    assert simulation.linearise().stability == "stable"
+    assert simulation.equilibrium().stable
+
+
+@pytest.mark.parametrize("beside", [0, 1])
+def test_becks_column_flutters_beside_what_is_slower(beside):
+    """Sixteen motions of a soft rod that nothing connects with it are slower than those that flutter."""
+    scene = rods.weightless()
+    column = scene.add_rod(
+        start=(0, 0, 0),
+        end=(0, 0, 1),
+        nodes=41,
+        radius=1e-3,
+        stiffness=withe.Stiffness(stretch=1e5, bend=0.1, twist=0.1),
+        line_density=0.1,
+    )
+    scene.clamp(column.start)
+    scene.add_force(column.end, (0, 0, -1.3 * 20.05 * 0.1), follower=True)
+    if beside:
+        soft = withe.Stiffness(stretch=1e2, bend=1e-6, twist=1e-6)
+        rod = scene.add_rod(start=(1, 0, 0), end=(1, 0, 2), nodes=61, radius=1e-3, stiffness=soft, line_density=0.1)
+        scene.clamp(rod.start)
+    found = scene.build().equilibrium()
+    assert found.stability == "flutters"
+    assert not found.stable
+
+
+@pytest.mark.parametrize("moment", [4e-3, 6e-3, 8e-3])
+def test_what_diverges_comes_first_where_loads_turn_with_the_rod(moment):
+    scene = withe.Scene()
+    rubber = withe.Material(youngs_modulus=1e6, poisson_ratio=0.4, density=1100.0)
+    strip = withe.Rectangle(width=1e-2, height=4e-3)
+    rod = scene.add_rod(start=(0, 0, 0), end=(0.3, 0, 0), nodes=16, normal=(0, 1, 0), section=strip, material=rubber)
+    scene.clamp(rod.start)
+    scene.pin(rod.end, free=(1, 0, 0))
+    scene.add_moment(rod.node(8), (0.0, moment, 0.0), follower=True)
+    simulation = scene.build(integrator="static", planar=False)
+    simulation.equilibrium()
+    linearisation = simulation.linearise()
+    dense = eig(linearisation.stiffness, linearisation.mass)[0]
+    expected = np.sort(dense.real)
+    for count in (2, 6, 30):
+        squares = (2.0 * np.pi * linearisation.frequencies(count)) ** 2 * np.where(
+            np.real(linearisation.frequencies(count)) < 0.0, -1.0, 1.0
+        )
+        np.testing.assert_allclose(squares[:2].real, expected[:2], rtol=1e-4)

@@ -15,7 +15,7 @@ from withe.parts.handles import NodeHandle
 from withe.parts.kinds import SupportPart
 from withe.simulation.calls import Gradients, Ledger, RunJournal
 from withe.simulation.drawn import DrawnNodes, Moment
-from withe.simulation.losses import check_in_plane, readout_adjoints, readout_shape
+from withe.simulation.losses import readout_adjoints, readout_shape
 from withe.simulation.session import Session
 from withe.simulation.unknowns import (
     INITIAL_WORDS,
@@ -50,7 +50,6 @@ def equilibrium_gradient(session: Session, by: Loss, wrt: Sequence[Unknown]) -> 
         adjoints = readout_adjoints(session, {word: _with_frame(value) for word, value in by.items()}, 1)
     else:
         by_positions = validation.number_array(by, "dL_dx", (session.directory.layout.node_count, 3))
-        check_in_plane(session, by_positions, "dL_dx")
         adjoints = [_by_positions(by_positions)]
     (found,) = session.world.equilibrium_gradients(adjoints)
     return [read(found) for read in readers]
@@ -91,9 +90,6 @@ def equilibrium_jacobian(session: Session, of: Any, wrt: Sequence[Unknown]) -> l
         shape = readout_shape(session, target, word)
         count = int(np.prod(shape))
         tables = {word: {target: np.eye(count).reshape(count, *shape)}}
-    in_plane = _in_plane(session) if "positions" in tables or "velocities" in tables else None
-    if in_plane is not None:
-        tables = {word: _projected(value, in_plane) for word, value in tables.items()}
     found = session.world.equilibrium_gradients(readout_adjoints(session, tables, int(np.prod(shape))))
     out = []
     for read in readers:
@@ -107,20 +103,6 @@ def _with_frame(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {target: _with_frame(each) for target, each in value.items()}
     return np.asarray(value)[None]
-
-
-def _in_plane(session: Session) -> FloatArray | None:
-    """Projector onto the plane in which a planar scene moves."""
-    normal = session.world.plane_normal
-    if normal is None:
-        return None
-    return np.eye(3) - np.outer(normal, normal)
-
-
-def _projected(value: Any, projector: FloatArray) -> Any:
-    if isinstance(value, Mapping):
-        return {target: each @ projector for target, each in value.items()}
-    return value @ projector
 
 
 class RunDerivatives:
@@ -154,7 +136,7 @@ class RunDerivatives:
         drawn = {place: self._drawn(unknown) for place, unknown in enumerate(wrt) if is_points(unknown)}
         acting = [place for place, unknown in enumerate(wrt) if unknown not in INITIAL_WORDS and place not in drawn]
         kept = [wrt[place] for place in acting]
-        adjoints = readout_adjoints(self._session, by, len(self._steps))
+        adjoints = readout_adjoints(self._session, by, len(self._steps), in_plane=True)
         ledger = Ledger(
             self._session,
             self._journal,

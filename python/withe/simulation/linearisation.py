@@ -29,8 +29,11 @@ Stability = Literal["stable", "diverges", "flutters"]
 
 _BLOCK = 8
 _FULL = 8  # share of all modes, one in so many, from which on matrices are full
-_LOOK = 16  # slow modes among which stability is looked for
-_NEUTRAL = 1e-6  # of a frequency squared, what is none
+_LOOK = 16  # slow modes among which what diverges is looked for,
+_LOOK_UNSYMMETRIC = 64  # and what flutters
+_NEUTRAL = 1e-4  # of a shift, what a square near it is known to
+_KNOWN = 1e-7  # of a shift, what a square is known to that no energy tells
+_PAIR = 1e-6  # of a square, what its imaginary part is known to
 _ROUNDING = 64.0 * np.finfo(float).eps  # of the parts of a stiffness, as in the engine's `curvature_along`
 _RESIDUAL = 1e-9  # of an eigenvalue of the inverse
 
@@ -121,13 +124,15 @@ class Linearisation:
 
         "diverges" grows steadily, "flutters" swings and grows, which only loads that turn with the rod can do. Without
         damping, which may make things better or worse [Ziegler 1952]. Neutral motions (of a rod that may spin about its
-        axis) do not count. Looked for among the lowest 16 modes.
+        axis) do not count. Where loads that turn with the rod make the stiffness unsymmetric, looked for among the
+        lowest 64 modes.
         """
         if self._mass.shape[0] == 0:
             return "stable"
-        squares, shapes = self._solve(min(_LOOK, self._mass.shape[0]))
+        squares, shapes = self._solve(min(_LOOK if self._symmetric else _LOOK_UNSYMMETRIC, self._mass.shape[0]))
         rates = np.sqrt(-squares.astype(complex))
-        growth = np.where(np.abs(squares) <= self._neutral(shapes), 0.0, np.abs(rates.real))
+        neutral = self._neutral(shapes) if self._symmetric else self._neutral(shapes) + _KNOWN * self._shift
+        growth = np.where(np.abs(squares) <= neutral, 0.0, np.abs(rates.real))
         if not growth.any():
             return "stable"
         return "flutters" if squares[np.argmax(growth)].imag != 0.0 else "diverges"
@@ -148,17 +153,21 @@ class Linearisation:
         size = self._mass.shape[0]
         if not 1 <= count <= size:
             raise ValueError(f"count must be between 1 and {size}, got {count}")
-        shift = self._shift()
-        if count > size // _FULL:
+        shift = self._shift
+        # Nearest to -shift are those of the lowest real part, but for pairs that lie off the axis.
+        found = count if self._symmetric else min(2 * count + _BLOCK, size)
+        if found > size // _FULL:
             squares, shapes = self._full(shift)
         else:
-            squares, shapes, _ = self._krylov(shift, count)
-        chosen = _lowest(squares, count, self._symmetric)
+            squares, shapes, _ = self._krylov(shift, found)
+        chosen = np.argsort(squares.real, kind="stable")[:count]
         squares, shapes = squares[chosen], shapes[:, chosen]
         if self._symmetric:
-            return self._rayleigh(shapes), shapes
+            squares = self._rayleigh(shapes)
+            order = np.argsort(squares, kind="stable")
+            return squares[order], shapes[:, order]
         # Two equal ones may come out as a pair by rounding: two real shapes span what theirs do.
-        real = np.abs(squares.imag) <= _NEUTRAL * np.abs(squares)
+        real = np.abs(squares.imag) <= _PAIR * np.abs(squares)
         shapes = np.where(real, np.where(squares.imag < 0.0, shapes.imag, shapes.real), shapes)
         squares = np.where(real, squares.real, squares)
         return (squares.real, shapes.real) if real.all() else (squares, shapes)
@@ -173,15 +182,19 @@ class Linearisation:
         """Squares that are no greater than this may be of neutral motions.
 
         By what rounding leaves of the parts of the stiffness; and by what is left out of balance, F: along q(a) on
-        which the energy is the same, K q' . q' = -F . q'', and what turns by a has |q''| of |q'|.
+        which the energy is the same, K q' . q' = -F . q'', and nodes that turn by a have |q''| of |q'|. Twice that, as
+        a bar that is pulled by rounding reaches it.
         """
         sizes = np.abs(shapes)
         strains = np.abs(self._gradients @ shapes) * (abs(self._gradients) @ sizes)
         twice = _ROUNDING * ((sizes * (abs(self._geometric) @ sizes)).sum(axis=0) + self._stiffnesses @ strains)
         turns = np.abs(self._turn @ shapes).max(axis=0, initial=0.0)
-        twice += np.abs(self._imbalance) @ sizes * turns
+        forces = np.linalg.norm((self._displacement @ self._imbalance).reshape(-1, 3), axis=1)
+        ways = np.linalg.norm((self._displacement @ shapes).reshape(len(forces), 3, -1), axis=1)
+        twice += 2.0 * (forces @ ways) * turns
         return np.asarray(twice / np.abs((shapes.conj() * (self._mass @ shapes)).sum(axis=0)))
 
+    @cached_property
     def _shift(self) -> float:
         """A square of a frequency s near that of the slowest motion that is not neutral, and above any that diverges.
 
@@ -201,17 +214,22 @@ class Linearisation:
             if 1e-7 * slowest < shift < 10.0 * slowest:
                 break
             shift = 0.1 * slowest
-        while self._symmetric and not self._positive(shift):
+        while not self._positive(shift):
             shift *= 4.0
         return float(shift)
 
     def _positive(self, shift: float) -> bool:
-        """Whether no motion has a square below -shift: all pivots are positive [Sylvester's law of inertia]."""
+        """Whether no motion has a square, or the real part of one, below -shift.
+
+        All pivots of the stiffness or its symmetric part are positive [Sylvester's law of inertia; a square lies in the
+        field of values].
+        """
         from scipy.sparse import diags
         from scipy.sparse.linalg import splu
 
         scale = diags(1.0 / np.sqrt(np.abs(self._assembled.diagonal()) + shift * self._mass.diagonal()))
-        matrix = (scale @ (self._assembled + shift * self._mass) @ scale).tocsc()
+        stiffness = 0.5 * (self._assembled + self._assembled.T)
+        matrix = (scale @ (stiffness + shift * self._mass) @ scale).tocsc()
         try:
             factors = splu(matrix, "MMD_AT_PLUS_A", 0.0, options={"SymmetricMode": True, "Equil": False})
         except RuntimeError:  # a pivot that rounding left at zero
@@ -327,10 +345,3 @@ class Linearisation:
         fast[:turn] = slow[:turn]
         shapes[:, :turn] = slow_shapes[:, :turn]
         return fast, shapes
-
-
-def _lowest(squares: npt.NDArray[Any], count: int, symmetric: bool) -> npt.NDArray[np.intp]:
-    if symmetric:
-        return np.argsort(squares)[:count]
-    nearest = np.argsort(np.abs(squares), kind="stable")[:count]
-    return nearest[np.argsort(squares[nearest].real, kind="stable")]

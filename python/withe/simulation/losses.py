@@ -15,7 +15,7 @@ from withe.parts.kinds import RodPart
 from withe.simulation.session import Session
 from withe.simulation.supports import find_support
 
-__all__ = ["READOUTS", "check_in_plane", "readout_adjoints", "readout_shape"]
+__all__ = ["READOUTS", "readout_adjoints", "readout_shape"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -41,12 +41,19 @@ def readout_shape(session: Session, of: Rod | Support | NodeHandle | str, word: 
     raise ValueError(f"there is no read-out {word!r} of {part.owner}; it has {', '.join(READOUTS)}")
 
 
-def readout_adjoints(session: Session, by: Mapping[str, Any], frames: int) -> list[_core.ReadoutAdjoint]:
-    """One a frame, from arrays by words of read-outs whose first axis is the frame."""
+def readout_adjoints(
+    session: Session, by: Mapping[str, Any], frames: int, *, in_plane: bool = False
+) -> list[_core.ReadoutAdjoint]:
+    """One a frame, from arrays by words of read-outs whose first axis is the frame.
+
+    `in_plane`: of nodes of a planar scene, within its plane.
+    """
     if not isinstance(by, Mapping) or not by or not set(by) <= set(READOUTS):
         got = ", ".join(map(repr, by)) or "none" if isinstance(by, Mapping) else type(by).__name__
         raise ValueError(f"what a gradient is of must be derivatives by {', '.join(READOUTS)}, got {got}")
     tables = {word: _table(session, word, value, frames) for word, value in by.items()}
+    for word in set(tables) & set(_NODAL) if in_plane else ():
+        _check_in_plane(session, tables[word], word)
     out = []
     for frame in range(frames):
         adjoint = _core.ReadoutAdjoint()
@@ -58,7 +65,7 @@ def readout_adjoints(session: Session, by: Mapping[str, Any], frames: int) -> li
     return out
 
 
-def check_in_plane(session: Session, array: FloatArray, name: str) -> None:
+def _check_in_plane(session: Session, array: FloatArray, name: str) -> None:
     """Refuse derivatives that point out of the plane in which a planar scene moves."""
     normal = session.world.plane_normal
     if normal is None or not array.size:
@@ -74,15 +81,11 @@ def _table(session: Session, word: str, value: Any, frames: int) -> FloatArray:
     """Of every node, edge, stencil or support, as the engine takes them: (frames, rows, ...)."""
     if word in _NODAL and not isinstance(value, Mapping):
         nodes = session.directory.layout.node_count
-        table = validation.number_array(value, word, (frames, nodes, 3))
-    else:
-        if not isinstance(value, Mapping):
-            whose = "supports" if word in _OF_SUPPORTS else "rods"
-            raise ValueError(f"derivatives by {word} must be given for {whose}, such as {{{word!r}: {{arm: array}}}}")
-        table = _of_parts(session, word, value, frames)
-    if word in _NODAL:
-        check_in_plane(session, table, word)
-    return table
+        return validation.number_array(value, word, (frames, nodes, 3))
+    if not isinstance(value, Mapping):
+        whose = "supports" if word in _OF_SUPPORTS else "rods"
+        raise ValueError(f"derivatives by {word} must be given for {whose}, such as {{{word!r}: {{arm: array}}}}")
+    return _of_parts(session, word, value, frames)
 
 
 def _of_parts(session: Session, word: str, value: Mapping[Any, Any], frames: int) -> FloatArray:

@@ -141,7 +141,8 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
     ) -> Equilibrium | EquilibriumPath:
         """Find the static equilibrium that the present state leads to, and go there. Time stands still.
 
-        Supports that were moved go to their places, and loads that were changed come in, along the branch of equilibria
+        Supports that were moved go to their places, natural shapes that were set grow from those that the state last
+        moved with (from the drawn shape at first), and loads that were changed come in, along the branch of equilibria
         that begins at the present state, in steps in which no edge turns far. Where that branch ends (at a limit point)
         or is not stable any more, the scene goes on dynamically: then `branch_changed` is true. Saddles are left, so
         that a straight column that carries too much buckles.

@@ -1,0 +1,81 @@
+#include "integrators/stiffness_signs.hpp"
+
+#include <algorithm>
+#include <random>
+#include <span>
+#include <utility>
+
+#include "steps/strain_parts.hpp"
+
+namespace withe {
+
+LinearSolver& StiffnessSigns::symmetric_part() {
+  LinearSolver& matrix = equations_.assembler().solver();
+  if (matrix.symmetry() == Symmetry::symmetric) return matrix;
+  const SparsityPattern& pattern = equations_.assembler().pattern();
+  if (generation_ != equations_.assembler().generation()) {
+    generation_ = equations_.assembler().generation();
+    symmetric_ = make_linear_solver(pattern, Symmetry::symmetric);
+  }
+  const std::span<const double> from = std::as_const(matrix).values();
+  const std::span<double> to = symmetric_->values();
+  std::fill(to.begin(), to.end(), 0.0);
+  for (int column = 0, k = 0; column < pattern.size; ++column)
+    for (; k < pattern.column_starts[static_cast<std::size_t>(column) + 1]; ++k) {
+      const int row = pattern.row_indices[static_cast<std::size_t>(k)];
+      to[static_cast<std::size_t>(symmetric_->place(row, column))] +=
+          (row == column ? 1.0 : 0.5) * from[static_cast<std::size_t>(matrix.place(row, column))];
+    }
+  return *symmetric_;
+}
+
+bool StiffnessSigns::definite(LinearSolver& stiffness, double damping, const VectorX& weight) {
+  shift_ = damping * weight;
+  ++counters_.factorizations;
+  const Factorization f = stiffness.factorize({shift_.data(), static_cast<std::size_t>(shift_.size())});
+  return f.status == FactorStatus::ok && f.negative_pivots == 0;
+}
+
+bool StiffnessSigns::stable(const State& state, StepData& data) {
+  LinearSolver& solver = equations_.assembler().solver();
+  if (solver.symmetry() == Symmetry::unsymmetric) {
+    ++counters_.factorizations;
+    return solver.factorize().status == FactorStatus::ok;
+  }
+  if (definite(solver, -1.0, neutral_shift(equations_, kDoubtful))) return true;
+  // A neutral mode (a rod that may spin about its axis) comes out on either side of zero by rounding, and by what is
+  // left out of balance, F: along q(a) on which the potential is the same, K q' . q' = -F . q'', and nodes that turn
+  // by a have |q''| of |q'|; twice that, as a bar that is pulled by rounding reaches it.
+  const VectorX mode = lowest_mode(0);
+  VectorX imbalance = data.residual;
+  equations_.assembler().project(imbalance);
+  double left = 0.0;
+  const Model& model = equations_.model();
+  for (const int dof : model.node_dof)
+    left += imbalance.segment(dof, model.dimension).norm() * mode.segment(dof, model.dimension).norm();
+  left *= 2.0 * norms_.turn(mode);
+  const Curvature least = curvature_along(equations_, state, mode, data);
+  return least.value > -(least.rounding + left);
+}
+
+VectorX StiffnessSigns::lowest_mode(int seed) {
+  const Model& model = equations_.model();
+  LinearSolver& solver = equations_.assembler().solver();
+  const VectorX weight = equations_.mass().rows.cwiseMax(1e-300);
+  const double stiffness = equations_.assembler().greatest_stiffness(weight);
+  double damping = 1e-16 * stiffness;
+  while (damping < 1e3 * stiffness && !definite(solver, damping, weight)) damping *= 2.0;
+  std::mt19937 random(static_cast<unsigned>(seed + 1));
+  std::normal_distribution<double> normal;
+  VectorX direction(model.dof_count);
+  for (Eigen::Index i = 0; i < direction.size(); ++i) direction(i) = normal(random);
+  for (int k = 0; k < 20; ++k) {
+    direction = direction.cwiseProduct(weight);
+    equations_.assembler().project(direction);
+    solver.solve({direction.data(), static_cast<std::size_t>(direction.size())});
+    direction /= direction.norm();
+  }
+  return direction;
+}
+
+}  // namespace withe

@@ -1,0 +1,36 @@
+#pragma once
+/// What the signs of a stiffness's eigenvalues say of an equilibrium: whether it is stable, and where it falls to.
+
+#include <memory>
+
+#include "integrators/newton_system.hpp"
+#include "integrators/step_norms.hpp"
+
+namespace withe {
+
+/// All of it needs the matrix of the equations' last evaluation.
+class StiffnessSigns {
+ public:
+  StiffnessSigns(Equations& equations, const StepNorms& norms, Counters& counters)
+      : equations_(equations), norms_(norms), counters_(counters) {}
+
+  /// That matrix if it is symmetric, otherwise its symmetric part.
+  LinearSolver& symmetric_part();
+  /// Factorises a symmetric matrix plus `damping` of the weight; whether all its eigenvalues are positive.
+  bool definite(LinearSolver& stiffness, double damping, const VectorX& weight);
+  /// Whether no motion lowers the potential; of unsymmetric equations, whether they can be solved. `data`: of the
+  /// evaluation, and scratch.
+  bool stable(const State& state, StepData& data);
+  /// Direction of most negative curvature against mass, by inverse iteration on a matrix shifted until it is definite.
+  VectorX lowest_mode(int seed);
+
+ private:
+  Equations& equations_;
+  const StepNorms& norms_;
+  Counters& counters_;
+  std::unique_ptr<LinearSolver> symmetric_;  ///< of the assembler's `generation_`
+  int generation_ = -1;
+  VectorX shift_;
+};
+
+}  // namespace withe

@@ -1,0 +1,55 @@
+#include "model/natural_shape.hpp"
+
+#include <algorithm>
+#include <iterator>
+
+namespace withe {
+
+NaturalShape natural_shape(const Parameters& p) {
+  return {p.natural_curvature, p.natural_twist, p.edge_natural_stretch};
+}
+
+NaturalShape relaxed_shape(const Model& model, const Parameters& p, const Configuration& c) {
+  NaturalShape out = natural_shape(p);
+  for (std::size_t r = 0; r < model.place.size(); ++r)
+    for (std::size_t s = 0; s < model.place[r].size(); ++s) {
+      const StencilPlace& place = model.place[r][s];
+      const auto row = static_cast<Eigen::Index>(s);
+      Vector2 turn = Vector2::Zero();
+      double twist = 0.0, length = 0.0;
+      const auto add = [&](const auto& strain, double voronoi) {
+        const Vector2 bend =
+            model.planar() ? Vector2(strain(0) * model.planar_components[r]) : Vector2(strain(0), strain(1));
+        turn += voronoi * smooth_curvature(bend, voronoi);
+        twist += model.planar() ? 0.0 : strain(2);
+        length += voronoi;
+      };
+      const bool offset = place.bend >= 0 ? !model.bend_offset.row(place.bend).isZero(0.0)
+                                          : std::any_of(std::begin(place.half), std::end(place.half), [&](int h) {
+                                              return h >= 0 && !model.half_offset.row(h).isZero(0.0);
+                                            });
+      if (offset) continue;
+      if (place.bend >= 0)
+        add(c.bend_strain.row(place.bend), model.bend_voronoi(place.bend));
+      else
+        for (const int h : place.half)
+          if (h >= 0) add(c.half_strain.row(h), model.half_voronoi(h));
+      if (length == 0.0) continue;
+      out.curvature[r].row(row) = turn / length;
+      out.twist[r](row) = twist / length;
+    }
+  return out;
+}
+
+void set_natural_between(const Model& model, const NaturalShape& from, const NaturalShape& to, double fraction,
+                         Parameters& p) {
+  const double rest = 1.0 - fraction;
+  for (std::size_t r = 0; r < p.natural_curvature.size(); ++r) {
+    p.natural_curvature[r] = rest * from.curvature[r] + fraction * to.curvature[r];
+    p.natural_twist[r] = rest * from.twist[r] + fraction * to.twist[r];
+  }
+  p.edge_natural_stretch = rest * from.stretch + fraction * to.stretch;
+  update_natural(model, p);
+}
+
+}  // namespace withe
