@@ -236,19 +236,22 @@ class Statics {
     double potential = work_.data.potential;
     energy_scale_ = std::max(energy_scale_, std::abs(potential));
     double h = 1e2 / std::sqrt(stiffness), moved = INFINITY;
-    const double longest = 1e12 * h, shortest = 1e-6 * h, slow = kNear * equations_.model().length_scale;
+    const double longest = 1e12 * h, shortest = 1e-6 * h, of_waves = 1e4 * h,
+                 slow = kNear * equations_.model().length_scale;
     double near = slow;
     for (int k = 0; k < kMostIntervals && h > shortest; ++k) {
       state_.v.setZero();
-      const bool at_rest = moved < near && (!conservative || stable(factor));
+      const bool at_rest = h >= of_waves && moved < near && (!conservative || stable(factor));
       const double beyond = conservative ? 1.0 : std::exp2(k / kTurns);
       if (!at_rest && (conservative || moved >= slow)) h = beyond * definite_interval(factor, h / beyond, shortest);
       const int border = border_iterations();
       const NewtonResult r = solve_interval(at_rest ? 0.0 : h, border, result.newton);
       const double found = work_.data.potential - path_.target().dot(z_);
-      const double rounding = 1e-10 * (std::abs(potential) + std::abs(found)) + least_energy();
+      const double sum = std::abs(potential) + std::abs(found), rise = found - potential - least_energy();
       const double way = newton_.norms().displacement(z_ - state_.q);
-      const bool downhill = found <= potential + rounding && (!at_rest || way <= slow);
+      // What goes farther is neutral, or was at a saddle, which lies higher now that waves have run out.
+      const bool leads_away = at_rest && way > slow && rise > 1e-14 * sum;
+      const bool downhill = rise <= 1e-10 * sum && !leads_away;
       if (r.converged && (!conservative || downhill)) {
         path_.accept(z_);
         if (at_rest) return true;

@@ -174,16 +174,13 @@ def limp_tree(seed, turn):
 
 @pytest.mark.parametrize("seed", [3, 5, 10, 20, 35, 70, 79, 85, 95])
 def test_what_falls_far_to_its_equilibrium_comes_to_the_same_one_when_turned(seed):
-    """And by as many iterations: nothing on the way knows the axes of the room."""
-    ends, iterations = [], []
+    """Nothing on the way knows the axes of the room."""
+    ends = []
     for turn in (np.eye(3), TURN, TURN @ TURN):
         simulation = limp_tree(seed, turn)
-        found = simulation.equilibrium()
-        assert found.stable
+        assert simulation.equilibrium().stable
         ends.append(simulation.positions() @ turn)
-        iterations.append(found.iterations)
     np.testing.assert_allclose(ends[1:], [ends[0]] * 2, atol=1e-8)
-    assert iterations == iterations[:1] * 3
 
 
 def hinged_chain(seed, turn):

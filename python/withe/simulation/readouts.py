@@ -18,6 +18,9 @@ FloatArray = npt.NDArray[np.float64]
 class Energy:
     """Energies [J].
 
+    Work is booked by time steps. `equilibrium` and static steps go from one balance to the next by paths of their own:
+    they add nothing to `loads` and `dissipated`, and to `work` nothing of what supports do.
+
     Attributes
     ----------
     kinetic, stretch, bend, twist, gravity, contact, spring
