@@ -47,6 +47,16 @@ ContactReport report_of(const ContactProblem& problem, const Touching& t) {
     r.s = pair.piece.weights->along(t.proximity.points.s);
   }
   r.point = on_a - (pair.radius_a + 0.5 * r.gap) * r.normal;
+  if (pair.curve()) {
+    // What presses on the nodes, in all: beside what is round, the normals of the three distances part.
+    const CurveSlopes slopes = curve_slopes(pair.piece, t.proximity.curve);
+    Vec3d sum{};
+    for (int i = 0; i < pair.piece.weights->nodes; ++i)
+      sum += Vec3d{slopes.distance[3 * i], slopes.distance[3 * i + 1], slopes.distance[3 * i + 2]};
+    const double size = std::sqrt(dot(sum, sum));
+    r.force *= size;
+    r.normal = (1.0 / size) * sum;
+  }
   if (const ContactRecord* record = problem.record_of(pair.key)) {
     r.friction = record->friction;
     r.sticking = record->sticking;

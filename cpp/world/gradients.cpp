@@ -41,7 +41,8 @@ std::vector<EquilibriumGradient> World::equilibrium_gradients(const std::vector<
   const Model& model = self.model;
   for (const ReadoutAdjoint& scalar : by) scalar.check(model);
   const auto leaves = [&](const ReadoutAdjoint& scalar) { return leaves_plane(model, self.state, scalar); };
-  if (std::any_of(by.begin(), by.end(), leaves)) {
+  // Nothing leads out of the plane of a scene that is to stay in it.
+  if (!self.options.planar.value_or(false) && std::any_of(by.begin(), by.end(), leaves)) {
     World spatial(*this);
     spatial.implementation_->leave_plane("what the gradient is of");
     return spatial.equilibrium_gradients(by);

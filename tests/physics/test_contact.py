@@ -451,3 +451,25 @@ def test_rods_that_slide_over_rods_without_friction_are_not_braked(integrator: A
     masses = np.r_[0.5, np.ones(nodes - 2), 0.5] / (nodes - 1)
     lost = speed - np.linalg.norm(masses @ simulation.velocities(rod)[:, :2])
     assert abs(lost) / (9.81 * duration) < 2e-3
+
+
+@pytest.mark.parametrize("nodes", [6, 9, 17])
+@pytest.mark.parametrize("kind", ["sphere", "capsule"])
+def test_contacts_read_out_balance_weight_and_reaction_on_what_is_round(kind: str, nodes: int) -> None:
+    """On a coarse rod the three distances that make one have normals of their own."""
+    scene = withe.Scene()
+    soft = withe.Material(youngs_modulus=3e5, density=1200.0)
+    rod = scene.add_rod(start=(-0.12, 0, 0.105), end=(0.28, 0, 0.105), nodes=nodes, radius=5e-3, material=soft)
+    wall = scene.clamp(rod.start)
+    if kind == "sphere":
+        scene.add_sphere((0.02, 0, 0), 0.1)
+    else:
+        scene.add_capsule((0.02, -0.5, 0), (0.02, 0.5, 0), 0.1)
+    simulation = scene.build(integrator="static")
+    simulation.equilibrium()
+    contacts = simulation.contacts()
+    assert len(contacts) > 2
+    np.testing.assert_allclose(np.linalg.norm(contacts["normal"], axis=1), 1.0, rtol=1e-12)
+    pressing = (contacts["normal_force"][:, None] * contacts["normal"]).sum(axis=0)
+    weight = np.array([0.0, 0.0, 1200.0 * np.pi * 5e-3**2 * 0.4 * 9.81])
+    np.testing.assert_allclose(pressing + simulation.reaction(wall).force, weight, atol=1e-9)

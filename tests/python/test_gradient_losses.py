@@ -206,7 +206,6 @@ def test_what_is_no_read_out_says_so():
         ({"curvatures": {arm: np.zeros((3, 2))}}, "shape"),
         ({"curvatures": {wall: curvatures}}, "for rods"),
         ({"reaction_forces": np.zeros(3)}, "must be given for supports"),
-        ({"positions": {arm: np.ones((NODES, 3))}}, "plane"),
         ({}, "derivatives by positions"),
     ):
         with pytest.raises(ValueError, match=message):
@@ -218,6 +217,8 @@ def test_what_is_no_read_out_says_so():
         record.gradient({"reaction_forces": {wall: np.ones((2, 3))}}, ["gravity"])
     with pytest.raises(ValueError, match="not held"):
         record.gradient({"reaction_forces": {arm.end: np.ones((2, 3))}}, ["gravity"])
+    with pytest.raises(ValueError, match="plane"):
+        record.gradient({"positions": {arm: np.ones((2, NODES, 3))}}, ["gravity"])
     assert isinstance(record, withe.Record)
 
 

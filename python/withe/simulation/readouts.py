@@ -163,7 +163,12 @@ class Equilibrium:
         ValueError
             The simulation has left this equilibrium, or it follows not from what acts (a rod free to spin, a limit
             point, friction or a hand at its force limit that holds it); contact whose stiffness was not given; a wrong
-            shape; something without a gradient; what leads out of the plane of a scene built with planar=True.
+            shape; something without a gradient.
+
+        Notes
+        -----
+        What leads out of the plane of a planar scene counts, as if it were built in space; with planar=True nothing
+        does.
 
         Examples
         --------
