@@ -120,7 +120,7 @@ void Homotopy::find_tangent(Tangent& out) {
   LinearSolver& solver = equations_.assembler().solver();
   ++work_.counters.iterations;
   ++work_.counters.factorizations;
-  shift_ = neutral_shift(equations_, kRounded);
+  if (hold_neutral_) shift_ = neutral_shift(equations_, kRounded);
   out.factorization = solver.factorize({shift_.data(), static_cast<std::size_t>(shift_.size())});
   out.found = out.factorization.status == FactorStatus::ok || factorize(equations_, work_);
   if (!out.found) return;

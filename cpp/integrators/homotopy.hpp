@@ -47,6 +47,8 @@ class Homotopy {
   bool hold(double factor, VectorX& q) const { return boundary_.hold(factor, q); }
   /// From here on contacts that become stiffer yield by as much as it takes to stay in balance.
   void keep_balance() { keep_ = Keep::force; }
+  /// From here on tangents leave alone what is neutral.
+  void hold_neutral() { hold_neutral_ = true; }
   /// Whether supports did so where a tangent was last found.
   bool supports_move() const { return moves_; }
   /// What grad V - f is to be at the factor last gone to.
@@ -82,7 +84,7 @@ class Homotopy {
   VectorX imbalance_, target_, held_, moved_, shift_;
   Configuration scratch_;
   double factor_ = 0.0;
-  bool moves_ = false;
+  bool moves_ = false, hold_neutral_ = false;
   Keep keep_ = Keep::depth;
 };
 

@@ -98,7 +98,7 @@ class Newton::Solve {
         work_(work),
         z_(z),
         contact_(equations.contact()),
-        system_{equations, how.target, work},
+        system_{equations, how.target, work, how.hold_neutral},
         search_(newton.norms_, system_, newton.options_.heuristics),
         line_search_(newton.options_.line_search == LineSearch::goldstein_price),
         mixed_(how.mixed && newton.options_.mixed),

@@ -65,6 +65,7 @@ struct SolveOptions {
   bool mixed = true;    ///< with the axial forces as unknowns of their own, where the options allow it
   double interval = 0;  ///< of a time step [s], whose matrix may serve several iterations and the steps to come; the
                         ///< mixed method then sets out from work.axial_force. 0: a new matrix every iteration
+  bool hold_neutral = false;              ///< keeps neutral motions from going anywhere by rounding; slows fine rods
   bool give_up_if_cut = false;            ///< where the first step is `cut`
   double regularisation = 1;              ///< by which friction's slip tolerance is greater, in a continuation
   const Prediction* predicted = nullptr;  ///< how z was found, if it was from another solution

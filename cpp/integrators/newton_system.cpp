@@ -6,7 +6,7 @@
 
 namespace withe {
 
-bool factorize(Equations& equations, NewtonWorkspace& work, bool at_rest) {
+bool factorize(Equations& equations, NewtonWorkspace& work, bool hold_neutral) {
   const Timer timer(work.counters.solve_time);
   LinearSolver& solver = equations.assembler().solver();
   ++work.counters.factorizations;
@@ -14,7 +14,7 @@ bool factorize(Equations& equations, NewtonWorkspace& work, bool at_rest) {
     return solver.factorize({work.trial.data(), static_cast<std::size_t>(work.trial.size())}).status ==
            FactorStatus::ok;
   };
-  if (at_rest) {
+  if (hold_neutral) {
     work.trial = neutral_shift(equations, kRounded);
     if (shifted()) return true;
   } else if (solver.factorize().status == FactorStatus::ok) {
@@ -29,10 +29,6 @@ VectorX neutral_shift(const Equations& equations, double share) {
   VectorX shift(equations.model().dof_count);
   for (int i = 0; i < equations.model().dof_count; ++i) shift[i] = share * std::abs(equations.assembler().diagonal(i));
   return shift;
-}
-
-bool NewtonSystem::factorize() const {
-  return withe::factorize(equations, work, equations.problem().rule == StepRule::statics);
 }
 
 void NewtonSystem::evaluate(const VectorX& z, bool matrix, const double* axial_force) const {

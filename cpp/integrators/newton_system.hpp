@@ -33,18 +33,19 @@ struct NewtonWorkspace {
 VectorX neutral_shift(const Equations& equations, double share);
 inline constexpr double kRounded = std::numeric_limits<double>::epsilon(), kDoubtful = 64.0 * kRounded;
 
-/// Factorises the matrix as it is, `at_rest` with what keeps neutral modes from going anywhere by rounding; one that is
-/// singular is held by a shift far below every stiffness.
-bool factorize(Equations& equations, NewtonWorkspace& work, bool at_rest = false);
+/// Factorises the matrix as it is, `hold_neutral` with what keeps neutral modes from going anywhere by rounding; one
+/// that is singular is held by a shift far below every stiffness.
+bool factorize(Equations& equations, NewtonWorkspace& work, bool hold_neutral = false);
 
 struct NewtonSystem {
   Equations& equations;
   const VectorX* target;  ///< nothing: zero
   NewtonWorkspace& work;
+  bool hold_neutral = false;
 
   /// Residual, and matrix where it is asked for.
   void evaluate(const VectorX& z, bool matrix, const double* axial_force = nullptr) const;
-  bool factorize() const;
+  bool factorize() const { return withe::factorize(equations, work, hold_neutral); }
   /// step = -A^-1 residual, with the matrix as it is factorised.
   void solve_for(VectorX& step) const;
 };

@@ -41,9 +41,9 @@ constexpr int kMostJumps = 20;
 constexpr double kBeyond = 4.0;
 // A turn that is greater than this between two points of a path is a jump [rad].
 constexpr double kJump = 0.25 * kFarthestTurn;
-// What moves by less than this in an interval, over the length of the scene, is taken to its equilibrium at once; where
-// that fails, again when it moves by less than this share of what it did.
-constexpr double kNear = 1e-4, kCloser = 0.1;
+// What moves by less than this in an interval, over the length of the scene, is slow; by less than that, is taken to
+// its equilibrium; where that fails, again when it moves by less than this share of what it did.
+constexpr double kSlow = 1e-4, kNear = 1e-7, kCloser = 0.1;
 // Intervals in which a scene settles; and where loads without a potential drive it round, after how many they may be
 // twice as long.
 constexpr int kMostIntervals = 400, kTurns = 50;
@@ -92,6 +92,9 @@ class Statics {
   /// Follows the path from the present state to its end. False where not even a jump leads on.
   bool follow(StaticResult& result) {
     path_.start_out_of_balance();
+    evaluate(0.0);
+    neutral_ = signs_.neutral(state_, work_.data);
+    if (neutral_) path_.hold_neutral();
     NewtonResult& last = result.newton;
     const int most_cuts = equations_.has_potential() ? kMostCuts : kMostCutsOfFriction;
     double reached = 0.0, longest = 1.0;
@@ -183,6 +186,7 @@ class Statics {
                                          {.target = &path_.target(),
                                           .max_iterations = most_iterations(),
                                           .free_steps = border_iterations(),
+                                          .hold_neutral = neutral_,
                                           .predicted = predicted ? &prediction : nullptr},
                                          work_);
     note(r, last);
@@ -237,11 +241,13 @@ class Statics {
     energy_scale_ = std::max(energy_scale_, std::abs(potential));
     double h = 1e2 / std::sqrt(stiffness), moved = INFINITY;
     const double longest = 1e12 * h, shortest = 1e-6 * h, of_waves = 1e4 * h,
-                 slow = kNear * equations_.model().length_scale;
-    double near = slow;
+                 slow = kSlow * equations_.model().length_scale;
+    double near = kNear * equations_.model().length_scale;
     for (int k = 0; k < kMostIntervals && h > shortest; ++k) {
       state_.v.setZero();
-      const bool at_rest = h >= of_waves && moved < near && (!conservative || stable(factor));
+      // What is neutral keeps intervals from growing further.
+      const bool still = neutral_ && h >= of_waves && moved < near;
+      const bool at_rest = h >= longest || (still && (!conservative || stable(factor)));
       const double beyond = conservative ? 1.0 : std::exp2(k / kTurns);
       if (!at_rest && (conservative || moved >= slow)) h = beyond * definite_interval(factor, h / beyond, shortest);
       const int border = border_iterations();
@@ -259,8 +265,8 @@ class Statics {
         potential = found;
         h = std::min(longest, h * (r.iterations <= 4 + border ? 10.0 : r.iterations <= 8 + border ? 3.0 : 1.0));
       } else if (at_rest) {
-        if (!r.converged && moved < kOnTheWay * equations_.model().length_scale && balanced(factor)) return true;
         near = kCloser * moved;
+        h = std::min(h, 0.25 * longest);
       } else {
         h *= 0.25;
       }
@@ -269,19 +275,14 @@ class Statics {
     return false;
   }
 
-  /// Whether the present state is in balance but for rounding, as where what is neutral keeps Newton's method going.
-  bool balanced(double factor) {
-    evaluate(factor);
-    NewtonResult found;
-    return newton_.balance(work_.data, found).floor;
-  }
-
   /// An interval of backward Euler from rest, which ends in z; of no length: equilibrium.
   NewtonResult solve_interval(double h, int border, NewtonResult& last) {
     equations_.begin(state_, parameters_, h > 0.0 ? StepRule::backward_euler : StepRule::statics, h);
     z_ = state_.q;
     NewtonResult r = newton_.solve(
-        equations_, z_, {.target = &path_.target(), .max_iterations = kMostIterations, .free_steps = border}, work_);
+        equations_, z_,
+        {.target = &path_.target(), .max_iterations = kMostIterations, .free_steps = border, .hold_neutral = neutral_},
+        work_);
     note(r, last);
     r.converged = r.converged && !turned_too_far(state_, work_.data.configuration, equations_.model().planar());
     return r;
@@ -411,6 +412,7 @@ class Statics {
   Homotopy path_;
   Homotopy::Tangent tangent_;
   StiffnessSigns signs_;
+  bool neutral_ = false;  ///< whether something may move at no cost, and is held by as much as rounding
   VectorX step_, z_;
 };
 

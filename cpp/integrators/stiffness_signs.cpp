@@ -1,6 +1,7 @@
 #include "integrators/stiffness_signs.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <random>
 #include <span>
 #include <utility>
@@ -43,10 +44,25 @@ bool StiffnessSigns::stable(const State& state, StepData& data) {
     return solver.factorize().status == FactorStatus::ok;
   }
   if (definite(solver, -1.0, neutral_shift(equations_, kDoubtful))) return true;
-  // A neutral mode (a rod that may spin about its axis) comes out on either side of zero by rounding, and by what is
-  // left out of balance, F: along q(a) on which the potential is the same, K q' . q' = -F . q'', and nodes that turn
-  // by a have |q''| of |q'|; twice that, as a bar that is pulled by rounding reaches it.
+  const Lowest found = lowest(lowest_mode(0), state, data);
+  return found.curvature > -found.unknown;
+}
+
+bool StiffnessSigns::neutral(const State& state, StepData& data) {
+  LinearSolver& stiffness = symmetric_part();
+  if (definite(stiffness, -1.0, neutral_shift(equations_, kDoubtful))) return false;
+  if (equations_.assembler().solver().symmetry() == Symmetry::unsymmetric) return true;
   const VectorX mode = lowest_mode(0);
+  // A hundredth of what rounding leaves of the matrix: what is softer than that is none of its motions.
+  const double least = 0.01 * neutral_shift(equations_, kRounded).dot(mode.cwiseAbs2());
+  const Lowest found = lowest(mode, state, data);
+  return std::abs(found.curvature) <= found.unknown + least;
+}
+
+/// A neutral mode comes out on either side of zero by rounding, and by what is left out of balance, F: along q(a) on
+/// which the potential is the same, K q' . q' = -F . q'', and nodes that turn by a have |q''| of |q'|; twice that, as a
+/// bar that is pulled by rounding reaches it.
+StiffnessSigns::Lowest StiffnessSigns::lowest(const VectorX& mode, const State& state, StepData& data) {
   VectorX imbalance = data.residual;
   equations_.assembler().project(imbalance);
   double left = 0.0;
@@ -55,7 +71,7 @@ bool StiffnessSigns::stable(const State& state, StepData& data) {
     left += imbalance.segment(dof, model.dimension).norm() * mode.segment(dof, model.dimension).norm();
   left *= 2.0 * norms_.turn(mode);
   const Curvature least = curvature_along(equations_, state, mode, data);
-  return least.value > -(least.rounding + left);
+  return {least.value, least.rounding + left};
 }
 
 VectorX StiffnessSigns::lowest_mode(int seed) {

@@ -21,10 +21,18 @@ class StiffnessSigns {
   /// Whether no motion lowers the potential; of unsymmetric equations, whether they can be solved. `data`: of the
   /// evaluation, and scratch.
   bool stable(const State& state, StepData& data);
+  /// Whether a motion is neutral, as of a free body, or of a rod that may spin about its axis; of unsymmetric
+  /// equations, whether one may be.
+  bool neutral(const State& state, StepData& data);
   /// Direction of most negative curvature against mass, by inverse iteration on a matrix shifted until it is definite.
   VectorX lowest_mode(int seed);
 
  private:
+  struct Lowest {
+    double curvature, unknown;  ///< along a mode, and what rounding and the imbalance may make of it
+  };
+  Lowest lowest(const VectorX& mode, const State& state, StepData& data);
+
   Equations& equations_;
   const StepNorms& norms_;
   Counters& counters_;

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include "common/check.hpp"
 #include "geometry/rotation.hpp"
@@ -45,7 +46,13 @@ std::vector<EquilibriumGradient> World::equilibrium_gradients(const std::vector<
   if (!self.options.planar.value_or(false) && std::any_of(by.begin(), by.end(), leaves)) {
     World spatial(*this);
     spatial.implementation_->leave_plane("what the gradient is of");
-    return spatial.equilibrium_gradients(by);
+    try {
+      return spatial.equilibrium_gradients(by);
+    } catch (const std::invalid_argument& error) {
+      throw std::invalid_argument(std::string("what the gradient is of leaves the plane of the scene, and taken out of "
+                                              "it: ") +
+                                  error.what() + "; build it with planar=False");
+    }
   }
   if (!self.static_gradient) {
     Options statics = self.options;

@@ -320,24 +320,3 @@ def test_muscles_move_a_heavy_arm_along_its_branch_at_once_and_in_steps(shape, a
         getattr(small, f"set_{word}")(arm, value, over=100.0)
     small.step(100)
     np.testing.assert_allclose(simulation.positions(arm), small.positions(arm), atol=1e-8)
-
-
-@pytest.mark.parametrize("twist", [0.0, 0.5, 0.9])
-@pytest.mark.parametrize("nodes", [24, 40])
-def test_a_free_ring_of_a_straight_rod_stays_where_it_is(nodes, twist):
-    """Flat below Michell's twist 2 pi sqrt(3) E I / G J, and no force moves its centre."""
-    s = np.linspace(0.0, 2.0 * np.pi, nodes, endpoint=False)
-    rubber = withe.Material(youngs_modulus=1e6, poisson_ratio=0.3, density=1000.0)
-    scene = rods.weightless()
-    points = np.stack([np.cos(s), np.sin(s), 0.0 * s], axis=1)
-    ring = scene.add_rod(points=points, closed=True, radius=0.02, material=rubber, natural="straight")
-    simulation = scene.build(planar=False)
-    simulation.set_natural_twist(ring, twist * np.sqrt(3.0) * 1.3)
-    found = simulation.equilibrium()
-    assert found.stable
-    assert not found.branch_changed
-    positions = simulation.positions(ring)
-    assert np.abs(positions.mean(axis=0)).max() < 1e-3
-    assert np.linalg.norm(positions - positions.mean(axis=0), axis=1) == pytest.approx(
-        np.full(nodes, np.linalg.norm(positions[0] - positions.mean(axis=0))), rel=1e-6
-    )

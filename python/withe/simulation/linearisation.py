@@ -29,10 +29,10 @@ Stability = Literal["stable", "diverges", "flutters"]
 
 _BLOCK = 8
 _FULL = 8  # share of all modes, one in so many, from which on matrices are full
-_LOOK = 16  # slow modes among which what diverges is looked for,
-_LOOK_UNSYMMETRIC = 64  # and what flutters
+_LOOK = 16  # slow modes of what hangs together among which stability is looked for
 _NEUTRAL = 1e-4  # of a shift, what a square near it is known to
-_KNOWN = 1e-7  # of a shift, what a square is known to that no energy tells
+_TOLERATED = 0.1  # of a shift, what may be neutral by what is out of balance
+_KNOWN = 1e-7  # of a shift, what a square is known to
 _PAIR = 1e-6  # of a square, what its imaginary part is known to
 _ROUNDING = 64.0 * np.finfo(float).eps  # of the parts of a stiffness, as in the engine's `curvature_along`
 _RESIDUAL = 1e-9  # of an eigenvalue of the inverse
@@ -124,18 +124,50 @@ class Linearisation:
 
         "diverges" grows steadily, "flutters" swings and grows, which only loads that turn with the rod can do. Without
         damping, which may make things better or worse [Ziegler 1952]. Neutral motions (of a rod that may spin about its
-        axis) do not count. Where loads that turn with the rod make the stiffness unsymmetric, looked for among the
-        lowest 64 modes.
+        axis) do not count. Looked for among the lowest 16 modes; where loads that turn with the rod make the stiffness
+        unsymmetric, of each of the parts that nothing connects.
         """
         if self._mass.shape[0] == 0:
             return "stable"
-        squares, shapes = self._solve(min(_LOOK if self._symmetric else _LOOK_UNSYMMETRIC, self._mass.shape[0]))
+        parts = [self] if self._symmetric else self._parts()
+        return max((part._fastest() for part in parts), key=lambda found: found[0])[1]
+
+    def _fastest(self) -> tuple[float, Stability]:
+        """Greatest rate of growth [1/s], and what it is."""
+        squares, shapes = self._solve(min(_LOOK, self._mass.shape[0]))
         rates = np.sqrt(-squares.astype(complex))
-        neutral = self._neutral(shapes) if self._symmetric else self._neutral(shapes) + _KNOWN * self._shift
+        neutral = self._neutral(shapes, self._shift) + _KNOWN * self._shift
         growth = np.where(np.abs(squares) <= neutral, 0.0, np.abs(rates.real))
-        if not growth.any():
-            return "stable"
-        return "flutters" if squares[np.argmax(growth)].imag != 0.0 else "diverges"
+        fastest = int(np.argmax(growth))
+        if growth[fastest] == 0.0:
+            return 0.0, "stable"
+        return float(growth[fastest]), "flutters" if squares[fastest].imag != 0.0 else "diverges"
+
+    def _parts(self) -> list[Linearisation]:
+        """What hangs together, each by itself."""
+        from scipy.sparse.csgraph import connected_components
+
+        coupled = abs(self._assembled) + abs(self._mass)
+        count, labels = connected_components(coupled, directed=False)
+        if count == 1:
+            return [self]
+        out = []
+        for label in range(count):
+            own = np.flatnonzero(labels == label)
+            gradients = self._gradients.tocsc()[:, own].tocsr()
+            strained = np.flatnonzero(np.diff(gradients.indptr))
+            out.append(
+                Linearisation(
+                    self._geometric.tocsc()[:, own].tocsr()[own].tocsc(),
+                    gradients[strained].tocsc(),
+                    self._stiffnesses[strained],
+                    self._mass.tocsc()[:, own].tocsr()[own].tocsc(),
+                    self._displacement.tocsc()[:, own],
+                    self._turn.tocsc()[:, own],
+                    self._imbalance[own],
+                )
+            )
+        return out
 
     # Eigenvalues
 
@@ -160,6 +192,8 @@ class Linearisation:
             squares, shapes = self._full(shift)
         else:
             squares, shapes, _ = self._krylov(shift, found)
+            if not self._symmetric:
+                squares, shapes = self._with_fast_growth(squares, shapes, shift, found)
         chosen = np.argsort(squares.real, kind="stable")[:count]
         squares, shapes = squares[chosen], shapes[:, chosen]
         if self._symmetric:
@@ -178,7 +212,24 @@ class Linearisation:
         twice = (shapes * (self._geometric @ shapes)).sum(axis=0) + self._stiffnesses @ strains**2
         return np.asarray(twice / (shapes * (self._mass @ shapes)).sum(axis=0))
 
-    def _neutral(self, shapes: npt.NDArray[Any]) -> FloatArray:
+    def _with_fast_growth(
+        self, squares: npt.NDArray[Any], shapes: npt.NDArray[Any], shift: float, count: int
+    ) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+        """Also what diverges by more than -shift, which is nearest to a shift beyond it."""
+        beyond = shift
+        while not self._positive(beyond):
+            beyond *= 4.0
+        if beyond <= 4.0 * shift:
+            return squares, shapes
+        far, far_shapes, residuals = self._krylov(beyond, count)
+        grows = (far.real < -shift) & (residuals <= _RESIDUAL / (np.abs(far + beyond)))
+        near = squares.real >= -shift
+        return (
+            np.concatenate((far[grows], squares[near])),
+            np.hstack((far_shapes[:, grows], shapes[:, near])),
+        )
+
+    def _neutral(self, shapes: npt.NDArray[Any], shift: float) -> FloatArray:
         """Squares that are no greater than this may be of neutral motions.
 
         By what rounding leaves of the parts of the stiffness; and by what is left out of balance, F: along q(a) on
@@ -191,8 +242,9 @@ class Linearisation:
         turns = np.abs(self._turn @ shapes).max(axis=0, initial=0.0)
         forces = np.linalg.norm((self._displacement @ self._imbalance).reshape(-1, 3), axis=1)
         ways = np.linalg.norm((self._displacement @ shapes).reshape(len(forces), 3, -1), axis=1)
-        twice += 2.0 * (forces @ ways) * turns
-        return np.asarray(twice / np.abs((shapes.conj() * (self._mass @ shapes)).sum(axis=0)))
+        kinetic = np.abs((shapes.conj() * (self._mass @ shapes)).sum(axis=0))
+        # Where much is out of balance, as on the way somewhere, nothing is neutral.
+        return np.asarray(twice / kinetic + np.minimum(2.0 * (forces @ ways) * turns / kinetic, _TOLERATED * shift))
 
     @cached_property
     def _shift(self) -> float:
@@ -206,7 +258,7 @@ class Linearisation:
         count = _BLOCK
         for _ in range(40):
             squares, shapes, _ = self._krylov(shift, count, rounds=2)
-            moving = np.abs(squares[np.abs(squares) > np.maximum(_NEUTRAL * shift, self._neutral(shapes))])
+            moving = np.abs(squares[np.abs(squares) > np.maximum(_NEUTRAL * shift, self._neutral(shapes, shift))])
             if not len(moving) and count < self._mass.shape[0]:
                 count *= 2  # every free rod has six that are neutral
                 continue
@@ -214,7 +266,7 @@ class Linearisation:
             if 1e-7 * slowest < shift < 10.0 * slowest:
                 break
             shift = 0.1 * slowest
-        while not self._positive(shift):
+        while self._symmetric and not self._positive(shift):
             shift *= 4.0
         return float(shift)
 
