@@ -96,7 +96,6 @@ const Configuration& World::Implementation::configuration() const {
 void World::Implementation::begin_setting() {
   if (!newly_set) before_settings.set(model, parameters);
   newly_set = true;
-  note_shape();
 }
 
 void World::Implementation::account_for_settings() {

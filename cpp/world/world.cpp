@@ -355,9 +355,13 @@ void World::Implementation::set(std::span<const ParameterSetting> settings) {
   }
   for (const ParameterSetting& setting : settings) leave_plane_for(setting);
   for (const ParameterSetting& setting : settings) {
-    if (setting.kind == ParameterKind::natural_curvature) ramps[at(setting.rod)].curvature.active = false;
-    if (setting.kind == ParameterKind::natural_twist) ramps[at(setting.rod)].twist.active = false;
-    if (setting.kind == ParameterKind::natural_stretch) ramps[at(setting.rod)].stretch.active = false;
+    const bool curvature = setting.kind == ParameterKind::natural_curvature,
+               twist = setting.kind == ParameterKind::natural_twist,
+               stretch = setting.kind == ParameterKind::natural_stretch;
+    if (curvature || twist || stretch) note_shape();
+    if (curvature) ramps[at(setting.rod)].curvature.active = false;
+    if (twist) ramps[at(setting.rod)].twist.active = false;
+    if (stretch) ramps[at(setting.rod)].stretch.active = false;
   }
   const bool set_before = newly_set;
   begin_setting();

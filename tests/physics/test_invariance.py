@@ -139,27 +139,34 @@ def test_micrometre_millimetre_and_metre_scenes_move_alike(integrator):
         np.testing.assert_allclose(shape, shapes[-1], atol=1e-8)
 
 
+def anywhere(draw, length):
+    """A vector of that length."""
+    way = draw.normal(size=3)
+    return length * way / np.linalg.norm(way)
+
+
+def limp_rod(scene, draw, turn, start, way, nodes, decades, name):
+    """One that leads straight on from a place; how its section lies, and its stiffness in `decades` [Pa], are drawn."""
+    return scene.add_rod(
+        start=turn @ start,
+        end=turn @ (start + way),
+        nodes=nodes,
+        normal=turn @ np.cross(way, draw.normal(size=3)),
+        section=withe.Rectangle(width=8e-3, height=5e-3),
+        material=withe.Material(youngs_modulus=10.0 ** draw.uniform(*decades), poisson_ratio=0.4, density=1000.0),
+        name=name,
+    )
+
+
 def limp_tree(seed, turn):
     """Three soft rods on one joint, with loads and natural shapes that lead them far from where they were drawn."""
     draw = np.random.default_rng(seed)
     scene = withe.Scene(gravity=turn @ (0.0, 0.0, -9.81))
 
-    def anywhere(length):
-        way = draw.normal(size=3)
-        return length * way / np.linalg.norm(way)
-
-    knot = anywhere(0.25)
+    knot = anywhere(draw, 0.25)
     for name, start, length, nodes in (("trunk", np.zeros(3), 0.25, 11), ("leg", knot, 0.2, 9), ("arm", knot, 0.15, 8)):
-        way = knot if name == "trunk" else anywhere(length)
-        scene.add_rod(
-            start=turn @ start,
-            end=turn @ (start + way),
-            nodes=nodes,
-            normal=turn @ np.cross(way, draw.normal(size=3)),
-            section=withe.Rectangle(width=8e-3, height=5e-3),
-            material=withe.Material(youngs_modulus=10.0 ** draw.uniform(5.5, 6.5), poisson_ratio=0.4, density=1000.0),
-            name=name,
-        )
+        way = knot if name == "trunk" else anywhere(draw, length)
+        limp_rod(scene, draw, turn, start, way, nodes, (5.5, 6.5), name)
     scene.join("trunk.end", "leg.start")
     scene.join("trunk.end", "arm.start")
     scene.clamp("trunk.start")
@@ -188,27 +195,15 @@ def hinged_chain(seed, turn):
     draw = np.random.default_rng(seed)
     scene = withe.Scene(gravity=turn @ (0.0, 0.0, -9.81))
 
-    def anywhere(length):
-        way = draw.normal(size=3)
-        return length * way / np.linalg.norm(way)
-
     start, last = np.zeros(3), None
     for name in ("upper", "lower", "hand"):
-        way = anywhere(0.2)
-        rod = scene.add_rod(
-            start=turn @ start,
-            end=turn @ (start + way),
-            nodes=11,
-            normal=turn @ np.cross(way, draw.normal(size=3)),
-            section=withe.Rectangle(width=8e-3, height=5e-3),
-            material=withe.Material(youngs_modulus=10.0 ** draw.uniform(6.0, 7.0), poisson_ratio=0.4, density=1000.0),
-            name=name,
-        )
+        way = anywhere(draw, 0.2)
+        rod = limp_rod(scene, draw, turn, start, way, 11, (6.0, 7.0), name)
         if last is None:
             scene.clamp(rod.start)
         else:
-            scene.join(last.end, rod.start, kind="revolute", axis=turn @ anywhere(1.0))
-        scene.add_force(rod.node(6), turn @ anywhere(0.2))
+            scene.join(last.end, rod.start, kind="revolute", axis=turn @ anywhere(draw, 1.0))
+        scene.add_force(rod.node(6), turn @ anywhere(draw, 0.2))
         start, last = start + way, rod
     simulation = scene.build(integrator="static", planar=False)
     for name in ("upper", "lower", "hand"):

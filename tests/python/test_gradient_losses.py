@@ -206,6 +206,7 @@ def test_what_is_no_read_out_says_so():
         ({"curvatures": {arm: np.zeros((3, 2))}}, "shape"),
         ({"curvatures": {wall: curvatures}}, "for rods"),
         ({"reaction_forces": np.zeros(3)}, "must be given for supports"),
+        ({"positions": {arm: np.ones((NODES, 3))}}, "plane"),
         ({}, "derivatives by positions"),
     ):
         with pytest.raises(ValueError, match=message):

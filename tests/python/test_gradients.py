@@ -289,7 +289,10 @@ def test_what_has_no_gradient_says_so():
     drawn = Drawn(planar=True, joint=False, integrator="implicit_midpoint", adaptive=False)
     sim, arm = drawn.simulation, drawn.arm
     found = sim.equilibrium()
+    out_of_plane = np.zeros((NODES, 3))
+    out_of_plane[:, 1] = 1.0
     for value, wrt, message in (
+        (out_of_plane, [(arm, "youngs_modulus")], "plane"),
         (np.zeros((3, 3)), [(arm, "youngs_modulus")], "shape"),
         (np.zeros((NODES, 3)), [(arm, "colour")], "no 'colour'"),
         (np.zeros((NODES, 3)), [], "wrt must be a list"),

@@ -15,7 +15,7 @@ from withe.parts.handles import NodeHandle
 from withe.parts.kinds import SupportPart
 from withe.simulation.calls import Gradients, Ledger, RunJournal
 from withe.simulation.drawn import DrawnNodes, Moment
-from withe.simulation.losses import readout_adjoints, readout_shape
+from withe.simulation.losses import check_in_plane, readout_adjoints, readout_shape
 from withe.simulation.session import Session
 from withe.simulation.unknowns import (
     INITIAL_WORDS,
@@ -46,10 +46,14 @@ Loss = npt.ArrayLike | Mapping[str, Any]
 def equilibrium_gradient(session: Session, by: Loss, wrt: Sequence[Unknown]) -> list[Any]:
     """Derivatives of a scalar of the present equilibrium; see `Equilibrium.gradient`."""
     readers = unknown_readers(session, wrt)
+    in_plane = session.options.planar is True
     if isinstance(by, Mapping):
-        adjoints = readout_adjoints(session, {word: _with_frame(value) for word, value in by.items()}, 1)
+        frames = {word: _with_frame(value) for word, value in by.items()}
+        adjoints = readout_adjoints(session, frames, 1, in_plane=in_plane)
     else:
         by_positions = validation.number_array(by, "dL_dx", (session.directory.layout.node_count, 3))
+        if in_plane:
+            check_in_plane(session, by_positions, "dL_dx")
         adjoints = [_by_positions(by_positions)]
     (found,) = session.world.equilibrium_gradients(adjoints)
     return [read(found) for read in readers]

@@ -15,7 +15,7 @@ from withe.parts.kinds import RodPart
 from withe.simulation.session import Session
 from withe.simulation.supports import find_support
 
-__all__ = ["READOUTS", "readout_adjoints", "readout_shape"]
+__all__ = ["READOUTS", "check_in_plane", "readout_adjoints", "readout_shape"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -53,7 +53,7 @@ def readout_adjoints(
         raise ValueError(f"what a gradient is of must be derivatives by {', '.join(READOUTS)}, got {got}")
     tables = {word: _table(session, word, value, frames) for word, value in by.items()}
     for word in set(tables) & set(_NODAL) if in_plane else ():
-        _check_in_plane(session, tables[word], word)
+        check_in_plane(session, tables[word], word)
     out = []
     for frame in range(frames):
         adjoint = _core.ReadoutAdjoint()
@@ -65,7 +65,7 @@ def readout_adjoints(
     return out
 
 
-def _check_in_plane(session: Session, array: FloatArray, name: str) -> None:
+def check_in_plane(session: Session, array: FloatArray, name: str) -> None:
     """Refuse derivatives that point out of the plane in which a planar scene moves."""
     normal = session.world.plane_normal
     if normal is None or not array.size:

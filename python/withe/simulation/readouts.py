@@ -163,7 +163,7 @@ class Equilibrium:
         ValueError
             The simulation has left this equilibrium, or it follows not from what acts (a rod free to spin, a limit
             point, friction or a hand at its force limit that holds it); contact whose stiffness was not given; a wrong
-            shape; something without a gradient.
+            shape; something without a gradient; positions off the plane of a scene built with planar=True.
 
         Notes
         -----
