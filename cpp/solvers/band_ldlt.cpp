@@ -4,23 +4,20 @@
 #include <string>
 #include <vector>
 
-#include "solvers/band_ldlt_kernel.hpp"
+#include "solvers/band_storage.hpp"
 #include "solvers/pattern_lookup.hpp"
 
 namespace withe {
 namespace {
 
 /// values(): column after column of the lower band, `stride` numbers each, those below the matrix never used.
-template <class Band>
-class BandLdlt final : public LinearSolver {
+class SymmetricBand : public LinearSolver {
  public:
-  BandLdlt(const SparsityPattern& pattern, Band band)
+  SymmetricBand(const SparsityPattern& pattern, int width)
       : pattern_(pattern),
-        band_(band),
         half_bandwidth_(pattern.half_bandwidth()),
-        values_(static_cast<std::size_t>(pattern.size) * band.stride + kPadding, 0.0),
-        factor_(static_cast<std::size_t>(pattern.size + band.half_bandwidth) * band.stride, 0.0),
-        inverse_pivots_(pattern.size, 0.0) {}
+        stride_(band_column_stride(width)),
+        values_(static_cast<std::size_t>(pattern.size) * stride_ + kBandPadding + kPadding, 0.0) {}
 
   int size() const override { return pattern_.size; }
   Symmetry symmetry() const override { return Symmetry::symmetric; }
@@ -28,32 +25,23 @@ class BandLdlt final : public LinearSolver {
 
   std::ptrdiff_t offset(int row, int column) const override {
     find_lower_entry(pattern_, row, column);
-    return static_cast<std::ptrdiff_t>(column) * band_.stride + (row - column);
+    return static_cast<std::ptrdiff_t>(column) * stride_ + (row - column);
   }
-  std::span<double> values() override { return {values_.data(), values_.size() - kPadding}; }
-  std::span<const double> values() const override { return {values_.data(), values_.size() - kPadding}; }
+  std::span<double> values() override { return {matrix(), values_.size() - kBandPadding - kPadding}; }
+  std::span<const double> values() const override { return {matrix(), values_.size() - kBandPadding - kPadding}; }
 
   Factorization factorize(std::span<const double> shift) override {
     require_shift(shift, size());
-    double* factor = factor_.data() + static_cast<std::ptrdiff_t>(band_.half_bandwidth) * band_.stride;
-    band_ldlt::factorize(band_, size(), values_.data(), shift.empty() ? nullptr : shift.data(), factor,
-                         inverse_pivots_.data());
-    Factorization result;
-    bool usable = true;
-    for (int k = 0; k < size(); ++k) {
-      const double pivot = factor[static_cast<std::ptrdiff_t>(k) * band_.stride];
-      usable &= is_usable_pivot(pivot);
-      result.negative_pivots += pivot < 0.0;
-    }
-    if (!usable) result = {FactorStatus::singular, 0};
-    factorized_ = usable;
-    return result;
+    const std::span<const double> inverse_pivots = eliminate(shift.empty() ? nullptr : shift.data());
+    factorized_ = std::all_of(inverse_pivots.begin(), inverse_pivots.end(), is_usable_pivot);  // as good as its inverse
+    if (!factorized_) return {FactorStatus::singular, 0};
+    const auto negative = std::count_if(inverse_pivots.begin(), inverse_pivots.end(), [](double d) { return d < 0.0; });
+    return {FactorStatus::ok, static_cast<int>(negative)};
   }
 
   void solve(std::span<double> right_hand_side) const override {
     require_solvable(factorized_, right_hand_side, size());
-    const double* factor = factor_.data() + static_cast<std::ptrdiff_t>(band_.half_bandwidth) * band_.stride;
-    band_ldlt::solve(band_, size(), factor, inverse_pivots_.data(), right_hand_side.data());
+    substitute(right_hand_side.data());
   }
   void solve_transposed(std::span<double> right_hand_side) const override { solve(right_hand_side); }
 
@@ -61,7 +49,7 @@ class BandLdlt final : public LinearSolver {
     require_product(x, y, size());
     std::fill(y.begin(), y.end(), 0.0);
     for (int k = 0; k < size(); ++k) {
-      const double* column = values_.data() + static_cast<std::ptrdiff_t>(k) * band_.stride;
+      const double* column = matrix() + static_cast<std::ptrdiff_t>(k) * stride_;
       double sum = column[0] * x[k];
       const int last = std::min(half_bandwidth_, size() - 1 - k);
       for (int m = 1; m <= last; ++m) {
@@ -72,35 +60,88 @@ class BandLdlt final : public LinearSolver {
     }
   }
 
-  std::unique_ptr<LinearSolver> clone() const override { return std::make_unique<BandLdlt>(*this); }
+ protected:
+  /// Factors of the matrix, with a shift of the diagonal or nothing; what the pivots are the inverse of.
+  virtual std::span<const double> eliminate(const double* shift) = 0;
+  virtual void substitute(double* x) const = 0;
+  double* matrix() { return values_.data() + kBandPadding; }
+  const double* matrix() const { return values_.data() + kBandPadding; }
 
- private:
   SparsityPattern pattern_;
-  Band band_;
   int half_bandwidth_;
+  int stride_;
   std::vector<double> values_;
-  std::vector<double> factor_;
-  std::vector<double> inverse_pivots_;
   bool factorized_ = false;
 };
 
-template <int kHalfBandwidth>
-std::unique_ptr<LinearSolver> make_fixed(const SparsityPattern& pattern) {
-  using Band = band_ldlt::FixedBand<kHalfBandwidth>;
-  return std::make_unique<BandLdlt<Band>>(pattern, Band());
-}
+/// Of rods and chains: as wide as kernels know; narrower bands are padded with zeros.
+class BandLdlt final : public SymmetricBand {
+ public:
+  BandLdlt(const SparsityPattern& pattern, const BandKernels& kernels)
+      : SymmetricBand(pattern, kernels.half_bandwidth),
+        kernels_(kernels),
+        storage_(pattern.size, kernels.half_bandwidth) {}
+  std::unique_ptr<LinearSolver> clone() const override { return std::make_unique<BandLdlt>(*this); }
+
+ private:
+  std::span<const double> eliminate(const double* shift) override {
+    kernels_.factorize_symmetric(storage_.factor(), matrix(), shift);
+    return storage_.inverse_pivots();
+  }
+  void substitute(double* x) const override { kernels_.solve_symmetric(storage_.factor(), x); }
+
+  const BandKernels& kernels_;
+  BandStorage storage_;
+};
+
+/// Of any width, column after column of L. For comparison: the sparse solver is faster.
+class WideBandLdlt final : public SymmetricBand {
+ public:
+  explicit WideBandLdlt(const SparsityPattern& pattern)
+      : SymmetricBand(pattern, pattern.half_bandwidth()),
+        factor_(values_.size(), 0.0),
+        inverse_pivots_(pattern.size, 0.0) {}
+  std::unique_ptr<LinearSolver> clone() const override { return std::make_unique<WideBandLdlt>(*this); }
+
+ private:
+  /// Column k of L, its first entry the diagonal.
+  double* column(int k) { return factor_.data() + static_cast<std::ptrdiff_t>(k) * stride_; }
+  const double* column(int k) const { return factor_.data() + static_cast<std::ptrdiff_t>(k) * stride_; }
+
+  /// u(i, k) = a(i, k) - sum over m of l(i, k - m) d(k - m) l(k, k - m), l(i, k) = u(i, k) / d(k).
+  std::span<const double> eliminate(const double* shift) override {
+    std::copy_n(matrix(), static_cast<std::ptrdiff_t>(size()) * stride_, factor_.begin());
+    for (int k = 0; k < size(); ++k) {
+      double* newest = column(k);
+      if (shift) newest[0] += shift[k];
+      for (int m = std::min(half_bandwidth_, k); m >= 1; --m) {
+        const double* earlier = column(k - m);
+        const double weight = earlier[m] / inverse_pivots_[k - m];
+        for (int i = 0; i <= half_bandwidth_ - m; ++i) newest[i] -= earlier[m + i] * weight;
+      }
+      inverse_pivots_[k] = 1.0 / newest[0];
+      for (int i = 1; i <= half_bandwidth_; ++i) newest[i] *= inverse_pivots_[k];
+    }
+    return inverse_pivots_;
+  }
+  void substitute(double* x) const override {
+    for (int k = 0; k < size(); ++k)
+      for (int m = std::min(half_bandwidth_, k); m >= 1; --m) x[k] -= column(k - m)[m] * x[k - m];
+    for (int k = size() - 1; k >= 0; --k) {
+      x[k] *= inverse_pivots_[k];
+      for (int m = std::min(half_bandwidth_, size() - 1 - k); m >= 1; --m) x[k] -= column(k)[m] * x[k + m];
+    }
+  }
+
+  std::vector<double> factor_, inverse_pivots_;
+};
 
 }  // namespace
 
 std::unique_ptr<LinearSolver> make_band_ldlt(const SparsityPattern& pattern) {
-  // Narrower bands are padded with zeros: cheaper than loops whose length the compiler does not know.
-  const int half_bandwidth = pattern.half_bandwidth();
-  if (half_bandwidth <= 5) return make_fixed<5>(pattern);
-  if (half_bandwidth <= 10) return make_fixed<10>(pattern);
-  if (half_bandwidth <= 16) return make_fixed<16>(pattern);
-  if (half_bandwidth <= 24) return make_fixed<24>(pattern);
-  const band_ldlt::AnyBand band{half_bandwidth, band_ldlt::column_stride(half_bandwidth)};
-  return std::make_unique<BandLdlt<band_ldlt::AnyBand>>(pattern, band);
+  if (const BandKernels* kernels = band_kernels(pattern.half_bandwidth()))
+    return std::make_unique<BandLdlt>(pattern, *kernels);
+  return std::make_unique<WideBandLdlt>(pattern);
 }
 
 }  // namespace withe

@@ -1,21 +1,18 @@
 #pragma once
-/// The arithmetic of the unsymmetric band solver, by the instruction set in use. Raw pointers only: the kernels behind
-/// share no code with the rest.
+/// The arithmetic of the unsymmetric band solver where rows are exchanged, by the instruction set in use. Raw pointers
+/// only: the kernels behind share no code with the rest.
 ///
 /// While column j is eliminated, rows j ... j + w are active (w the half bandwidth). Row i of `work` holds columns
 /// i - w ... i + 2 w: exchanges widen U to 2 w. Multipliers stay where they were made, as the exchanges of later
 /// columns are applied to the right-hand side in turn. Rows are padded, to the right with zeros, so that they are read
 /// in packs, which begin where columns are multiples of their length.
 
-#include "common/instruction_set.hpp"
+#include "solvers/band_kernels.hpp"
 
 namespace withe {
 
-/// Rows of U and of multipliers are this multiple of numbers long.
-constexpr int kBandLuPadding = 4;
-constexpr int band_lu_padded(int count) { return (count + kBandLuPadding - 1) / kBandLuPadding * kBandLuPadding; }
 /// From one row of `work` to the next in the same column: columns i - w ... i + 2 w, padded to either side.
-constexpr int band_lu_stride(int width) { return band_lu_padded(3 * width + 2 * kBandLuPadding); }
+constexpr int band_lu_stride(int width) { return band_padded(3 * width + 2 * kBandPadding); }
 
 struct BandLuFactor {
   int size = 0, width = 0;
@@ -23,6 +20,7 @@ struct BandLuFactor {
   double* work = nullptr;         ///< column 0 of row 0, aligned to packs; of size rows: U from the diagonal on
   double* multipliers = nullptr;  ///< size rows: of the rows below, by which the pivot row was taken off them
   double* inverse_pivots = nullptr;
+  double* row_scales = nullptr;  ///< 1 / the greatest entry of each row of the matrix
   int* pivot_rows = nullptr;    ///< with which row each was exchanged
   int* last_columns = nullptr;  ///< of each row of U
 };

@@ -6,10 +6,11 @@
 namespace withe::WITHE_INSTRUCTION_SET {
 namespace {
 
-static_assert(kBandLuPadding % kLanes == 0);
+static_assert(kBandPadding % kLanes == 0);
 
 /// Threshold pivoting: the diagonal is kept where nothing in its column is greater by more than this factor, for
-/// exchanges widen the band [Duff, Erisman and Reid 2017, sec. 5.2].
+/// exchanges widen the band [Duff, Erisman and Reid 2017, sec. 5.2]. Entries are measured by the greatest of their row,
+/// so that pivots do not depend on units [Golub and Van Loan 2013, sec. 3.5.2].
 constexpr double kPivotThreshold = 0.1;
 
 double magnitude(double a) { return __builtin_fabs(a); }
@@ -24,37 +25,35 @@ double* multipliers_of(const BandLuFactor& a, int column) {
   return a.multipliers + static_cast<std::ptrdiff_t>(column) * a.multiplier_stride;
 }
 
+double greater(double a, double b) { return b <= a ? a : b; }
+
 void load_row(const BandLuFactor& a, int row, const double* values, const double* shift) {
   const double* value = values + static_cast<std::ptrdiff_t>(row) * a.value_stride;
   double* work = entry(a, row, row - a.width);
-  for (int i = -kBandLuPadding; i < 0; ++i) work[i] = 0.0;
-  for (int i = 0; i < a.value_stride; ++i) work[i] = value[i];
-  for (int i = a.value_stride; i <= a.work_stride - kBandLuPadding; ++i) work[i] = 0.0;
+  for (int i = -kBandPadding; i < 0; ++i) work[i] = 0.0;
+  double greatest = 0.0;
+  for (int i = 0; i < a.value_stride; ++i) {
+    work[i] = value[i];
+    greatest = greater(greatest, magnitude(value[i]));
+  }
+  a.row_scales[row] = greatest > 0.0 ? 1.0 / greatest : 1.0;
+  for (int i = a.value_stride; i <= a.work_stride - kBandPadding; ++i) work[i] = 0.0;
   if (shift) work[a.width] += shift[row];
 }
 
-/// A number that is not finite wins, so that it is met as a pivot and reported.
-double greater(double a, double b) { return b <= a ? a : b; }
-
 int find_pivot(const BandLuFactor& a, int column, int last_row) {
-  const double* place = entry(a, column, column);
-  const std::ptrdiff_t step = a.work_stride;
-  const int count = last_row - column;
-  double odd = 0.0, even = 0.0;  // neither waits for the other
-  for (int i = 1; i <= count; i += 2) odd = greater(odd, magnitude(place[step * i]));
-  for (int i = 2; i <= count; i += 2) even = greater(even, magnitude(place[step * i]));
-  const double own = magnitude(place[0]);
-  if (own >= kPivotThreshold * odd && own >= kPivotThreshold * even) return column;
+  const auto measure = [&](int row) { return magnitude(entry(a, row, column)[0]) * a.row_scales[row]; };
   int best = column;
-  double most = own;
-  for (int i = 1; i <= count; ++i) {
-    const double other = magnitude(place[step * i]);
-    if (!(other <= most)) {
+  double most = measure(column);
+  const double own = most;
+  for (int row = column + 1; row <= last_row; ++row) {
+    const double other = measure(row);
+    if (!(other <= most)) {  // one that is not finite wins, so that it is met as a pivot and reported
       most = other;
-      best = column + i;
+      best = row;
     }
   }
-  return best;
+  return own >= kPivotThreshold * most ? column : best;
 }
 
 void exchange(double* a, double* b, int count) {
@@ -115,7 +114,10 @@ bool factorize(const BandLuFactor& a, const double* values, const double* shift)
     const int pivot_row = find_pivot(a, j, last_row);
     const int reached = smaller(pivot_row + a.width, a.size - 1);
     if (reached > last_column) last_column = reached;
-    if (pivot_row != j) exchange(entry(a, j, j), entry(a, pivot_row, j), last_column - j + 1);
+    if (pivot_row != j) {
+      exchange(entry(a, j, j), entry(a, pivot_row, j), last_column - j + 1);
+      exchange(a.row_scales + j, a.row_scales + pivot_row, 1);
+    }
     const double pivot = entry(a, j, j)[0];
     if (!is_usable(pivot)) return false;
     a.pivot_rows[j] = pivot_row;

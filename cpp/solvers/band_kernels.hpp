@@ -1,0 +1,55 @@
+#pragma once
+/// The arithmetic of band factorisations without exchanges, by the instruction set in use: A = L U, the diagonal of U
+/// one, row after row [Crout's order; Golub and Van Loan 2013, sec. 3.2.9]. Of a symmetric matrix L^T = D U, and half
+/// of the work is left. Raw pointers only: the kernels behind share no code with the rest.
+///
+/// A row is complete in registers before it is stored. Rows lie `stride` numbers apart, column 0 of row 0 at the
+/// pointer, so that packs of columns begin at multiples of their length in every row, and each is read as it was last
+/// written: a read across two that are on their way to memory waits for both.
+
+#include <cstddef>
+
+#include "common/instruction_set.hpp"
+
+namespace withe {
+
+/// Packs of the widest instruction set.
+constexpr int kBandPadding = 4;
+constexpr int band_padded(int count) { return (count + kBandPadding - 1) / kBandPadding * kBandPadding; }
+/// From one row to the next in the same column: a row of U or of L, from a multiple of kBandPadding to another.
+constexpr int band_stride(int half_bandwidth) { return band_padded(half_bandwidth + kBandPadding); }
+
+/// `half_bandwidth` rows, and as many numbers and kBandPadding of `scale` and `reach`, lie before row 0 and after the
+/// last: zeros, so that the first and last rows need no special case.
+struct BandFactor {
+  int size = 0;
+  double* upper = nullptr;           ///< U beyond its diagonal
+  double* lower = nullptr;           ///< L beyond its diagonal; of a symmetric matrix L^T = D U with it, by rows
+  double* inverse_pivots = nullptr;  ///< of the diagonal of L
+  double* scale = nullptr;           ///< 1 / sqrt |a_ii|: units in which the diagonal is one
+  double* reach = nullptr;           ///< sum of |u_ij| scale_j over a row of U
+};
+
+struct BandKernels {
+  int half_bandwidth;
+  /// From row after row of the band, 2 w + 1 numbers each (w the half bandwidth), kBandPadding numbers before and after
+  /// them, and what is added to the diagonal (or nothing). False where | L | | U |, by which errors of the factors are
+  /// bounded [Higham 2002, thm 9.3], is beyond kGreatestGrowth in units in which the diagonal of A is one.
+  bool (*factorize)(const BandFactor& factor, const double* values, const double* shift);
+  /// From column after column of the lower triangle, band_column_stride(w) numbers each.
+  void (*factorize_symmetric)(const BandFactor& factor, const double* values, const double* shift);
+  void (*solve)(const BandFactor& factor, double* x);
+  void (*solve_transposed)(const BandFactor& factor, double* x);
+  void (*solve_symmetric)(const BandFactor& factor, double* x);
+};
+
+/// Numbers a column of a symmetric matrix.
+constexpr int band_column_stride(int half_bandwidth) { return (half_bandwidth + 3) / 2 * 2; }
+
+/// Where rounding of the factors, a multiple of it, would cost more than two digits.
+constexpr double kGreatestGrowth = 100.0;
+
+/// Those of the narrowest band that holds this one: 5 (a rod in a plane), 10 (in space), 16, 24; none of a wider.
+const BandKernels* band_kernels(int half_bandwidth);
+
+}  // namespace withe
