@@ -205,7 +205,8 @@ def load_json(
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except (json.JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise ValueError(f"{path} is not a withe file, or damaged: it is no JSON ({error})") from error
+        other = "" if path.suffix == ".json" else "; the file to read is the .json"
+        raise ValueError(f"{path} is not a withe file, or damaged: it is no JSON ({error}){other}") from error
     content = _checked_header(path, content, kind, version)
     try:
         return read(content)

@@ -234,3 +234,39 @@ def test_a_block_that_is_pushed_at_once_gathers_the_speed_that_its_anchors_give_
             print(f"pushed at once, {force} N, tolerance {tolerance}:", speeds[-1], exact)
             assert 0.75 * exact < speeds[-1] < exact  # as contact is up to a quarter stiffer than it has to be
         assert speeds[0] / speeds[1] == pytest.approx(2.0, rel=0.1)  # goes with the root of the tolerance
+
+
+@pytest.mark.parametrize("time_step", [2e-3, 5e-4, 1e-4, 2e-5])
+def test_what_friction_takes_throws_no_rod_up(time_step):
+    """A rod that lies on two rails and is pushed along itself: what contact had yielded pressed again at once, ten
+    times as hard as the rod weighs in short steps, on energy that friction had taken."""
+    radius, length = 5e-3, 0.2
+    scene = withe.Scene()
+    rubber = withe.Material(youngs_modulus=1e9, poisson_ratio=0.4, density=1200.0)
+    rod = scene.add_rod(start=(-0.5 * length, 0, 0), end=(0.5 * length, 0, 0), nodes=11, radius=radius, material=rubber)
+    for x in (-0.0487, 0.0479):
+        rail = scene.add_rod(
+            start=(x, -0.06, -2 * radius),
+            end=(x, 0.06, -2 * radius),
+            nodes=7,
+            radius=radius,
+            material=withe.Material(youngs_modulus=1e11, poisson_ratio=0.4, density=1200.0),
+        )
+        for node in range(7):
+            (scene.clamp if node in (0, 6) else scene.pin)(rail.node(node))
+    scene.enable_contact(friction=0.3)
+    simulation = scene.build(time_step=time_step)
+    simulation.step(round(0.1 / time_step))
+    simulation.set_velocities(rod, (0.5, 0, 0))
+    height, dissipated = simulation.positions(rod)[:, 2].mean(), simulation.energy().dissipated
+    work, risen = 0.0, 0.0
+    for _ in range(round(0.02 / time_step)):
+        momentum, speed = simulation.momentum().linear[0], simulation.velocities(rod)[:, 0].mean()
+        simulation.step()
+        way = 0.5 * time_step * (speed + simulation.velocities(rod)[:, 0].mean())
+        work += (momentum - simulation.momentum().linear[0]) / time_step * way
+        risen = max(risen, simulation.positions(rod)[:, 2].mean() - height)
+    heat = simulation.energy().dissipated - dissipated
+    print(f"steps of {time_step} s: risen {risen:.2e} m, heat {heat:.4e} of {work:.4e} J")
+    assert risen < 0.01 * radius
+    assert heat == pytest.approx(work, rel=0.01)

@@ -224,6 +224,10 @@ def test_bad_patterns_say_what_is_wrong(arguments, message):
         (lambda: measure(image=np.zeros((50, 50, 3), np.uint8)), "needs scale"),
         (lambda: measure(image=np.zeros((50, 50, 3), np.uint8), scale=1e-3), "it is plain"),
         (lambda: Pattern(wave()).feasibility(Cable.dlo(2), -0.1), "friction"),
+        (
+            lambda: Pattern(wave()).feasibility(Cable.dlo(2), 40.0),
+            "friction must be at most 10, got 40: is it in per cent",
+        ),
         (lambda: Pattern(wave()).feasibility(Cable(0.3, 1e-3, 0.03), 0.4), "pattern 0.5"),
         (lambda: Pattern(arc(0.03, 3.0)).feasibility(Cable(1.0, 0.04, 0.05), 0.4), "tighter than the cable's own"),
         (lambda: Pattern(arc(0.01, 6.0)).feasibility(Cable(1.0, 2e-3, 0.1), 0.4), "gravito-bending length over 6"),

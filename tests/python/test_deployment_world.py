@@ -236,3 +236,17 @@ def test_a_held_end_stays_where_the_pattern_begins(arc):
     ends = found.record.positions("cable")[:, 0]
     assert np.ptp(ends[:, :2], axis=0).max() < 1e-6
     assert np.ptp(ends[:, 2]) > 0.01
+
+
+def test_a_cable_as_thick_as_a_hose_is_laid_as_exactly_for_its_size():
+    """What is ten times as large comes ten times as far off, for the jaw holds it as rigidly: it was led to
+    another pattern."""
+    errors = []
+    for scale in (1.0, 10.0):
+        cable = Cable(0.36 * scale, 1.6e-3 * scale, 0.03 * scale)
+        pattern = Pattern(scale * bend(1.0), smoothing=3e-4 * scale)
+        motion = plan(cable, pattern, speed=0.04 * np.sqrt(scale), progress=False)
+        found = deploy(motion, floor=0.6, nodes=NODES, quasi_static=True, progress=False)
+        errors.append(found.error / scale)
+    print("error over size [mm]:", 1e3 * np.array(errors))
+    assert errors[1] == pytest.approx(errors[0], rel=0.1)

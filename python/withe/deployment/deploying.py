@@ -81,7 +81,8 @@ def deploy(
     Nothing of the plan but the jaw's motion is known there: the cable has thickness, weight, torsion and inertia,
     touches the floor where it comes to, and sticks to it by anchored friction at its surface, on which it rolls.
     Backward Euler steps; density 1180 kg/m^3, Kelvin-Voigt viscosity of .02 s. The jaw holds 10 mm of the cable; its
-    pads yield by .5 mm/N and 20 rad/(N m), so that a jaw too low rests on the floor.
+    pads yield by .5 mm/N and 20 rad/(N m), and less under heavy and stiff cables, by 1e-4 Lgb^3 / EI and
+    Lgb / (300 EI); so a jaw too low rests on the floor.
 
     Parameters
     ----------

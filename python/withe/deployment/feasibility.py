@@ -19,6 +19,7 @@ __all__ = ["Controller", "Feasibility", "Slip", "examine"]
 
 FloatArray = npt.NDArray[np.float64]
 Controller = Literal["exact", "least_friction"]
+_PER_CENT = 10.0  # what is more has been given so
 _BEND_STIFFNESS = 2.0  # EI in units of w Lgb^2
 _NEIGHBOURS = 4.0  # radii along a cable within which its parts are no obstacle to each other, times pi
 
@@ -143,6 +144,8 @@ def examine(
 ) -> Feasibility:
     """What `Pattern.feasibility` does; `force` of the grasps there, shape (nodes, 3), where it is known."""
     friction = validation.positive(friction, "friction")
+    if friction > _PER_CENT:
+        raise ValueError(f"friction must be at most {_PER_CENT:g}, got {friction:g}: is it in per cent?")
     validation.choice(controller, "controller", ("exact", "least_friction"))
     if force is None:
         force = grasps_along(pattern, cable, controller).force

@@ -322,7 +322,7 @@ class Pattern:
         Raises
         ------
         ValueError
-            Negative friction; a cable shorter than the pattern, or one that cannot bend so tightly.
+            Friction that is negative or above 10; a cable shorter than the pattern, or one that cannot bend so tightly.
 
         Examples
         --------

@@ -13,7 +13,7 @@ from withe.common import validation
 from withe.deployment.cable import JAW
 from withe.deployment.deploying import DRAWN, drawn_setup
 from withe.deployment.planning import Plan
-from withe.deployment.world import JAW_STIFFNESS, Setup, hung, jaw_path
+from withe.deployment.world import Setup, hung, jaw_path, jaw_stiffness
 from withe.parts.handles import Rod
 from withe.simulation import Simulation
 from withe.simulation.hands import RunningHand
@@ -243,7 +243,7 @@ class _Table:
                 return pick, None
             at = float(s[away.argmin()])
         at = float(np.clip(at, 0.5 * JAW, s[-1] - 0.5 * JAW))
-        return pick, self.simulation.grasp(cable, at=at, length=JAW, stiffness=JAW_STIFFNESS, name=name)
+        return pick, self.simulation.grasp(cable, at=at, length=JAW, stiffness=jaw_stiffness(setup.cable), name=name)
 
     def _rest(self, name: str) -> None:
         self.simulation.run(_RESTS, progress=False)

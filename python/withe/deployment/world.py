@@ -18,13 +18,14 @@ from withe.scene import Scene
 from withe.simulation import Simulation
 from withe.simulation.hands import RunningHand
 
-__all__ = ["JAW_STIFFNESS", "ROLLING_FRICTION", "Motion", "Setup", "hung", "jaw_path", "lay", "place"]
+__all__ = ["ROLLING_FRICTION", "Motion", "Setup", "hung", "jaw_path", "jaw_stiffness", "lay", "place"]
 
 FloatArray = npt.NDArray[np.float64]
 _DENSITY, _VISCOUS_TIME, _GRAVITY = 1180.0, 0.02, 9.81  # [kg/m^3], [s], [m/s^2]
 _SETTLING = 2.0  # [s] after the jaw has opened
 ROLLING_FRICTION = 0.01  # of the floor: a couple over normal force times radius, that of rubber on what is hard
-JAW_STIFFNESS = (2e3, 0.05)  # [N/m, N m/rad], of its pads: hundreds of times the cable's
+_JAW_STIFFNESS = (2e3, 0.05)  # [N/m, N m/rad], of its pads at least; and so many times EI / Lgb^3, EI / Lgb
+_JAW_RATIOS = (1e4, 300.0)
 _STRESSED = 1.0  # [s] in which a cable that is put down takes its stress
 _RECORD_EVERY = 0.1  # [s]
 
@@ -77,7 +78,7 @@ def lay(setup: Setup, motion: Motion, *, progress: bool) -> tuple[FloatArray, Fl
         Of the motion, every tenth of a second.
     """
     scene, cable = _scene(setup, _hanging(setup, motion))
-    jaw_part = scene.grasp(cable, at=setup.cable.length, length=JAW, stiffness=JAW_STIFFNESS, name="jaw")
+    jaw_part = scene.grasp(cable, at=setup.cable.length, length=JAW, stiffness=jaw_stiffness(setup.cable), name="jaw")
     if setup.start_held:
         scene.pin(cable.start, free=(0.0, 0.0, 1.0))
     simulation = scene.build(integrator=_integrator(setup), time_step=setup.time_step, planar=False)
@@ -104,7 +105,7 @@ def hang(setup: Setup) -> FloatArray:
     points = setup.arc_length[:, None] * [0.0, 0.0, 1.0]
     scene = Scene(gravity=(0.0, 0.0, -_GRAVITY))
     cable = _add_cable(scene, setup.cable, points, "cable")
-    scene.grasp(cable, at=setup.cable.length, length=JAW, stiffness=JAW_STIFFNESS, name="jaw")
+    scene.grasp(cable, at=setup.cable.length, length=JAW, stiffness=jaw_stiffness(setup.cable), name="jaw")
     simulation = scene.build(planar=False)
     simulation.set_natural_curvature(cable, setup.cable.natural_curvature)
     simulation.equilibrium()
@@ -147,8 +148,8 @@ def hung(
     for number, (setup, motion, height) in enumerate(zip(setups, motions, heights, strict=True)):
         points = _hanging(setup, motion) + np.array([0.0, 0.0, height])
         cable = _add_cable(scene, setup.cable, points, f"cable {number}")
-        at = setup.cable.length
-        jaws.append(scene.grasp(cable, at=at, length=JAW, stiffness=JAW_STIFFNESS, name=f"jaw {number}"))
+        at, stiffness = setup.cable.length, jaw_stiffness(setup.cable)
+        jaws.append(scene.grasp(cable, at=at, length=JAW, stiffness=stiffness, name=f"jaw {number}"))
         cables.append(cable)
     simulation = scene.build(integrator=_integrator(setups[0]), time_step=setups[0].time_step, planar=False)
     for setup, cable in zip(setups, cables, strict=True):
@@ -185,9 +186,20 @@ def _floor(setup: Setup) -> Scene:
     return scene
 
 
+def _bending_stiffness(cable: Cable) -> float:
+    """EI = 2 w Lgb^3 [N m^2]."""
+    return 2.0 * _DENSITY * np.pi * cable.radius**2 * _GRAVITY * cable.gravito_bending_length**3
+
+
+def jaw_stiffness(cable: Cable) -> tuple[float, float]:
+    """With which a jaw's pads hold a cable [N/m, N m/rad]: plans take the jaw for rigid."""
+    lgb, bend = cable.gravito_bending_length, _bending_stiffness(cable)
+    (along, about), (share, turning) = _JAW_STIFFNESS, _JAW_RATIOS
+    return max(along, share * bend / lgb**3), max(about, turning * bend / lgb)
+
+
 def _add_cable(scene: Scene, cable: Cable, points: FloatArray, name: str) -> Rod:
-    weight = _DENSITY * np.pi * cable.radius**2 * _GRAVITY
-    bend = 2.0 * weight * cable.gravito_bending_length**3
+    bend = _bending_stiffness(cable)
     modulus = 4.0 * bend / (np.pi * cable.radius**4)
     material = Material(youngs_modulus=modulus, poisson_ratio=0.5, density=_DENSITY, viscosity=_VISCOUS_TIME * modulus)
     return scene.add_rod(points=points, radius=cable.radius, material=material, name=name)

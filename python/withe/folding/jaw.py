@@ -26,9 +26,10 @@ class Jaw:
         Thickness of either finger.
     reach : float [m]
         Length of the fingers beyond the sheet's edge, to where the gripper is out of the way.
-    stiffness : (float, float) [N/m, N m/rad]
+    stiffness : (float, float), optional [N/m, N m/rad]
         With which the fingers hold the sheet in place, and against turning in them: a jaw that comes too low yields,
-        and rests on the table.
+        and rests on the table. Plans take the jaw for rigid. By default 2000 and 10, which is thousands of times what a
+        sheet of office paper asks for; heavier and stiffer sheets are held by 5000 EI / Lgb^3 and 10000 EI / Lgb.
     force_limit : float [N]
         With which they press on the table at most; beyond it the sheet slips in the jaw.
 
@@ -41,21 +42,22 @@ class Jaw:
     --------
     >>> import withe
     >>> withe.folding.Jaw(depth=0.01, finger=0.001)
-    Jaw(depth=0.01, finger=0.001, reach=0.06, stiffness=(2000.0, 10.0), force_limit=10.0)
+    Jaw(depth=0.01, finger=0.001, reach=0.06, stiffness=None, force_limit=10.0)
     """
 
     depth: float = 0.01
     finger: float = 5e-4
     reach: float = 0.06
-    stiffness: tuple[float, float] = (2e3, 10.0)
+    stiffness: tuple[float, float] | None = None
     force_limit: float = 10.0
 
     def __post_init__(self) -> None:
         for name in ("depth", "finger", "reach"):
             object.__setattr__(self, name, validation.non_negative(getattr(self, name), name))
-        along, about = self.stiffness
-        pair = validation.positive(along, "stiffness along"), validation.positive(about, "stiffness about")
-        object.__setattr__(self, "stiffness", pair)
+        if self.stiffness is not None:
+            along, about = self.stiffness
+            pair = validation.positive(along, "stiffness along"), validation.positive(about, "stiffness about")
+            object.__setattr__(self, "stiffness", pair)
         object.__setattr__(self, "force_limit", validation.positive(self.force_limit, "force_limit"))
 
     def clearance(self, x: FloatArray, z: FloatArray, angle: FloatArray, side: str) -> FloatArray:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from withe.folding.jaw import Jaw
 from withe.folding.paper import Paper
 from withe.parts.handles import Rod
 from withe.parts.materials import Stiffness
 from withe.scene.scene import Scene
 
-__all__ = ["add_paper", "strip_numbers"]
+__all__ = ["add_paper", "jaw_stiffness", "strip_numbers"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -27,6 +28,15 @@ def strip_numbers(paper: Paper) -> tuple[float, float, float]:
     line_density = _DENSITY * paper.thickness * paper.width
     bend = 2.0 * line_density * _GRAVITY * paper.gravito_bending_length**3
     return line_density, bend, 12.0 * bend / paper.thickness**2
+
+
+def jaw_stiffness(jaw: Jaw, paper: Paper) -> tuple[float, float]:
+    """With which a jaw holds a sheet in place, and against turning [N/m], [N m/rad]: plans take it for rigid."""
+    if jaw.stiffness is not None:
+        return jaw.stiffness
+    lgb = paper.gravito_bending_length
+    _, bend, _ = strip_numbers(paper)
+    return max(2e3, 5e3 * bend / lgb**3), max(10.0, 1e4 * bend / lgb)
 
 
 def add_paper(scene: Scene, paper: Paper, places: FloatArray, curl: float) -> Rod:

@@ -16,7 +16,7 @@ from withe.folding.jaw import Jaw
 from withe.folding.jaw_motion import JawMotion, Motion, lead
 from withe.folding.noise import Drawn, Noise
 from withe.folding.paper import Paper, require_length
-from withe.folding.paper_rods import add_paper
+from withe.folding.paper_rods import add_paper, jaw_stiffness
 from withe.folding.views import strip_picture, table_picture
 from withe.perception.camera import Camera
 from withe.recording.record import Record
@@ -168,7 +168,7 @@ class SimulatedSheet:
             self.rod,
             at=0.5 * self.jaw.depth,
             length=self.jaw.depth,
-            stiffness=self.jaw.stiffness,
+            stiffness=jaw_stiffness(self.jaw, paper),
             force_limit=self.jaw.force_limit,
             name="jaw",
         )

@@ -17,7 +17,7 @@ from withe.folding.jaw import Jaw
 from withe.folding.jaw_motion import JawMotion, Motion, lead
 from withe.folding.noise import Drawn, Noise
 from withe.folding.paper import Paper
-from withe.folding.paper_rods import strip_numbers
+from withe.folding.paper_rods import jaw_stiffness, strip_numbers
 from withe.folding.simulated_sheet import LONGEST, FoldingMotion, node_places, require_motion
 from withe.folding.views import table_picture
 from withe.parts.handles import Rod
@@ -183,6 +183,7 @@ class WideSheet:
         scene.join(strips[1].end, cross.end)
         table = scene.add_floor(-0.55 * paper.thickness, friction=self.truth.friction, restitution=0.0, name="table")
         scene.enable_contact(friction=own_friction, restitution=0.0)
+        along, about = jaw_stiffness(self.jaw, paper)
         for strip, friction in zip(strips, self.frictions, strict=True):
             scene.set_friction(strip, table, float(friction))
             scene.ignore_contact(strip, cross)
@@ -190,7 +191,7 @@ class WideSheet:
                 strip,
                 at=0.5 * self.jaw.depth,
                 length=self.jaw.depth,
-                stiffness=(0.5 * self.jaw.stiffness[0], 0.5 * self.jaw.stiffness[1]),
+                stiffness=(0.5 * along, 0.5 * about),
                 force_limit=0.5 * self.jaw.force_limit,
                 name=f"jaw on {strip.name}",
             )
