@@ -37,7 +37,9 @@ ContactReport report_of(const ContactProblem& problem, const Touching& t) {
   r.s = t.proximity.points.s;
   r.t = t.proximity.points.t;
   r.normal = t.proximity.normal;
-  r.force = -t.energy.first;
+  // What acted: contact that has yielded may press harder from here on.
+  const ContactRecord* record = t.lagged < 0 ? problem.record_of(pair.key) : nullptr;
+  r.force = record && t.energy.first < 0.0 ? record->force : -t.energy.first;
   Vec3d x[4];
   t.end_points(x);
   Vec3d on_a = x[0] + r.s * (x[1] - x[0]);
@@ -57,7 +59,7 @@ ContactReport report_of(const ContactProblem& problem, const Touching& t) {
     r.force *= size;
     r.normal = (1.0 / size) * sum;
   }
-  if (const ContactRecord* record = problem.record_of(pair.key)) {
+  if (record) {
     r.friction = record->friction;
     r.sticking = record->sticking;
   }

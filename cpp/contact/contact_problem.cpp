@@ -58,7 +58,7 @@ double ContactProblem::offset(const ContactPair& pair) const {
   const BodyOffset bodies{pair.rod_a, pair.key.b < 0 ? pair.key.b : pair.rod_b};
   const auto found = std::lower_bound(offsets.begin(), offsets.end(), bodies, by_bodies);
   if (found == offsets.end() || by_bodies(bodies, *found)) return 0.0;
-  return std::min(found->moment / found->force, std::max(kMostYield * pair.small_radius(), pair.tolerance));
+  return std::min(found->moment / found->force, kMostYield * pair.small_radius());
 }
 
 double ContactProblem::mass_of(const ContactPair& pair) const {

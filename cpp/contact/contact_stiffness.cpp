@@ -18,9 +18,8 @@ bool by_key(const ContactRecord& a, const ContactRecord& b) { return a.key < b.k
 // for which it is so many times too great.
 constexpr double kAhead = 1.25, kSlack = 32.0;
 // Of the depth that has yielded, over the smaller radius, what is beyond that which lasts presses again little by
-// little: no more than this share of it in a step, nor than makes the contact press harder by this share of its force
-// while what it presses on moves by a radian of its period.
-constexpr double kLastingYield = 0.01, kFading = 0.02;
+// little: this share of it in a step, where surfaces part no faster than this share of the speed at which they rest.
+constexpr double kLastingYield = 0.01, kFading = 0.1, kRising = 0.1;
 // What surfaces that a scene draws near each other may press with, beside what their edges weigh, over the force that
 // their contact is stiff for.
 constexpr double kDrawnForce = 1e-6;
@@ -49,15 +48,14 @@ double worn(const ContactProblem& problem, const Touching& t) {
   return std::clamp(t.pair.reach() - t.proximity.distance, least, t.yielded);
 }
 
-/// And fades where it is deep and surfaces rest, which takes work; so slowly that surfaces part at rest. Faster, and
-/// what friction takes would throw them off.
+/// And fades where it is deep and surfaces rest, which takes work: until they part, and so that they press no more than
+/// twice as hard after a step. Otherwise what friction takes would throw them off.
 double faded(const ContactProblem& problem, const Touching& t) {
-  const double beyond = t.yielded - kLastingYield * t.pair.small_radius();
-  if (!(beyond > 0.0 && t.energy.second > 0.0)) return worn(problem, t);
-  const double mass = t.pair.share * problem.mass_of(t.pair);
-  const double radians = std::min(1.0, problem.duration * std::sqrt(t.energy.second / mass));
-  const double harder = -t.energy.first / t.energy.second * radians;
-  return std::min(worn(problem, t), t.yielded - kFading * std::min(beyond, harder));
+  const double beyond = t.yielded - kLastingYield * t.pair.small_radius(), left = worn(problem, t);
+  if (!(beyond > 0.0 && t.energy.second > 0.0)) return left;
+  const double parted = t.proximity.distance - start_distance(problem, t.pair);
+  if (parted > kRising * rest_speed(problem, t.pair) * problem.duration) return left;
+  return std::min(left, t.yielded - std::min(kFading * beyond, -0.5 * t.energy.first / t.energy.second));
 }
 
 /// Of the weight of an edge what a contact holds up, where edges touch several others. Contacts of the same bodies,

@@ -37,13 +37,6 @@ double smooth_slope(double x) { return x > 0.0 && x < 1.0 ? 6.0 * x * (1.0 - x) 
 /// turns round nothing of the speed is lost, which is the more the less is to be left.
 double steps_in_swing(double restitution) { return std::clamp(10.0 / std::max(restitution, 1e-3), 12.0, 40.0); }
 
-/// Distance as the step begins.
-double start_distance(const ContactProblem& problem, const ContactPair& pair) {
-  if (pair.curve()) return problem.curve_at_start(pair).distance;
-  Vec3d x[4];
-  return std::sqrt(problem.closest_at_start(pair, x).square);
-}
-
 /// As `impact_share`, of an impact that is over after so many swings.
 double share_within(const ContactProblem& problem, const Touching& t, double swings) {
   if (!(t.approach > 0.0)) return 0.0;
@@ -52,6 +45,12 @@ double share_within(const ContactProblem& problem, const Touching& t, double swi
 }
 
 }  // namespace
+
+double start_distance(const ContactProblem& problem, const ContactPair& pair) {
+  if (pair.curve()) return problem.curve_at_start(pair).distance;
+  Vec3d x[4];
+  return std::sqrt(problem.closest_at_start(pair, x).square);
+}
 
 double rest_speed(const ContactProblem& problem, const ContactPair& pair) {
   return std::max(std::sqrt(problem.parameters->gravity * kDepth * pair.small_radius()),

@@ -10,6 +10,8 @@ namespace withe {
 double rest_speed(const ContactProblem& problem, const ContactPair& pair);
 /// Of surfaces that near each other so slowly that they rest, if they do not fall on [m/s].
 double least_approach(const ContactProblem& problem, const ContactPair& pair);
+/// Of centrelines as the step begins [m].
+double start_distance(const ContactProblem& problem, const ContactPair& pair);
 /// At which surfaces near each other as the step begins [m/s].
 double approach_speed(const ContactProblem& problem, const ContactPair& pair);
 /// Whether an impact is still on its way in at the end of a step: it has not pressed surfaces together yet, nor turned

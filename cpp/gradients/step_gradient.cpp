@@ -172,6 +172,23 @@ void StepGradient::pull_back(StateAdjoint& state, CoefficientAdjoint& by, HeldAd
   state.obstacles = std::move(adjoint.obstacles);
 }
 
+void StepGradient::add_work_along(const VectorX& motion, CoefficientAdjoint& by, HeldAdjoint& held) {
+  const Model& model = equations_.model();
+  const Assembler& assembler = equations_.assembler();
+  StateAdjoint state{VectorX::Zero(model.dof_count), VectorX::Zero(model.dof_count)};
+  state.hands = HandAdjoint(model);
+  VectorX rows = rows_ = motion, velocity = state.v;
+  by_z_.setZero(model.dof_count);
+  columns_ = by_z_;
+  assembler.multiply_held_transposed(rows_, columns_);
+  StepAdjoint adjoint(model, rows, state.approach, state.hands, by);
+  for (const std::unique_ptr<Term>& term : equations_.terms())
+    term->add_adjoint(equations_.problem(), data_, assembler, adjoint);
+  add_held(adjoint, state.v, state.q, velocity, held);
+  held.hands = adjoint.hands_end;
+  held.obstacles = adjoint.obstacles_end;
+}
+
 void StepGradient::add_frames(const StateAdjoint& state, const StepAdjoint& adjoint, VectorX& start) const {
   const Model& model = equations_.model();
   for (int f = 0; f < model.frame_count; ++f) {

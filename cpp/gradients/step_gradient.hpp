@@ -83,6 +83,8 @@ class StepGradient {
   /// besides. Throws std::invalid_argument where no gradient is known.
   void pull_back(StateAdjoint& state, CoefficientAdjoint& by, HeldAdjoint& held,
                  const ReactionAdjoint* reactions = nullptr);
+  /// Of an equilibrium: adds the derivatives of the work of its residual over a motion.
+  void add_work_along(const VectorX& motion, CoefficientAdjoint& by, HeldAdjoint& held);
 
  private:
   void set_end(const StateAdjoint& state);

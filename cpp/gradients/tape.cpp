@@ -374,8 +374,8 @@ InitialGradient Tape::gradient(const std::vector<MomentAdjoint>& given, const Pa
   if (steps_.empty()) visit(0, -1, time, parameter_gradient(model_, acting_.start(), coefficients));
   const StepRule rule = steps_.empty() ? StepRule::backward_euler : steps_.front().rule;
   const Assembler& assembler = player.gradient(rule).equations().assembler();
-  assembler.project(adjoint.v);
   moments.add(0, assembler, acting_.start(), [&] { return starts_.front(); }, adjoint);
+  assembler.project(adjoint.v);  // what is held goes as it is told
   const State& first = starts_.front();
   const std::vector<HandPose> hands = poses_of(first);
   PoseAdjoint poses = by_poses(model_, first.q, adjoint.q, adjoint.hands, {hands, first.hands});

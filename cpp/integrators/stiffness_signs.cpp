@@ -49,14 +49,18 @@ bool StiffnessSigns::stable(const State& state, StepData& data) {
 }
 
 bool StiffnessSigns::neutral(const State& state, StepData& data) {
-  LinearSolver& stiffness = symmetric_part();
-  if (definite(stiffness, -1.0, neutral_shift(equations_, kDoubtful))) return false;
-  if (equations_.assembler().solver().symmetry() == Symmetry::unsymmetric) return true;
-  const VectorX mode = lowest_mode(0);
+  if (equations_.assembler().solver().symmetry() == Symmetry::symmetric) return neutral_motion(state, data).size() != 0;
+  return !definite(symmetric_part(), -1.0, neutral_shift(equations_, kDoubtful));
+}
+
+VectorX StiffnessSigns::neutral_motion(const State& state, StepData& data, double slack) {
+  if (definite(equations_.assembler().solver(), -1.0, neutral_shift(equations_, kDoubtful))) return {};
+  VectorX mode = lowest_mode(0);
   // A hundredth of what rounding leaves of the matrix: what is softer than that is none of its motions.
   const double least = 0.01 * neutral_shift(equations_, kRounded).dot(mode.cwiseAbs2());
   const Lowest found = lowest(mode, state, data);
-  return std::abs(found.curvature) <= found.unknown + least;
+  if (std::abs(found.curvature) > slack * found.unknown + least) mode.resize(0);
+  return mode;
 }
 
 /// A neutral mode comes out on either side of zero by rounding, and by what is left out of balance, F: along q(a) on

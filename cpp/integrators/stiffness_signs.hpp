@@ -24,6 +24,9 @@ class StiffnessSigns {
   /// Whether a motion is neutral, as of a free body, or of a rod that may spin about its axis; of unsymmetric
   /// equations, whether one may be.
   bool neutral(const State& state, StepData& data);
+  /// Of symmetric equations, that motion, of length 1, or nothing. `slack`: times what is rounded here, as what was
+  /// given may be: a drawing that is straight but for its last digits prefers one side.
+  VectorX neutral_motion(const State& state, StepData& data, double slack = 1.0);
   /// Direction of most negative curvature against mass, by inverse iteration on a matrix shifted until it is definite.
   VectorX lowest_mode(int seed);
 

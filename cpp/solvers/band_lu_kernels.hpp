@@ -21,8 +21,8 @@ struct BandLuFactor {
   double* multipliers = nullptr;  ///< size rows: of the rows below, by which the pivot row was taken off them
   double* inverse_pivots = nullptr;
   double* row_scales = nullptr;  ///< 1 / the greatest entry of each row of the matrix
-  int* pivot_rows = nullptr;    ///< with which row each was exchanged
-  int* last_columns = nullptr;  ///< of each row of U
+  int* pivot_rows = nullptr;     ///< with which row each was exchanged
+  int* last_columns = nullptr;   ///< of each row of U
 };
 
 struct BandLuKernels {

@@ -112,6 +112,7 @@ Model World::Implementation::model_of_active(Rebuild why) {
 void World::Implementation::drop_scratch() {
   static_equations.reset();
   static_gradient.reset();
+  read_equations.reset();
   fallback_equations.reset();
   const Counters counters = work.newton.counters;
   const double finest = work.newton.finest;
@@ -218,6 +219,7 @@ void World::Implementation::remake_equations() {
   model.description.loads = description.loads;
   static_equations.reset();
   static_gradient.reset();
+  read_equations.reset();
   fallback_equations.reset();
   newton = std::make_unique<Newton>(model, options);
   equations = std::make_unique<Equations>(model, equation_options(options));

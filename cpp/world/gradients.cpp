@@ -1,10 +1,12 @@
 #include <algorithm>
 #include <cmath>
+#include <random>
 #include <stdexcept>
 
 #include "common/check.hpp"
 #include "geometry/rotation.hpp"
 #include "gradients/state_vector.hpp"
+#include "integrators/stiffness_signs.hpp"
 #include "world/implementation.hpp"
 
 namespace withe {
@@ -12,6 +14,8 @@ namespace {
 
 /// An equilibrium leaves this much of the forces in it out of balance.
 constexpr double kBalanced = 1e-6;
+/// A rod that was drawn straight, but for rounding, hardly prefers a side: times what is rounded in its stiffness.
+constexpr double kAsDrawn = 1e4;
 constexpr const char* kAtLimit =
     "no gradient is known of an equilibrium in which a hand holds with all its force, for it goes with the way there: "
     "give a greater force_limit, or run with differentiable=True";
@@ -35,9 +39,19 @@ bool loses_in_impacts(const ContactDescription& contact) {
          std::any_of(contact.pairs.begin(), contact.pairs.end(), [&](const auto& p) { return loses(p.restitution); });
 }
 
+/// At random, of length 1, of what is free.
+VectorX any_motion(const Model& model, const Assembler& assembler) {
+  std::mt19937 random(1);
+  std::normal_distribution<double> normal;
+  VectorX motion(model.dof_count);
+  for (double& number : motion) number = normal(random);
+  assembler.project(motion);
+  return motion.normalized();
+}
+
 }  // namespace
 
-std::vector<EquilibriumGradient> World::equilibrium_gradients(const std::vector<ReadoutAdjoint>& by) const {
+EquilibriumGradients World::equilibrium_gradients(const std::vector<ReadoutAdjoint>& by) const {
   const Implementation& self = *implementation_;
   const Model& model = self.model;
   for (const ReadoutAdjoint& scalar : by) scalar.check(model);
@@ -79,7 +93,7 @@ std::vector<EquilibriumGradient> World::equilibrium_gradients(const std::vector<
   }
   require(gradient.imbalance() < kBalanced,
           "the simulation is in no equilibrium, so that there is no gradient of one: call equilibrium() again");
-  std::vector<EquilibriumGradient> out;
+  EquilibriumGradients out;
   for (const ReadoutAdjoint& scalar : by) {
     StateAdjoint adjoint{VectorX::Zero(model.dof_count), VectorX::Zero(model.dof_count)};
     CoefficientAdjoint coefficients(model, self.parameters.loads.rows());
@@ -89,12 +103,43 @@ std::vector<EquilibriumGradient> World::equilibrium_gradients(const std::vector<
       add_readouts(model, gradient.equations().assembler(), self.parameters, frames, scalar, adjoint, coefficients);
     const ReactionAdjoint reactions{scalar.reactions, hands};
     gradient.pull_back(adjoint, coefficients, held, scalar.has_reactions() ? &reactions : nullptr);
-    PoseAdjoint poses = by_poses(model, self.state.q, held.pose, held.hands, {hands, self.state.hands});
-    poses.obstacles = by_places(model, held.obstacles);
-    out.push_back({parameter_gradient(model, self.parameters, coefficients), std::move(poses),
-                   by_drawing(model, self.state.q, held.pose)});
+    out.scalars.push_back(self.equilibrium_gradient(coefficients, held));
+  }
+  const VectorX neutral = self.neutral_motion();
+  if (neutral.size() == 0) return out;
+  for (const VectorX& motion : {neutral, any_motion(model, gradient.equations().assembler())}) {
+    CoefficientAdjoint coefficients(model, self.parameters.loads.rows());
+    HeldAdjoint held(model);
+    gradient.add_work_along(motion, coefficients, held);
+    out.works.push_back(self.equilibrium_gradient(coefficients, held));
   }
   return out;
+}
+
+/// Of length 1; empty where none costs nothing, where loads turn with the rod, or with custom forces.
+VectorX World::Implementation::neutral_motion() const {
+  if (description.has_custom_force) return {};
+  if (!read_equations) {
+    Options symmetric = options;
+    symmetric.integrator = Integrator::statics;
+    read_equations = std::make_unique<Equations>(model, equation_options(symmetric));
+  }
+  Equations& system = *read_equations;
+  if (system.assembler().solver().symmetry() == Symmetry::unsymmetric) return {};
+  StepData evaluation;
+  system.begin(state, parameters, StepRule::statics, 0.0);
+  system.evaluate(state.q, true, nullptr, evaluation);
+  const StepNorms norms(model);
+  Counters unused;
+  return StiffnessSigns(system, norms, unused).neutral_motion(state, evaluation, kAsDrawn);
+}
+
+EquilibriumGradient World::Implementation::equilibrium_gradient(const CoefficientAdjoint& coefficients,
+                                                                const HeldAdjoint& held) const {
+  const std::vector<HandPose> hands = hand_poses();
+  PoseAdjoint poses = by_poses(model, state.q, held.pose, held.hands, {hands, state.hands});
+  poses.obstacles = by_places(model, held.obstacles);
+  return {parameter_gradient(model, parameters, coefficients), std::move(poses), by_drawing(model, state.q, held.pose)};
 }
 
 std::shared_ptr<Tape> World::start_tape() {

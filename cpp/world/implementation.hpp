@@ -53,6 +53,7 @@ struct World::Implementation : Running {
   std::unique_ptr<Equations> fallback_equations;  ///< energy-momentum ones, made when plain midpoint gains energy
   std::unique_ptr<Equations> static_equations;    ///< symmetric ones, made when first needed
   mutable std::unique_ptr<StepGradient> static_gradient;  ///< made when first needed
+  mutable std::unique_ptr<Equations> read_equations;      ///< symmetric ones, of which no matrix is yet to serve
   std::shared_ptr<Tape> tape;                             ///< of a run that is kept for gradients
   long taped = 0;                                         ///< its length at the start of a step that may be taken back
   StepWorkspace work;
@@ -180,6 +181,8 @@ struct World::Implementation : Running {
   void aim_hands(Equations& system);
   /// Where hands are, per support.
   std::vector<HandPose> hand_poses() const;
+  VectorX neutral_motion() const;
+  EquilibriumGradient equilibrium_gradient(const CoefficientAdjoint& coefficients, const HeldAdjoint& held) const;
   void find_hand_poses(std::vector<HandPose>& poses) const;
   static void release_hands(Equations& system);
   /// In an equilibrium that hands were aimed for.

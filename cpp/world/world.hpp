@@ -153,6 +153,13 @@ struct EquilibriumGradient {
   DrawnAdjoint drawn;
 };
 
+struct EquilibriumGradients {
+  std::vector<EquilibriumGradient> scalars;
+  /// Where a motion costs nothing, as of a rod that is free to spin: of the work of what is out of balance over that
+  /// motion, and over another at random. What the former depends on drives it, and has no derivative.
+  std::vector<EquilibriumGradient> works;
+};
+
 /// What a rod is to be like; what is empty stays as it is.
 struct RodState {
   int rod = 0;
@@ -301,7 +308,7 @@ class World {
 
   /// Of scalars whose derivatives by read-outs are given, in the equilibrium that the scene is in. Throws
   /// std::invalid_argument where it is in none, or where none is known.
-  std::vector<EquilibriumGradient> equilibrium_gradients(const std::vector<ReadoutAdjoint>& by) const;
+  EquilibriumGradients equilibrium_gradients(const std::vector<ReadoutAdjoint>& by) const;
   /// Keeps the steps from here on, for gradients; nothing: no more.
   std::shared_ptr<Tape> start_tape();
   /// A frame has been taken of the run that is recorded.

@@ -445,7 +445,8 @@ void define_readouts(WorldClass& world) {
   world.def(
       "equilibrium_gradients",
       [](const GuardedWorld& self, const std::vector<ReadoutAdjoint>& by) {
-        return self.reading().equilibrium_gradients(by);
+        EquilibriumGradients found = self.reading().equilibrium_gradients(by);
+        return std::make_tuple(std::move(found.scalars), std::move(found.works));
       },
       py::arg("by"));
   world.def("start_tape", [](GuardedWorld& self) { return self.changing().start_tape(); });

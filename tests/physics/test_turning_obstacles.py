@@ -118,7 +118,7 @@ def test_work_of_a_roller_is_the_torque_of_friction_times_its_turn():
     simulation = scene.build(time_step=1e-3, integrator="backward_euler")
     simulation.run(0.3, progress=False)
     simulation.move(roller, roll=10.0, over=10.0)
-    simulation.run(1.0, progress=False)  # until what contact has yielded presses again
+    simulation.run(0.2, progress=False)
     before = simulation.energy()
     simulation.run(0.2, progress=False)
     after, normal = simulation.energy(), simulation.contacts()["normal_force"].sum()

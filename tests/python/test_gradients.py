@@ -42,6 +42,59 @@ def test_gradient_of_an_equilibrium_is_that_of_differences(planar, joint):
         )
 
 
+@pytest.mark.parametrize("nodes", [9, 41, 401])
+@pytest.mark.parametrize("hangs", [False, True])
+def test_what_drives_the_spin_of_a_rod_that_is_free_to_has_no_gradient(nodes, hangs):
+    """Where it would spin to does not follow from what acts; rounding was answered. What does not drive it has one."""
+    rubber = withe.Material(youngs_modulus=1e6, poisson_ratio=0.4, density=1100.0)
+    scene = withe.Scene()
+    rod = scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0.05), nodes=nodes, radius=4e-3, material=rubber)
+    if hangs:  # from the end of another, which is held
+        other = scene.add_rod(start=(-0.2, 0, 0), end=(0, 0, 0), nodes=nodes, radius=4e-3, material=rubber)
+        scene.clamp(other.start)
+        scene.join(other.end, rod.start, kind="pinned")
+    else:
+        scene.pin(rod.start)
+    scene.pin(rod.end)
+    load = scene.add_force(rod.node(nodes // 2), (0, 0.01, -0.02))
+    simulation = scene.build(integrator="static", planar=False)
+    found = simulation.equilibrium()
+    weight = np.random.default_rng(1).normal(size=simulation.positions().shape)
+    wrt = [(load, "force"), (rod, "natural_curvature")]
+    for refused in (lambda: found.gradient(weight, wrt), lambda: found.jacobian((rod, "positions"), wrt)):
+        with pytest.raises(ValueError, match=r"no gradient by natural_curvature of .* is known: it drives a motion"):
+            refused()
+    by_load, _ = found.gradient(weight, [(load, "force"), (rod, "natural_twist")])  # which turns ends alone
+
+    def scalar(force):
+        moved = simulation.copy()
+        moved.set(load, force=force)
+        moved.equilibrium()
+        return float((weight * moved.positions()).sum())
+
+    step = 1e-5 * np.eye(3)
+    force = np.array((0, 0.01, -0.02))
+    differences = [(scalar(force + h) - scalar(force - h)) / 2e-5 for h in step]
+    np.testing.assert_allclose(by_load, differences, rtol=1e-4, atol=1e-4 * np.abs(differences).max())
+
+
+def test_velocities_of_what_is_held_go_with_none_at_the_start():
+    rubber = withe.Material(youngs_modulus=1e6, poisson_ratio=0.4, density=1100.0)
+    scene = withe.Scene()
+    rod = scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=6, radius=4e-3, material=rubber)
+    scene.clamp(rod.start)
+    simulation = scene.build(time_step=2e-3)
+    record = simulation.run(0.02, record_every=0.01, differentiable=True, progress=False)
+    weight = np.zeros(record.velocities().shape)
+    weight[0, :, ::2] = 1.0  # of the frame before the first step
+    (gradient,) = record.gradient({"velocities": weight}, ["initial_velocities"])
+    held = (simulation.velocities() == 0.0).all(axis=1)
+    assert held[0]
+    assert not held[2:].any()
+    np.testing.assert_array_equal(gradient[held], 0.0)
+    np.testing.assert_array_equal(gradient[~held], np.tile((1.0, 0.0, 1.0), ((~held).sum(), 1)))
+
+
 def test_what_is_free_to_spin_has_gradients_of_what_spinning_leaves_alone():
     scene = withe.Scene()
     rubber = withe.Material(youngs_modulus=1e6, poisson_ratio=0.4, density=1200.0)

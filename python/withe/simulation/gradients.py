@@ -36,6 +36,7 @@ __all__ = [
 
 FloatArray = npt.NDArray[np.float64]
 
+_DRIVES = 1e-11  # share of the work over any motion, above which work over a neutral one is no rounding
 # Their reactions have the inertia of what turns by other rates than their equations do.
 _OF_FINITE_TURNS = ("implicit_midpoint", "fourth_order")
 
@@ -45,7 +46,6 @@ Loss = npt.ArrayLike | Mapping[str, Any]
 
 def equilibrium_gradient(session: Session, by: Loss, wrt: Sequence[Unknown]) -> list[Any]:
     """Derivatives of a scalar of the present equilibrium; see `Equilibrium.gradient`."""
-    readers = unknown_readers(session, wrt)
     in_plane = session.options.planar is True
     if isinstance(by, Mapping):
         frames = {word: _with_frame(value) for word, value in by.items()}
@@ -55,8 +55,7 @@ def equilibrium_gradient(session: Session, by: Loss, wrt: Sequence[Unknown]) -> 
         if in_plane:
             check_in_plane(session, by_positions, "dL_dx")
         adjoints = [_by_positions(by_positions)]
-    (found,) = session.world.equilibrium_gradients(adjoints)
-    return [read(found) for read in readers]
+    return [value for (value,) in _gradients(session, adjoints, wrt)]
 
 
 def equilibrium_gradients(session: Session, by_positions: FloatArray, wrt: Sequence[Unknown]) -> list[list[Any]]:
@@ -66,9 +65,38 @@ def equilibrium_gradients(session: Session, by_positions: FloatArray, wrt: Seque
 
     The stiffness is factorised once for all of them.
     """
+    return _gradients(session, [_by_positions(each) for each in by_positions], wrt)
+
+
+def _gradients(session: Session, by: list[_core.ReadoutAdjoint], wrt: Sequence[Unknown]) -> list[list[Any]]:
+    """For each of `wrt` what the derivatives of every scalar say of it.
+
+    Raises
+    ------
+    ValueError
+        An unknown that drives a motion that costs nothing, such as how a rod spins that is free to.
+    """
     readers = unknown_readers(session, wrt)
-    found = session.world.equilibrium_gradients([_by_positions(each) for each in by_positions])
-    return [[read(gradient) for gradient in found] for read in readers]
+    scalars, works = session.world.equilibrium_gradients(by)
+    out = []
+    for unknown, read in zip(wrt, readers, strict=True):
+        if works:
+            drives, typical = (np.abs(np.asarray(read(work))).max(initial=0.0) for work in works)
+            if drives > _DRIVES * typical:
+                raise ValueError(
+                    f"no gradient by {_name(unknown)} is known: it drives a motion that costs nothing, and where that "
+                    "leads does not follow from what acts; hold what is free to move or to spin"
+                )
+        out.append([read(gradient) for gradient in scalars])
+    return out
+
+
+def _name(unknown: Any) -> str:
+    """Of what is differentiated by, for messages."""
+    if not isinstance(unknown, tuple):
+        return str(unknown)
+    target, word = unknown
+    return f"{word} of {getattr(target, 'name', target)}"
 
 
 def _by_positions(values: FloatArray) -> _core.ReadoutAdjoint:
@@ -79,7 +107,6 @@ def _by_positions(values: FloatArray) -> _core.ReadoutAdjoint:
 
 def equilibrium_jacobian(session: Session, of: Any, wrt: Sequence[Unknown]) -> list[FloatArray]:
     """Derivatives of a read-out in the present equilibrium; see `Equilibrium.jacobian`."""
-    readers = unknown_readers(session, wrt)
     if isinstance(of, NodeHandle) or (isinstance(of, str) and "." in of):
         node, _ = session.directory.node(of, "of")
         shape: tuple[int, ...] = (3,)
@@ -94,10 +121,9 @@ def equilibrium_jacobian(session: Session, of: Any, wrt: Sequence[Unknown]) -> l
         shape = readout_shape(session, target, word)
         count = int(np.prod(shape))
         tables = {word: {target: np.eye(count).reshape(count, *shape)}}
-    found = session.world.equilibrium_gradients(readout_adjoints(session, tables, int(np.prod(shape))))
     out = []
-    for read in readers:
-        values = np.array([read(gradient) for gradient in found])
+    for found in _gradients(session, readout_adjoints(session, tables, int(np.prod(shape))), wrt):
+        values = np.array(found)
         out.append(values.reshape(*shape, *values.shape[1:]))
     return out
 
