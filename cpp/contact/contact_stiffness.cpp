@@ -48,8 +48,8 @@ double worn(const ContactProblem& problem, const Touching& t) {
   return std::clamp(t.pair.reach() - t.proximity.distance, least, t.yielded);
 }
 
-/// And fades where it is deep and surfaces rest, which takes work: until they part, and so that they press no more than
-/// twice as hard after a step. Otherwise what friction takes would throw them off.
+/// And fades where it is deep and surfaces rest, which takes work: until they part, and so that they press about half
+/// as hard again after a step at most. Otherwise what friction takes would throw them off.
 double faded(const ContactProblem& problem, const Touching& t) {
   const double beyond = t.yielded - kLastingYield * t.pair.small_radius(), left = worn(problem, t);
   if (!(beyond > 0.0 && t.energy.second > 0.0)) return left;

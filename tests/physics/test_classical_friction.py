@@ -274,3 +274,21 @@ def test_what_friction_takes_throws_no_rod_up(time_step):
     assert risen < 0.03 * radius
     assert pressing < 4.0
     assert heat == pytest.approx(work - weight * risen, rel=0.02)
+
+
+def test_contacts_say_what_pressed_as_a_step_ended():
+    """And not what the next would begin with, once what has yielded presses again: that was 11 % more."""
+    radius, length, step = 5e-3, 0.2, 2e-3
+    scene = withe.Scene()
+    rubber = withe.Material(youngs_modulus=1e9, poisson_ratio=0.4, density=1200.0)
+    rod = scene.add_rod(start=(0, 0, 0), end=(length, 0, 0), nodes=11, radius=radius, material=rubber)
+    scene.add_floor(-radius, friction=0.3)
+    simulation = scene.build(integrator="backward_euler", time_step=step, planar=False)
+    simulation.step(100)
+    simulation.set_velocities(rod, (0.5, 0, 0))
+    weight = 9.81 * 1200.0 * np.pi * radius**2 * length
+    for _ in range(10):
+        before = simulation.momentum().linear[2]
+        simulation.step()
+        pressed = weight + (simulation.momentum().linear[2] - before) / step
+        assert simulation.contacts()["normal_force"].sum() == pytest.approx(pressed, rel=1e-6)

@@ -248,7 +248,7 @@ class Measurements:
         structured ndarray, a row per contact
             "pair" (two names) and "edge" (their edges, -1 for an obstacle), "distance" of the centrelines
             and "gap" of the surfaces [m], "point" between them [m], "normal" from the second to the first,
-            "normal_force" [N], "friction" on the first [N], "sticking".
+            "normal_force" [N] and "friction" on the first [N], as the last step ended, "sticking".
         """
         return contact_table(self._session.directory, self._session.world.contacts())
 
