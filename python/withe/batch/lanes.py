@@ -121,12 +121,12 @@ class Lanes:
 
     def note_failures(self) -> None:
         """After a step: what has failed is passed over until it is restored, from here on."""
-        for number in np.flatnonzero(self.engine.failed()):
+        for number in self.engine.failed().nonzero()[0]:
             self._restorations[number] = self.simulations[number]._session.restorations
 
     def forgive_restored(self) -> None:
         """Let simulations go on that had failed, and were restored by themselves since."""
-        for number in np.flatnonzero(self.engine.failed()):
+        for number in self.engine.failed().nonzero()[0]:
             if self.simulations[number]._session.restorations != self._restorations[number]:
                 self.engine.forgive(number)
 

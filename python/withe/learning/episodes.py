@@ -172,6 +172,7 @@ class Episodes:
             Another shape, not finite, or outside of the box.
         """
         values = validation.number_array(actions, "action", (*robots, self.action_size))
-        if np.abs(values).max(initial=0.0) > 1.0 + _ROUNDING:
+        most = np.abs(values).max(initial=0.0)
+        if most > 1.0 + _ROUNDING:
             raise ValueError(f"action must lie in -1..1, got {values.flat[np.abs(values).argmax()]:.9g}")
-        return np.clip(values, -1.0, 1.0)
+        return np.clip(values, -1.0, 1.0) if most > 1.0 else values
