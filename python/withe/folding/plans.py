@@ -278,6 +278,8 @@ class Plan:
         way = f"{self.method}, {self.grasp}, {len(self)} poses in {self.times[-1]:.1f} s"
         if self.plunges_at is not None:
             way += f", plunges at {self.plunges_at:.1f} s"
+        elif (slides := np.nanmax(np.abs(self.slide))) > 1e-3:
+            way += f", slides {1e3 * slides:.1f} mm"
         if self.blocked is not None:
             way += ", does not bear its uncertainty"
         greatest = f"slip ratio {ratio:.3f}, curvature {curvature:.0f}/m"
