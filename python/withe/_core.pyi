@@ -989,7 +989,9 @@ class World:
         """
         Find the static equilibrium.
         """
-    def equilibrium_gradients(self, by: collections.abc.Sequence[ReadoutAdjoint]) -> tuple[list[EquilibriumGradient], list[EquilibriumGradient]]: ...
+    def equilibrium_gradients(
+        self, by: collections.abc.Sequence[ReadoutAdjoint]
+    ) -> tuple[list[EquilibriumGradient], list[EquilibriumGradient]]: ...
     def equilibrium_path(
         self,
         loads: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
