@@ -37,9 +37,9 @@ ContactReport report_of(const ContactProblem& problem, const Touching& t) {
   r.s = t.proximity.points.s;
   r.t = t.proximity.points.t;
   r.normal = t.proximity.normal;
-  // What acted: contact that has yielded may press harder from here on.
-  const ContactRecord* record = t.lagged < 0 ? problem.record_of(pair.key) : nullptr;
-  r.force = record && t.energy.first < 0.0 ? record->force : -t.energy.first;
+  // What acted, where that is known: contact that has yielded may press harder from here on.
+  const ContactRecord* record = problem.record_of(pair.key);
+  r.force = record && record->force > 0.0 && t.energy.first < 0.0 ? record->force : -t.energy.first;
   Vec3d x[4];
   t.end_points(x);
   Vec3d on_a = x[0] + r.s * (x[1] - x[0]);
@@ -104,7 +104,7 @@ void Contact::take_given_stiffness(State& state, const Parameters& parameters) c
     if (!(given > 0.0)) continue;
     if (anchored()) record.friction = (given / record.stiffness) * record.friction;
     record.stiffness = given;
-    record.yielded = 0.0;
+    record.yielded = record.force = 0.0;  // what it presses with now no step has seen
   }
 }
 

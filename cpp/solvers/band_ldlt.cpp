@@ -17,7 +17,7 @@ class SymmetricBand : public LinearSolver {
       : pattern_(pattern),
         half_bandwidth_(pattern.half_bandwidth()),
         stride_(band_column_stride(width)),
-        values_(static_cast<std::size_t>(pattern.size) * stride_ + kBandPadding + kPadding, 0.0) {}
+        values_(static_cast<std::size_t>(pattern.size) * stride_) {}
 
   int size() const override { return pattern_.size; }
   Symmetry symmetry() const override { return Symmetry::symmetric; }
@@ -27,8 +27,8 @@ class SymmetricBand : public LinearSolver {
     find_lower_entry(pattern_, row, column);
     return static_cast<std::ptrdiff_t>(column) * stride_ + (row - column);
   }
-  std::span<double> values() override { return {matrix(), values_.size() - kBandPadding - kPadding}; }
-  std::span<const double> values() const override { return {matrix(), values_.size() - kBandPadding - kPadding}; }
+  std::span<double> values() override { return {values_.data(), values_.size()}; }
+  std::span<const double> values() const override { return {values_.data(), values_.size()}; }
 
   Factorization factorize(std::span<const double> shift) override {
     require_shift(shift, size());
@@ -49,7 +49,7 @@ class SymmetricBand : public LinearSolver {
     require_product(x, y, size());
     std::fill(y.begin(), y.end(), 0.0);
     for (int k = 0; k < size(); ++k) {
-      const double* column = matrix() + static_cast<std::ptrdiff_t>(k) * stride_;
+      const double* column = values_.data() + static_cast<std::ptrdiff_t>(k) * stride_;
       double sum = column[0] * x[k];
       const int last = std::min(half_bandwidth_, size() - 1 - k);
       for (int m = 1; m <= last; ++m) {
@@ -64,13 +64,11 @@ class SymmetricBand : public LinearSolver {
   /// Factors of the matrix, with a shift of the diagonal or nothing; what the pivots are the inverse of.
   virtual std::span<const double> eliminate(const double* shift) = 0;
   virtual void substitute(double* x) const = 0;
-  double* matrix() { return values_.data() + kBandPadding; }
-  const double* matrix() const { return values_.data() + kBandPadding; }
 
   SparsityPattern pattern_;
   int half_bandwidth_;
   int stride_;
-  std::vector<double> values_;
+  BandEntries values_;
   bool factorized_ = false;
 };
 
@@ -85,7 +83,7 @@ class BandLdlt final : public SymmetricBand {
 
  private:
   std::span<const double> eliminate(const double* shift) override {
-    kernels_.factorize_symmetric(storage_.factor(), matrix(), shift);
+    kernels_.factorize_symmetric(storage_.factor(), values_.data(), shift);
     return storage_.inverse_pivots();
   }
   void substitute(double* x) const override { kernels_.solve_symmetric(storage_.factor(), x); }
@@ -110,7 +108,7 @@ class WideBandLdlt final : public SymmetricBand {
 
   /// u(i, k) = a(i, k) - sum over m of l(i, k - m) d(k - m) l(k, k - m), l(i, k) = u(i, k) / d(k).
   std::span<const double> eliminate(const double* shift) override {
-    std::copy_n(matrix(), static_cast<std::ptrdiff_t>(size()) * stride_, factor_.begin());
+    std::copy_n(values_.data(), static_cast<std::ptrdiff_t>(size()) * stride_, factor_.begin());
     for (int k = 0; k < size(); ++k) {
       double* newest = column(k);
       if (shift) newest[0] += shift[k];

@@ -63,7 +63,8 @@ class BandLu final : public LinearSolver {
       : pattern_(pattern),
         kernels_(band_kernels(pattern.half_bandwidth())),
         width_(kernels_ ? kernels_->half_bandwidth : pattern.half_bandwidth()),
-        values_(static_cast<std::size_t>(pattern.size) * (2 * width_ + 1) + kBandPadding + kPadding, 0.0) {
+        value_stride_(2 * width_ + 1),
+        values_(static_cast<std::size_t>(pattern.size) * value_stride_) {
     if (kernels_)
       plain_.emplace(size(), width_);
     else
@@ -76,19 +77,19 @@ class BandLu final : public LinearSolver {
 
   std::ptrdiff_t offset(int row, int column) const override {
     find_entry(pattern_, row, column);
-    return static_cast<std::ptrdiff_t>(row) * (2 * width_ + 1) + (column - row + width_);
+    return static_cast<std::ptrdiff_t>(row) * value_stride_ + (column - row + width_);
   }
-  std::span<double> values() override { return {matrix(), values_.size() - kBandPadding - kPadding}; }
-  std::span<const double> values() const override { return {matrix(), values_.size() - kBandPadding - kPadding}; }
+  std::span<double> values() override { return {values_.data(), values_.size()}; }
+  std::span<const double> values() const override { return {values_.data(), values_.size()}; }
 
   Factorization factorize(std::span<const double> shift) override {
     require_shift(shift, size());
     const double* added = shift.empty() ? nullptr : shift.data();
-    exchanged_ = !(kernels_ && kernels_->factorize(plain_->factor(), matrix(), added));
+    exchanged_ = !(kernels_ && kernels_->factorize(plain_->factor(), values_.data(), added));
     factorized_ = true;
     if (exchanged_) {
       if (!pivoted_) pivoted_.emplace(size(), width_);
-      factorized_ = band_lu_kernels().factorize(pivoted_->factor(), matrix(), added);
+      factorized_ = band_lu_kernels().factorize(pivoted_->factor(), values_.data(), added);
     }
     return {factorized_ ? FactorStatus::ok : FactorStatus::singular, 0};
   }
@@ -107,7 +108,7 @@ class BandLu final : public LinearSolver {
   void multiply(std::span<const double> x, std::span<double> y) const override {
     require_product(x, y, size());
     for (int row = 0; row < size(); ++row) {
-      const double* value = matrix() + static_cast<std::ptrdiff_t>(row) * (2 * width_ + 1) + width_ - row;
+      const double* value = values_.data() + static_cast<std::ptrdiff_t>(row) * value_stride_ + width_ - row;
       double sum = 0.0;
       const int last = std::min(row + width_, size() - 1);
       for (int column = std::max(row - width_, 0); column <= last; ++column) sum += value[column] * x[column];
@@ -118,13 +119,11 @@ class BandLu final : public LinearSolver {
   std::unique_ptr<LinearSolver> clone() const override { return std::make_unique<BandLu>(*this); }
 
  private:
-  double* matrix() { return values_.data() + kBandPadding; }
-  const double* matrix() const { return values_.data() + kBandPadding; }
-
   SparsityPattern pattern_;
   const BandKernels* kernels_;  // without exchanges, where there are any for this band
   int width_;
-  std::vector<double> values_;
+  int value_stride_;
+  BandEntries values_;
   std::optional<BandStorage> plain_;
   std::optional<PivotedStorage> pivoted_;  // made when first needed
   bool exchanged_ = false;                 // the last factorisation

@@ -1,7 +1,6 @@
 #pragma once
 /// Memory of a band factorisation.
 
-#include <algorithm>
 #include <vector>
 
 #include "solvers/band_kernels.hpp"
@@ -19,6 +18,18 @@ class BandNumbers {
     double numbers[kBandPadding] = {};
   };
   std::vector<Block> blocks_;
+};
+
+/// Entries of a matrix, which kernels read a little beyond either end.
+class BandEntries {
+ public:
+  explicit BandEntries(std::size_t count) : numbers_(kBandPadding + count + kPadding, 0.0) {}
+  double* data() { return numbers_.data() + kBandPadding; }
+  const double* data() const { return numbers_.data() + kBandPadding; }
+  std::size_t size() const { return numbers_.size() - kBandPadding - kPadding; }
+
+ private:
+  std::vector<double> numbers_;
 };
 
 class BandStorage {

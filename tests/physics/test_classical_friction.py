@@ -292,3 +292,17 @@ def test_contacts_say_what_pressed_as_a_step_ended():
         simulation.step()
         pressed = weight + (simulation.momentum().linear[2] - before) / step
         assert simulation.contacts()["normal_force"].sum() == pytest.approx(pressed, rel=1e-6)
+
+
+def test_contacts_say_what_presses_at_a_stiffness_that_was_set():
+    """No step has pressed at it yet: as hard as it makes surfaces where they are."""
+    scene = withe.Scene()
+    rubber = withe.Material(youngs_modulus=1e9, poisson_ratio=0.4, density=1200.0)
+    scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=11, radius=5e-3, material=rubber)
+    scene.add_floor(-5e-3, friction=0.3)
+    scene.enable_contact(stiffness=5e3)
+    simulation = scene.build(integrator="backward_euler", time_step=2e-3, planar=False)
+    simulation.step(100)
+    before = simulation.contacts()["normal_force"]
+    simulation.set(contact_stiffness=1e5)
+    np.testing.assert_allclose(simulation.contacts()["normal_force"], 20.0 * before, rtol=1e-9)
