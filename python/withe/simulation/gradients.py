@@ -15,7 +15,7 @@ from withe.parts.handles import NodeHandle
 from withe.parts.kinds import SupportPart
 from withe.simulation.calls import Gradients, Ledger, RunJournal
 from withe.simulation.drawn import DrawnNodes, Moment
-from withe.simulation.losses import check_in_plane, readout_adjoints, readout_shape
+from withe.simulation.losses import check_in_plane, readout_adjoints, readout_shape, spoken
 from withe.simulation.session import Session
 from withe.simulation.unknowns import (
     INITIAL_WORDS,
@@ -83,20 +83,13 @@ def _gradients(session: Session, by: list[_core.ReadoutAdjoint], wrt: Sequence[U
         if works:
             drives, typical = (np.abs(np.asarray(read(work))).max(initial=0.0) for work in works)
             if drives > _DRIVES * typical:
+                name = unknown if isinstance(unknown, str) else f"{unknown[1]} of {spoken(unknown[0])}"
                 raise ValueError(
-                    f"no gradient by {_name(unknown)} is known: it drives a motion that costs nothing, and where that "
+                    f"no gradient by {name} is known: it drives a motion that costs nothing, and where that "
                     "leads does not follow from what acts; hold what is free to move or to spin"
                 )
         out.append([read(gradient) for gradient in scalars])
     return out
-
-
-def _name(unknown: Any) -> str:
-    """Of what is differentiated by, for messages."""
-    if not isinstance(unknown, tuple):
-        return str(unknown)
-    target, word = unknown
-    return f"{word} of {getattr(target, 'name', target)}"
 
 
 def _by_positions(values: FloatArray) -> _core.ReadoutAdjoint:

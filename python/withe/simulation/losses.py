@@ -15,7 +15,7 @@ from withe.parts.kinds import RodPart
 from withe.simulation.session import Session
 from withe.simulation.supports import find_support
 
-__all__ = ["READOUTS", "check_in_plane", "readout_adjoints", "readout_shape"]
+__all__ = ["READOUTS", "check_in_plane", "readout_adjoints", "readout_shape", "spoken"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -92,7 +92,7 @@ def _of_parts(session: Session, word: str, value: Mapping[Any, Any], frames: int
     shapes = {target: (frames, *readout_shape(session, target, word)) for target in value}
     table = np.zeros((frames, *_whole_shape(session, word)))
     for target, given in value.items():
-        array = validation.number_array(given, f"derivatives by {word} of {_name(target)}", shapes[target])
+        array = validation.number_array(given, f"derivatives by {word} of {spoken(target)}", shapes[target])
         rows = _rows(session, target, word)
         # A rod may pass a node twice.
         for frame, part in zip(table, array.reshape(frames, len(rows), *table.shape[2:]), strict=True):
@@ -129,5 +129,6 @@ def _as_rod(target: Any) -> Rod | str:
     return target
 
 
-def _name(target: Any) -> str:
+def spoken(target: Any) -> str:
+    """What a part is called in messages."""
     return repr(target if isinstance(target, str) else getattr(target, "name", target))
