@@ -5,39 +5,6 @@
 namespace withe::WITHE_INSTRUCTION_SET {
 namespace {
 
-/// The kLanes indices from `first`, the last one repeated; returns how many are real.
-int lanes_from(int first, int count, int (&index)[kLanes]) {
-  for (int l = 0; l < kLanes; ++l) index[l] = first + l < count ? first + l : count - 1;
-  return count - first < kLanes ? count - first : kLanes;
-}
-
-void store_first(double* place, Pack a, int count) {
-  if (count == kLanes) return store(place, a);
-  for (int l = 0; l < count; ++l) place[l] = a[l];
-}
-
-/// Rows of a table of three columns.
-Vec3<Pack> rows_from(const double* table, int first, int live) {
-  Pack number[3];
-  load_threes(table + std::ptrdiff_t{3} * first, live, number);
-  return {number[0], number[1], number[2]};
-}
-void store_rows(double* table, int first, int live, const Vec3<Pack>& v) {
-  store_threes(table + std::ptrdiff_t{3} * first, live, {v.x, v.y, v.z});
-}
-
-/// Three unknowns from each index on; read with the one before, as there may be none behind.
-Vec3<Pack> three_unknowns(const double* q, const int (&index)[kLanes]) {
-  const double* place[kLanes];
-  for (int l = 0; l < kLanes; ++l) {
-    if (index[l] == 0) return {gather(q, index), gather(q + 1, index), gather(q + 2, index)};
-    place[l] = q + index[l] - 1;
-  }
-  Pack number[4];
-  load_rows<4>(place, number);
-  return {number[1], number[2], number[3]};
-}
-
 void store_frames(double* frames, int first, int live, const Pack (&number)[kFrameNumbers]) {
   for (int k = 0; k < kFrameNumbers; k += kLanes) {
     Pack block[kLanes];

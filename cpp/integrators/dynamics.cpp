@@ -248,10 +248,13 @@ double account(Equations& equations, const Parameters& parameters, const StepPla
   return contact_loss;
 }
 
-/// The state becomes that at the end of the step.
+/// The state becomes that at the end of the step, whose configuration an energy-momentum step has found.
 void advance(const Equations& equations, const StepPlan& plan, const VectorX& q1, StepWorkspace& work, State& state) {
   const Model& model = equations.model();
-  if (!model.planar()) compute_configuration(model, state, q1, work.after);
+  if (plan.rule == StepRule::energy_momentum && work.newton.data.end == q1)
+    std::swap(work.after, work.newton.data.end_configuration);
+  else if (!model.planar())
+    compute_configuration(model, state, q1, work.after);
   if (state.motion.velocity[0].size() != 0) remember_motion(q1, plan.dt, state);
   accept_configuration(model, q1, work.after, state);
   state.v = work.velocity;

@@ -33,8 +33,20 @@ StrainBatch strain_batch(const Model& model, Configuration& out) {
           .column = out.bend_strain.rows()};
 }
 
-void compute_planar(const Model& model, const VectorX& q, Configuration& out) {
-  frame_kernels().planar_edges(edge_batch(model, q, out));
+/// Attached ends of joints, in a plane.
+void attach_planar(const Model& model, const VectorX& q, Configuration& out) {
+  for (std::size_t h = 0; h < model.half.size(); ++h) {
+    const FrameStencil& s = model.half[h];
+    const double angle = q(model.frame_dof[static_cast<std::size_t>(s.frame)]);
+    const Vector3 drawn = s.attachment.col(2);
+    const double x = drawn.dot(model.plane->first), y = drawn.dot(model.plane->second);
+    const double c = std::cos(angle), sn = std::sin(angle);
+    out.attached[h].tangent = {c * x - sn * y, sn * x + c * y, 0.0};
+    out.attached[h].inverse_length = 1.0;
+  }
+}
+
+void compute_planar_strains(const Model& model, Configuration& out) {
   frame_kernels().planar_strains(strain_batch(model, out));
   for (int b : model.reversed_bend) {
     const BendStencil& s = model.bend[static_cast<std::size_t>(b)];
@@ -44,14 +56,7 @@ void compute_planar(const Model& model, const VectorX& q, Configuration& out) {
   }
   for (std::size_t h = 0; h < model.half.size(); ++h) {
     const FrameStencil& s = model.half[h];
-    const double angle = q(model.frame_dof[static_cast<std::size_t>(s.frame)]);
-    const Vector3 drawn = s.attachment.col(2);
-    const double x = drawn.dot(model.plane->first), y = drawn.dot(model.plane->second);
-    const double c = std::cos(angle), sn = std::sin(angle);
-    const Vec3d a{c * x - sn * y, sn * x + c * y, 0.0};
-    const Vec3d& t = out.edge[static_cast<std::size_t>(s.edge)].tangent;
-    out.attached[h].tangent = a;
-    out.attached[h].inverse_length = 1.0;
+    const Vec3d &a = out.attached[h].tangent, &t = out.edge[static_cast<std::size_t>(s.edge)].tangent;
     out.half_strain(static_cast<Eigen::Index>(h), 0) =
         s.frame_first ? planar_kappa(a.x, a.y, t.x, t.y) : planar_kappa(t.x, t.y, a.x, a.y);
   }
@@ -64,18 +69,8 @@ EdgeBatch spatial_batch(const Model& model, const State& state, const VectorX& q
   return edges;
 }
 
-/// All that follows from the frames of the edges, in space.
-void compute_strains(const Model& model, const State& state, const VectorX& q, Configuration& out) {
-  StrainBatch strains = strain_batch(model, out);
-  strains.previous_tau = state.bend_tau.data();
-  frame_kernels().strains(strains);
-  for (int b : model.reversed_bend) {
-    const BendStencil& s = model.bend[static_cast<std::size_t>(b)];
-    const auto strain =
-        bend_twist_strain(oriented(out.edge[static_cast<std::size_t>(s.edge[0])], s.sign[0]),
-                          oriented(out.edge[static_cast<std::size_t>(s.edge[1])], s.sign[1]), state.bend_tau(b));
-    out.bend_strain.row(b) << strain.kappa1, strain.kappa2, strain.tau;
-  }
+/// Joints' frames and what is attached to them, in space.
+void attach(const Model& model, const State& state, const VectorX& q, Configuration& out) {
   for (int f = 0; f < model.frame_count; ++f) {
     const auto i = static_cast<std::size_t>(f);
     out.frame[i] = cayley(q.segment<3>(model.frame_dof[i])) * state.frame[i];
@@ -89,6 +84,23 @@ void compute_strains(const Model& model, const State& state, const VectorX& q, C
     }
     m = out.frame[static_cast<std::size_t>(s.frame)] * m;
     out.attached[h] = {to_vec3(m.col(2)), to_vec3(m.col(0)), to_vec3(m.col(1)), 1.0, {}, {}};
+  }
+}
+
+/// All that follows from the frames, in space.
+void compute_strains(const Model& model, const State& state, Configuration& out) {
+  StrainBatch strains = strain_batch(model, out);
+  strains.previous_tau = state.bend_tau.data();
+  frame_kernels().strains(strains);
+  for (int b : model.reversed_bend) {
+    const BendStencil& s = model.bend[static_cast<std::size_t>(b)];
+    const auto strain =
+        bend_twist_strain(oriented(out.edge[static_cast<std::size_t>(s.edge[0])], s.sign[0]),
+                          oriented(out.edge[static_cast<std::size_t>(s.edge[1])], s.sign[1]), state.bend_tau(b));
+    out.bend_strain.row(b) << strain.kappa1, strain.kappa2, strain.tau;
+  }
+  for (std::size_t h = 0; h < model.half.size(); ++h) {
+    const FrameStencil& s = model.half[h];
     const EdgeFrame<double>& edge = out.edge[static_cast<std::size_t>(s.edge)];
     const auto i = static_cast<Eigen::Index>(h);
     const auto strain = s.frame_first ? bend_twist_strain(out.attached[h], edge, state.half_tau(i))
@@ -162,14 +174,20 @@ void accept_frames(const Model& model, const Configuration& configuration, State
 
 }  // namespace
 
-void compute_configuration(const Model& model, const State& state, const VectorX& q, Configuration& out) {
+void compute_frames(const Model& model, const State& state, const VectorX& q, Configuration& out) {
   allocate(model, out);
   if (model.planar()) {
-    compute_planar(model, q, out);
-    return;
+    frame_kernels().planar_edges(edge_batch(model, q, out));
+    attach_planar(model, q, out);
+  } else {
+    frame_kernels().edges(spatial_batch(model, state, q, out));
+    attach(model, state, q, out);
   }
-  frame_kernels().edges(spatial_batch(model, state, q, out));
-  compute_strains(model, state, q, out);
+}
+
+void compute_configuration(const Model& model, const State& state, const VectorX& q, Configuration& out) {
+  compute_frames(model, state, q, out);
+  model.planar() ? compute_planar_strains(model, out) : compute_strains(model, state, out);
 }
 
 double advance_configuration(const Model& model, const State& state, const VectorX& q, Configuration& out,
@@ -178,7 +196,8 @@ double advance_configuration(const Model& model, const State& state, const Vecto
   const double cosine = frame_kernels().advance({.edges = spatial_batch(model, state, q, out),
                                                  .next_source = &next.tangent.data()->x,
                                                  .next_reference = &next.director.data()->x});
-  compute_strains(model, state, q, out);
+  attach(model, state, q, out);
+  compute_strains(model, state, out);
   next.q = q;
   accept_frames(model, out, next);
   return cosine;

@@ -136,6 +136,8 @@ struct Configuration {
 
 /// Fills `out` from q, measured from the frames of `state`. Does not allocate after the first call.
 void compute_configuration(const Model& model, const State& state, const VectorX& q, Configuration& out);
+/// The same without strains.
+void compute_frames(const Model& model, const State& state, const VectorX& q, Configuration& out);
 /// Directors of an edge in the axes of space: columns d1, d2, t.
 Matrix3 edge_directors(const Model& model, const Configuration& c, int edge);
 

@@ -47,11 +47,12 @@ void ElasticForces::begin(StepProblem& problem) {
 }
 
 /// Configurations; and rates of strain of a step under the midpoint rules, from its ends. The Jacobian takes those of
-/// its middle instead.
+/// its middle instead. Discrete gradients ask for no strains in the middle.
 void ElasticForces::find(const StepProblem& problem, StepData& data, Assembler&, bool) {
   const Model& model = problem.model;
-  compute_configuration(model, *problem.start, data.z, data.configuration);
   const bool viscous = problem.viscous_acts() && problem.in_middle();
+  (problem.conserves_energy() && !viscous ? compute_frames : compute_configuration)(model, *problem.start, data.z,
+                                                                                    data.configuration);
   if (!problem.conserves_energy() && !viscous) return;
   problem.set_end(data.z, data.end);
   compute_configuration(model, *problem.start, data.end, data.end_configuration);

@@ -9,64 +9,50 @@
 #include "geometry/rotation.hpp"
 #include "model/edge_vectors.hpp"
 #include "steps/turning_inertia.hpp"
+#include "steps/turning_kernels.hpp"
 #include "steps/turning_slopes.hpp"
 
 namespace withe {
 namespace {
 
-[[gnu::always_inline]] inline TurningEdge<double> turning_edge(const StepProblem& problem, const StepData& data,
-                                                               bool in_middle, bool conserves, int edge) {
-  const EdgeFrame<double>& f = data.configuration.edge[at(edge)];
-  const int angle = problem.model.edge_dof[at(edge)];
-  TurningEdge<double> out{.tangent = f.tangent,
-                          .spin = f.spin,
-                          .inverse_length = f.inverse_length,
-                          .start_tangent = problem.start->tangent[at(edge)],
-                          .end_tangent = {},
-                          .start_length = 0.0,
-                          .end_length = 0.0,
-                          .change = data.z[angle] - problem.start->q[angle],
-                          .start_rate = problem.start->v[angle]};
-  if (conserves) {
-    out.end_tangent = data.end_configuration.edge[at(edge)].tangent;
-    out.start_length = problem.start_configuration.length[edge];
-    out.end_length = data.end_configuration.length[edge];
-  } else if (in_middle) {
-    const Vec3d e1 =
-        2.0 * edge_vector(problem.model, data.z, edge) - edge_vector(problem.model, problem.start->q, edge);
-    out.end_tangent = (1.0 / std::sqrt(dot(e1, e1))) * e1;
-  }
-  return out;
-}
-
-[[gnu::always_inline]] inline TurningForce<double> turning_force(const StepProblem& problem, const StepData& data,
-                                                                 bool in_middle, bool conserves, double inertia,
-                                                                 int edge) {
-  const TurningEdge<double> turning = turning_edge(problem, data, in_middle, conserves, edge);
-  if (in_middle) return midpoint_turning(inertia, 2.0 * problem.interval, conserves, turning);
-  const Vec3d moved = edge_vector(problem.model, data.z, edge) - edge_vector(problem.model, problem.start->q, edge);
-  return euler_turning(inertia, problem.interval, turning, moved);
+/// Forces and torques of edges that spin and turn, whose moments of inertia are these.
+void find_turning(const StepProblem& problem, const StepData& data, const VectorX& inertia, TurningForces& out) {
+  const Model& model = problem.model;
+  out.head.resize(3 * Eigen::Index{model.edge_count});
+  out.torque.resize(model.edge_count);
+  const TurningBatch batch{.count = model.edge_count,
+                           .tail = model.tail_dof.data(),
+                           .head = model.head_dof.data(),
+                           .angle = model.edge_dof.data(),
+                           .z = data.z.data(),
+                           .start_q = problem.start->q.data(),
+                           .start_v = problem.start->v.data(),
+                           .interval = problem.interval,
+                           .inertia = inertia.data(),
+                           .frames = &data.configuration.edge.data()->tangent.x,
+                           .start_tangent = &problem.start->tangent.data()->x,
+                           .start_length = problem.start_configuration.length.data(),
+                           .end_length = data.end_configuration.length.data(),
+                           .end_frames = &data.end_configuration.edge.data()->tangent.x,
+                           .force = out.head.data(),
+                           .torque = out.torque.data()};
+  const TurningKernels& kernels = turning_kernels();
+  const auto kernel = problem.conserves_energy() ? kernels.energy_momentum
+                      : problem.in_middle()      ? kernels.midpoint
+                                                 : kernels.euler;
+  kernel(batch);
 }
 
 /// Inertia of edges that spin and turn: under backward Euler what the mass matrix knows nothing of, under the midpoint
 /// rules all of it.
-template <bool in_middle, bool conserves>
-void set_turning_edges(const StepProblem& problem, StepData& data) {
+void add_turning_edges(const StepProblem& problem, StepData& data) {
   const Model& model = problem.model;
+  TurningForces& forces = data.turning_forces;
+  find_turning(problem, data, problem.parameters->edge_inertia, forces);
   for (int e = 0; e < model.edge_count; ++e) {
-    const TurningForce<double> force =
-        turning_force(problem, data, in_middle, conserves, problem.parameters->edge_inertia[e], e);
-    if (in_middle) data.inertia[model.edge_dof[at(e)]] = force.torque;
-    add_to_edge(model, e, force.head, data.gradient);
+    if (problem.in_middle()) data.inertia[model.edge_dof[at(e)]] = forces.torque[e];
+    add_to_edge(model, e, forces.at_head(e), data.gradient);
   }
-}
-void set_turning_edges(const StepProblem& problem, StepData& data) {
-  if (problem.conserves_energy())
-    set_turning_edges<true, true>(problem, data);
-  else if (problem.in_middle())
-    set_turning_edges<true, false>(problem, data);
-  else
-    set_turning_edges<false, false>(problem, data);
 }
 
 /// Inertia of frames under the midpoint rules: moments J^T m where a Cayley vector's spin is J dw; in energy-momentum
@@ -120,7 +106,8 @@ void add_edge_slopes(const StepProblem& problem, StepData& data, const ElementTa
   }
 }
 
-void add_turning_adjoint(const StepProblem& problem, const StepData& data, int edge, StepAdjoint& adjoint) {
+void add_turning_adjoint(const StepProblem& problem, const StepData& data, const TurningForces& unit, int edge,
+                         StepAdjoint& adjoint) {
   const Model& model = problem.model;
   const int tail = model.tail_dof[at(edge)], head = model.head_dof[at(edge)], angle = model.edge_dof[at(edge)];
   const Vec3d apart = edge_vector(model, adjoint.rows, edge);
@@ -138,9 +125,7 @@ void add_turning_adjoint(const StepProblem& problem, const StepData& data, int e
   }
   adjoint.start[angle] += by[7];
   adjoint.velocity[angle] += by[8];
-  const TurningForce<double> unit =
-      turning_force(problem, data, problem.in_middle(), problem.conserves_energy(), 1.0, edge);
-  adjoint.coefficients.mass[angle] += dot(apart, unit.head) + about * unit.torque;
+  adjoint.coefficients.mass[angle] += dot(apart, unit.at_head(edge)) + about * unit.torque[edge];
 }
 
 void add_frame_slopes(const StepProblem& problem, const StepData& data, const Assembler& assembler,
@@ -194,7 +179,7 @@ void Inertia::add(const StepProblem& problem, StepData& data, const Assembler& a
   data.acceleration = inverse * (inverse * (data.z - problem.start->q) - problem.start->v);
   if (problem.held_acceleration.size() != 0) assembler.set_held_part(problem.held_acceleration, data.acceleration);
   multiply(problem.model, problem.mass, data.acceleration, data.inertia);
-  if (!problem.model.planar()) set_turning_edges(problem, data);
+  if (!problem.model.planar()) add_turning_edges(problem, data);
   if (problem.in_middle()) set_turning_frames(problem, data);
   const bool turning_too = problem.exact && !values.empty();
   if (turning_too && problem.in_middle()) add_frame_slopes(problem, data, assembler, values);
@@ -234,7 +219,9 @@ void Inertia::add_adjoint(const StepProblem& problem, const StepData& data, cons
     }
     return;
   }
-  for (int e = 0; e < model.edge_count; ++e) add_turning_adjoint(problem, data, e, adjoint);
+  TurningForces unit;  // of edges with unit moments of inertia
+  find_turning(problem, data, VectorX::Ones(model.edge_count), unit);
+  for (int e = 0; e < model.edge_count; ++e) add_turning_adjoint(problem, data, unit, e, adjoint);
 }
 
 /// What couples nodes off the diagonal is less on it.
@@ -276,10 +263,27 @@ void for_each_turn(const Model& model, const Set& set) {
     for (int e = 0; e < model.edge_count; ++e) set(model.edge_dof[at(e)]);
 }
 
+/// The same with their `finite_turn`, by `change`.
+template <class Use>
+void for_each_finite_turn(const Model& model, const VectorX& change, const Use& use) {
+  if (model.planar()) {
+    for_each_turn(model, [&](int dof) { use(dof, finite_turn(change[dof])); });
+    return;
+  }
+  constexpr int kSome = 64;
+  double turn[kSome];
+  for (int first = 0; first < model.edge_count; first += kSome) {
+    const int count = std::min(kSome, model.edge_count - first);
+    const int* angle = &model.edge_dof[at(first)];
+    turning_kernels().finite_turns(count, angle, change.data(), turn);
+    for (int i = 0; i < count; ++i) use(angle[i], turn[i]);
+  }
+}
+
 }  // namespace
 
 void set_turning_velocities(const Model& model, const VectorX& v0, const VectorX& change, double dt, VectorX& v1) {
-  for_each_turn(model, [&](int dof) { v1[dof] = 2.0 * finite_turn(change[dof]) / dt - v0[dof]; });
+  for_each_finite_turn(model, change, [&](int dof, double turn) { v1[dof] = 2.0 * turn / dt - v0[dof]; });
 }
 
 double farthest_turn(const Model& model, const VectorX& q0, const VectorX& q1) {
@@ -296,26 +300,23 @@ void set_velocity_rates(const Model& model, const VectorX& change, double dt, Ve
   });
 }
 
-/// 2 tan(D theta / 2) over how much of the mean of an edge's tangents lies along it in the middle.
-double working_turn(const StepProblem& problem, const StepData& data, int edge, double change) {
+/// How much of the mean of an edge's tangents at both ends of a step lies along it in the middle.
+double mean_along_middle(const StepProblem& problem, const StepData& data, int edge) {
   const Vec3d mean =
       0.5 * (problem.start_configuration.edge[at(edge)].tangent + data.end_configuration.edge[at(edge)].tangent);
-  return finite_turn(change) / dot(mean, data.configuration.edge[at(edge)].tangent);
+  return dot(mean, data.configuration.edge[at(edge)].tangent);
 }
 
 void set_working_change(const StepProblem& problem, const StepData& data, const VectorX& change, VectorX& working) {
+  const Model& model = problem.model;
   working = change;
-  for (int f = 0; f < problem.model.frame_count; ++f) {
-    const int dof = problem.model.frame_dof[at(f)];
-    if (problem.model.planar())
-      working[dof] = finite_turn(change[dof]);
-    else
-      working.segment<3>(dof) *= 1.0 + 0.0625 * change.segment<3>(dof).squaredNorm();
+  for_each_finite_turn(model, change, [&](int dof, double turn) { working[dof] = turn; });
+  if (model.planar()) return;
+  for (int f = 0; f < model.frame_count; ++f) {
+    const int dof = model.frame_dof[at(f)];
+    working.segment<3>(dof) *= 1.0 + 0.0625 * change.segment<3>(dof).squaredNorm();
   }
-  for (int e = 0; !problem.model.planar() && e < problem.model.edge_count; ++e) {
-    const int dof = problem.model.edge_dof[at(e)];
-    working[dof] = working_turn(problem, data, e, change[dof]);
-  }
+  for (int e = 0; e < model.edge_count; ++e) working[model.edge_dof[at(e)]] /= mean_along_middle(problem, data, e);
 }
 
 void set_working_rows(const StepProblem& problem, const StepData& data, const VectorX& change, VectorX& rows) {
@@ -329,7 +330,8 @@ void set_working_rows(const StepProblem& problem, const StepData& data, const Ve
     if (problem.model.planar()) continue;
     for (int edge : s.edges) {
       const int dof = problem.model.edge_dof[at(edge)];
-      rows[dof] += data.elastic_rows[dof] * (ratio(working_turn(problem, data, edge, change[dof]), change[dof]) - 1.0);
+      const double turn = finite_turn(change[dof]) / mean_along_middle(problem, data, edge);
+      rows[dof] += data.elastic_rows[dof] * (ratio(turn, change[dof]) - 1.0);
     }
   }
 }

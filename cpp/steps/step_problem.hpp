@@ -94,6 +94,14 @@ struct Wrench {
   Vector3 force = Vector3::Zero(), moment = Vector3::Zero();  ///< [N], [N m]
 };
 
+/// Inertia of edges that spin and turn, per edge: the force at its head, and the torque.
+struct TurningForces {
+  VectorX head;    ///< three numbers each [N]
+  VectorX torque;  ///< [N m]
+
+  Vec3d at_head(int edge) const { return {head[3 * edge], head[3 * edge + 1], head[3 * edge + 2]}; }
+};
+
 /// What an evaluation of a problem finds; owned by who asks for it.
 struct StepData {
   VectorX residual;       ///< projected onto free directions
@@ -119,8 +127,9 @@ struct StepData {
   AppliedForces custom;                 ///< custom forces at z
   VectorX velocity;                     ///< (z - q0) / h
   VectorX acceleration, inertia;        ///< M times the acceleration [N], [N m]
-  VectorX drag_force;                   ///< [N]
-  VectorX flow_force, flow_drag;        ///< of a fluid, and its local drag [N]
+  TurningForces turning_forces;
+  VectorX drag_force;             ///< [N]
+  VectorX flow_force, flow_drag;  ///< of a fluid, and its local drag [N]
   VectorX contact_gradient, contact_floor;
   std::vector<Wrench> hands;           ///< per support: of those that yield on the rod, about the origin
   std::vector<TurningSlopes> turning;  ///< per edge, of an exact matrix in space

@@ -1,6 +1,6 @@
 #pragma once
-/// Inertia of an edge about itself, on any scalar: doubles, or dual numbers for its derivatives. Inlined into loops
-/// over edges, whose vectors would go through memory otherwise.
+/// Inertia of an edge about itself, on any scalar: packs of edges, or dual numbers for its derivatives. Its moment of
+/// inertia is of the same type, or a double.
 
 #include "geometry/finite_turn.hpp"
 #include "geometry/frames.hpp"
@@ -27,23 +27,22 @@ struct TurningForce {
 
 /// An edge that spins at omega and turns also needs the couple I omega t x dt/dt: nodal forces
 /// +- I omega (dt/dt x t) / l, which do no work; this one acts at its head. `rate`: of the edge's vector.
-template <class Scalar>
-Vec3<Scalar> spin_couple(double inertia, const Scalar& omega, const Vec3<Scalar>& rate, const Vec3<Scalar>& tangent,
-                         const Scalar& inverse_length) {
+template <class Scalar, class Number>
+Vec3<Scalar> spin_couple(const Number& inertia, const Scalar& omega, const Vec3<Scalar>& rate,
+                         const Vec3<Scalar>& tangent, const Scalar& inverse_length) {
   return (inertia * omega * inverse_length * inverse_length) * cross(rate, tangent);
 }
 
 /// Of a step of backward Euler over h. psi = theta + spin . e is what turns: the edge's inertia acts on the nodes as
 /// its elastic torque does. It does no work either, since spin is normal to the edge before and now.
-template <class Scalar>
-[[gnu::always_inline]] inline TurningForce<Scalar> euler_turning(double inertia, double interval,
+template <class Scalar, class Number>
+[[gnu::always_inline]] inline TurningForce<Scalar> euler_turning(const Number& inertia, double interval,
                                                                  const TurningEdge<Scalar>& edge,
                                                                  const Vec3<Scalar>& moved) {
   const double inverse = 1.0 / interval;
   const Scalar omega = inverse * edge.change;
   const Scalar torque = inertia * (omega - edge.start_rate) * inverse;
-  return {spin_couple<Scalar>(inertia, omega, Scalar(inverse) * moved, edge.tangent, edge.inverse_length) +
-              torque * edge.spin,
+  return {spin_couple(inertia, omega, Scalar(inverse) * moved, edge.tangent, edge.inverse_length) + torque * edge.spin,
           torque};
 }
 
@@ -52,8 +51,9 @@ template <class Scalar>
 /// moment like any other, about where the edge is in the middle. In energy-momentum steps omega is 2 tan(D theta / 2) /
 /// dt, as in a rigid rotation of the whole, and an axial force that vanishes with the square of the step makes the work
 /// of m what kinetic energy changes by.
-template <class Scalar>
-[[gnu::always_inline]] inline TurningForce<Scalar> midpoint_turning(double inertia, double dt, bool conserves_energy,
+template <class Scalar, class Number>
+[[gnu::always_inline]] inline TurningForce<Scalar> midpoint_turning(const Number& inertia, double dt,
+                                                                    bool conserves_energy,
                                                                     const TurningEdge<Scalar>& edge) {
   const double inverse = 1.0 / dt;
   const Scalar change = 2.0 * edge.change;

@@ -1,0 +1,3 @@
+#define WITHE_INSTRUCTION_SET baseline
+#define WITHE_LANES 2
+#include "steps/turning_kernels_body.hpp"
