@@ -103,9 +103,46 @@ std::string why_off_plane(const SceneDescription& scene, const RodDescription& r
   return "";
 }
 
+/// Whether a direction is the plane's normal or lies in the plane, so that the mirror image of what belongs to it is
+/// itself.
+bool is_mirrored(const Vector3& direction, const Vector3& normal) {
+  constexpr double kAngle = 1e-9;
+  return std::abs(direction.dot(normal)) <= kAngle * direction.norm() ||
+         direction.cross(normal).norm() <= kAngle * direction.norm();
+}
+
+/// Axes of a hand that yields, as columns, before it moves. A rod in a plane keeps the angles of its directors to it.
+Matrix3 hand_axes(const SceneDescription& scene, const SupportDescription& support) {
+  if (support.hand.posed) return support.hand.rotation;
+  const RodDescription& rod = scene.rods[static_cast<std::size_t>(support.pass.rod)];
+  const Vector3 d1 = rod.directors.row(0);
+  const Vector3 t = (scene.positions.row(rod.nodes[1]) - scene.positions.row(rod.nodes[0])).normalized();
+  Matrix3 axes;
+  axes << d1, t.cross(d1), t;
+  return axes;
+}
+
+/// Whether the springs of a hand push out of the plane what moves in it: not where the normal is an axis of both.
+bool leans(const SceneDescription& scene, const SupportDescription& support, const Vector3& normal) {
+  const HandDescription& hand = support.hand;
+  if (support.kind != SupportKind::hand || !hand.yields || hand.slides) return false;
+  const Matrix3 axes = hand_axes(scene, support);
+  for (int first : {0, 3}) {
+    const Vector3 k{hand.stiffness[static_cast<std::size_t>(first)],
+                    hand.stiffness[static_cast<std::size_t>(first + 1)],
+                    hand.stiffness[static_cast<std::size_t>(first + 2)]};
+    const Vector3 pull = axes * k.cwiseProduct(axes.transpose() * normal);
+    if (pull.cross(normal).norm() > 1e-9 * k.maxCoeff()) return true;
+  }
+  return false;
+}
+
 /// The same of all that is in the scene.
 std::string why_off_plane(const SceneDescription& scene, const Vector3& normal) {
   const auto across = [&](const Vector3& v) { return v.cross(normal).norm() > kTolerance * 100 * v.norm(); };
+  for (const JointDescription& joint : scene.joints)
+    for (const RevoluteLink& link : joint.links)
+      if (!is_mirrored(link.axis, normal)) return "the axis of a revolute joint lies at an angle to the plane";
   for (const LoadDescription& load : scene.loads)
     for (const auto& value : load.values.rowwise())
       if (!load.added && is_axial(load.kind) && across(value.transpose()))
@@ -115,6 +152,7 @@ std::string why_off_plane(const SceneDescription& scene, const Vector3& normal) 
   for (const SupportDescription& support : scene.supports) {
     const Vector3 image = support.free * normal;
     if ((image - normal * normal.dot(image)).norm() > 1e-9) return "a support may slide out of the plane";
+    if (leans(scene, support, normal)) return "the axes of a hand lie at an angle to the plane";
   }
   const Vector3 corner = scene.positions.row(scene.rods.front().nodes.front());
   for (const ObstacleDescription& o : scene.contact.obstacles)

@@ -331,6 +331,10 @@ void World::Implementation::leave_plane_for(const ParameterSetting& setting) {
         return leave_plane("natural curvature" + name());
   } else if (kind == ParameterKind::natural_twist) {
     if ((values.array() != 0.0).any()) leave_plane("natural twist" + name());
+  } else if (kind == ParameterKind::bend_stiffness) {
+    const Vector2 p = model.planar_components[at(rod)];
+    const bool isotropic = (values.col(0).array() == values.col(1).array()).all();
+    if (!isotropic && p.cwiseAbs().minCoeff() > 1e-9) leave_plane("the section" + name() + ", at an angle to it,");
   } else if (kind == ParameterKind::gravity) {
     const Vector3 gravity = values.row(0);
     if (std::abs(gravity.dot(model.plane->normal)) > 1e-8 * gravity.norm()) leave_plane("gravity");
