@@ -62,16 +62,7 @@ class Readouts {
     }
   }
 
-  void add_tensions(const VectorX& by) {
-    StrainGradients strains;
-    for (int e = 0; e < model_.edge_count; ++e) {
-      stretch_gradients(model_, c_, e, strains);
-      add_gradient(assembler_.stretch, e, strains.gradient[0], by(e) * p_.edge_stretch(e), out_.q);
-      by_.stretch_stiffness(e) += by(e) * (strains.strain[0] - (p_.edge_natural_stretch(e) - 1.0));
-      by_.stretch_natural(e) -= by(e) * p_.edge_stretch(e);
-      by_.rest_length(e) -= by(e) * p_.edge_stretch(e) * (1.0 + strains.strain[0]) / model_.edge_length(e);
-    }
-  }
+  void add_tensions(const VectorX& by) { add_axial_forces(model_, p_, c_, by, out_.q, by_); }
 
   void add_stencils(const MatrixX2& curvatures, const VectorX& twists) {
     Eigen::Index row = 0;

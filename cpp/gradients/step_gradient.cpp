@@ -26,6 +26,18 @@ EquationOptions exact(EquationOptions options) {
 
 }  // namespace
 
+void add_axial_forces(const Model& model, const Parameters& parameters, const Configuration& configuration,
+                      const VectorX& by, VectorX& unknowns, CoefficientAdjoint& coefficients) {
+  for (int e = 0; e < model.edge_count; ++e) {
+    const double inverse_rest = 1.0 / model.edge_length(e), stretch = configuration.length(e) * inverse_rest;
+    const double stiffness = by(e) * parameters.edge_stretch(e);
+    add_to_edge(model, e, (stiffness * inverse_rest) * configuration.edge[at(e)].tangent, unknowns);
+    coefficients.stretch_stiffness(e) += by(e) * (stretch - parameters.edge_natural_stretch(e));
+    coefficients.stretch_natural(e) -= stiffness;
+    coefficients.rest_length(e) -= stiffness * stretch * inverse_rest;
+  }
+}
+
 StepGradient::StepGradient(const Model& model, EquationOptions options) : equations_(model, exact(options)) {}
 
 void StepGradient::begin(const StepTaken& step) {
@@ -119,7 +131,7 @@ void StepGradient::solve() {
 }
 
 void StepGradient::pull_back(StateAdjoint& state, CoefficientAdjoint& by, HeldAdjoint& held,
-                             const ReactionAdjoint* reactions) {
+                             const ReactionAdjoint* reactions, const VectorX* tensions) {
   const Model& model = equations_.model();
   const Assembler& assembler = equations_.assembler();
   const HandForces* yielding = equations_.hands();
@@ -142,6 +154,7 @@ void StepGradient::pull_back(StateAdjoint& state, CoefficientAdjoint& by, HeldAd
   by_z_ = end_rate() * by_end_;
   by_rows_.resize(0);
   if (reactions) add_reactions(*reactions, adjoint);
+  if (tensions) add_axial_forces(model, step_->parameters, data_.configuration, *tensions, by_z_, by);
   solve();
 
   rows = rows_;

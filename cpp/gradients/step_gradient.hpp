@@ -67,6 +67,10 @@ struct HeldAdjoint {
   explicit HeldAdjoint(const Model& model) : pose(VectorX::Zero(model.dof_count)), mean(pose), hands(model) {}
 };
 
+/// Adds derivatives by axial forces in a configuration: to those by its unknowns, and by coefficients.
+void add_axial_forces(const Model& model, const Parameters& parameters, const Configuration& configuration,
+                      const VectorX& by, VectorX& unknowns, CoefficientAdjoint& coefficients);
+
 class StepGradient {
  public:
   StepGradient(const Model& model, EquationOptions options);
@@ -79,10 +83,10 @@ class StepGradient {
   /// Of the last evaluation: greatest force out of balance, beyond rounding, over the greatest that there is [-].
   double imbalance() const;
   /// Makes of the adjoint of the state at the end that of the state at the start, and adds what coefficients and held
-  /// unknowns (at the end, in coordinates of the state) contribute. `reactions`: of this step, by which the scalar goes
-  /// besides. Throws std::invalid_argument where no gradient is known.
+  /// unknowns (at the end, in coordinates of the state) contribute. `reactions`, and `tensions` in the middle, per edge
+  /// [1/N]: of this step, by which the scalar goes besides. Throws std::invalid_argument where no gradient is known.
   void pull_back(StateAdjoint& state, CoefficientAdjoint& by, HeldAdjoint& held,
-                 const ReactionAdjoint* reactions = nullptr);
+                 const ReactionAdjoint* reactions = nullptr, const VectorX* tensions = nullptr);
   /// Of an equilibrium: adds the derivatives of the work of its residual over a motion.
   void add_work_along(const VectorX& motion, CoefficientAdjoint& by, HeldAdjoint& held);
 

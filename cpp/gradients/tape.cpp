@@ -127,7 +127,7 @@ void Tape::record(const AcceptedStep& step) {
   acting_.record(steps_.size(), step.parameters);
   steps_.push_back({step.rule, step.duration, after.time, step.end, held_velocities(after.v), held_gains(step),
                     step.reached, moved_hands(step.hands), moved_obstacles(after.obstacles), after.contacts,
-                    step.begins, step.unknown});
+                    step.begins, step.unknown, step.tensions_in_middle});
   const VectorX before = held_velocities(last_velocity_);
   const double moved = steps_.back().held.norm() + before.norm();
   if (moved * std::abs(step.duration) <= kRounding * std::max(model_.length_scale, 1.0)) {
@@ -265,6 +265,7 @@ class Tape::Moments {
       last = moment.steps;
       moment.by.check(tape.model_);
       if (moment.by.has_reactions()) add_reactions(moment, by_poses);
+      if (moment.by.tensions.size() != 0 && tensions_in_middle(moment.steps)) add_tensions(moment);
     }
   }
 
@@ -274,14 +275,24 @@ class Tape::Moments {
     for (; left_ > 0 && moments_[left_ - 1].steps == static_cast<long>(steps); --left_) {
       const ReadoutAdjoint& by = moments_[left_ - 1].by;
       add_unknowns(tape_.model_, by, adjoint);
-      if (!by.needs_state()) continue;
+      ReadoutAdjoint of_state = by;
+      if (tensions_in_middle(static_cast<long>(steps))) of_state.tensions.resize(0);
+      if (!of_state.needs_state()) continue;
       const Parameters& shown = shown_parameters(static_cast<long>(steps), &parameters);
       CoefficientAdjoint coefficients(tape_.model_, shown.loads.rows());
-      add_readouts(tape_.model_, assembler, shown, state(), by, adjoint, coefficients);
+      add_readouts(tape_.model_, assembler, shown, state(), of_state, adjoint, coefficients);
       const double time = steps == 0 ? tape_.starts_.front().time : tape_.steps_[steps - 1].time;
       visit_(static_cast<long>(steps), static_cast<long>(left_) - 1, time,
              parameter_gradient(tape_.model_, shown, coefficients));
     }
+  }
+
+  /// By the axial forces in the middle of a step; or nothing. To be asked from the last step on.
+  std::optional<VectorX> tensions(std::size_t step) {
+    if (tensions_.empty() || tensions_.back().first != step) return std::nullopt;
+    std::optional<VectorX> found = std::move(tensions_.back().second);
+    tensions_.pop_back();
+    return found;
   }
 
   /// By the reactions of a step; or nothing. To be asked from the last step on.
@@ -293,6 +304,19 @@ class Tape::Moments {
   }
 
  private:
+  /// Whether axial forces after so many steps are read out in the middle of the last one.
+  bool tensions_in_middle(long steps) const {
+    return steps > 0 && tape_.steps_[static_cast<std::size_t>(steps - 1)].tensions_in_middle;
+  }
+
+  void add_tensions(const MomentAdjoint& moment) {
+    const auto step = static_cast<std::size_t>(moment.steps - 1);
+    if (tensions_.empty() || tensions_.back().first != step)
+      tensions_.emplace_back(step, moment.by.tensions);
+    else
+      tensions_.back().second += moment.by.tensions;
+  }
+
   /// Reactions are the means over the parts of a time step, about where hands are at its end.
   void add_reactions(const MomentAdjoint& moment, bool by_poses) {
     if (moment.steps == 0)
@@ -338,6 +362,7 @@ class Tape::Moments {
   std::size_t left_;
   Parameters shown_;
   std::vector<std::pair<std::size_t, ReactionAdjoint>> reactions_;
+  std::vector<std::pair<std::size_t, VectorX>> tensions_;
 };
 
 InitialGradient Tape::gradient(const std::vector<MomentAdjoint>& given, const ParameterVisitor& visit,
@@ -358,7 +383,9 @@ InitialGradient Tape::gradient(const std::vector<MomentAdjoint>& given, const Pa
     if (begins) time = acting_time(steps_[k]);
     held.pose.setZero();
     const std::optional<ReactionAdjoint> reactions = moments.reactions(k);
-    passage.gradient.pull_back(adjoint, coefficients, held, reactions ? &*reactions : nullptr);
+    const std::optional<VectorX> tensions = moments.tensions(k);
+    passage.gradient.pull_back(adjoint, coefficients, held, reactions ? &*reactions : nullptr,
+                               tensions ? &*tensions : nullptr);
     drawn += held.pose;
     if (visit_poses) {
       PoseAdjoint poses =

@@ -58,9 +58,10 @@ struct AcceptedStep {
   const State& after;            ///< at its end
   const Parameters& parameters;  ///< as they acted
   Reached reached;
-  std::vector<HandPose> hands;    ///< where hands are at its end, per support; empty: there is none
-  bool begins = true;             ///< whether it is the first part of a time step
-  const char* unknown = nullptr;  ///< why no gradient goes through it, unless it is cut off again
+  std::vector<HandPose> hands;      ///< where hands are at its end, per support; empty: there is none
+  bool begins = true;               ///< whether it is the first part of a time step
+  const char* unknown = nullptr;    ///< why no gradient goes through it, unless it is cut off again
+  bool tensions_in_middle = false;  ///< whether axial forces after it are read out in its middle
 };
 
 class Tape {
@@ -109,6 +110,7 @@ class Tape {
     std::vector<ContactRecord> contacts;   ///< at its end
     bool begins;
     const char* unknown;  ///< why no gradient goes through it, if so
+    bool tensions_in_middle;
   };
   /// As it is read out, where it is another than the one that acted last.
   struct NaturalShape {

@@ -173,9 +173,11 @@ void exchange(Archive& io, StepControl& control) {
 
 template <class Archive>
 void exchange(Archive& io, Found& found) {
-  auto& [custom_force, custom_moments, reaction_residual, reaction_place, hand_wrenches, reaction_current] = found;
+  auto& [custom_force, custom_moments, reaction_residual, reaction_place, hand_wrenches, tensions, reaction_current] =
+      found;
   io(custom_force), io(custom_moments), io(reaction_residual), io(reaction_place), io(reaction_current);
   exchange(io, hand_wrenches);
+  exchange(io, tensions);
 }
 
 template <class Archive>

@@ -208,7 +208,8 @@ void World::Implementation::record_step(StepRule rule, double dt, bool begins) {
     else if (!contact->has_given_stiffness(state))
       unknown = kStiffness;
   }
-  tape->record({rule, dt, work.move, state, parameters, reached(), hand_poses(), begins, unknown});
+  tape->record(
+      {rule, dt, work.move, state, parameters, reached(), hand_poses(), begins, unknown, tensions_in_middle()});
 }
 
 Reached World::Implementation::reached() const {

@@ -243,6 +243,7 @@ struct World::Implementation : Running {
   Place place_of(int row) const;
   Place place_of_node(int node) const;
   std::string crushed() const;
+  std::string softened() const;
   std::string unresolved() const;
   void check_resolution();
   std::string overturned() const;
@@ -271,6 +272,8 @@ struct World::Implementation : Running {
   void lump_held();
   void note_reactions();
   void note_residual();
+  bool tensions_in_middle() const;
+  void note_tensions();
   void keep_reactions(double dt, bool begins);
   void make_frame_moments();
   Wrench reaction_of(int support, const VectorX& held) const;

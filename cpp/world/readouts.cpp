@@ -98,9 +98,10 @@ VectorX World::twists(int rod) const {
 
 VectorX World::tensions(int rod) const {
   const Implementation& self = *implementation_;
+  const int first = self.model.rod_first_edge.at(at(rod)), count = self.model.rod_first_edge.at(at(rod) + 1) - first;
+  if (self.reaction_current && self.tensions.size() != 0) return self.tensions.segment(first, count);
   Configuration c;
   compute_configuration(self.model, self.state, self.state.q, c);
-  const int first = self.model.rod_first_edge.at(at(rod)), count = self.model.rod_first_edge.at(at(rod) + 1) - first;
   VectorX out(count);
   for (int e = 0; e < count; ++e)
     out(e) =

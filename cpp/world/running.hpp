@@ -144,6 +144,7 @@ struct Found {
   VectorX reaction_residual;          ///< full residual of the last solve
   VectorX reaction_place;             ///< the configuration in which its forces act, in the middle of midpoint steps
   std::vector<Wrench> hand_wrenches;  ///< likewise, of hands that yield: per support, about the origin
+  VectorX tensions;                   ///< per edge, in the middle of a midpoint step [N]; none: those of the state
   bool reaction_current = false;
 };
 

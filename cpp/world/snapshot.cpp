@@ -9,7 +9,7 @@
 namespace withe {
 namespace {
 
-constexpr std::uint64_t kMagic = 0x4153454854495757ull;
+constexpr std::uint64_t kMagic = 0x4253454854495757ull;
 
 /// FNV-1a.
 std::uint64_t hash_of(std::string_view bytes) {

@@ -294,7 +294,7 @@ class World {
   MatrixX9 directors(int rod) const;        ///< per edge
   MatrixX2 curvatures(int rod) const;       ///< per stencil, of the smooth rod [1/m]
   VectorX twists(int rod) const;            ///< per stencil [rad/m]
-  VectorX tensions(int rod) const;          ///< per edge [N]
+  VectorX tensions(int rod) const;          ///< per edge, in the middle of the last step if by the midpoint rule [N]
   double spring_tension(int spring) const;  ///< positive where it pulls; its damper's part included [N]
   VectorX spins(int rod) const;             ///< per edge, angular velocity about the tangent [rad/s]
   Energy energy() const;

@@ -77,7 +77,7 @@ class Reading:
         return _read(self._lanes, "twists", part.index, (len(part.voronoi),), out)
 
     def tensions(self, rod: Rod | str, out: FloatArray | None = None) -> FloatArray:
-        """Axial forces of the edges, pulling is positive, shape (n, edges) [N]."""
+        """Axial forces of the edges, pulling is positive, as `Simulation.tensions`, shape (n, edges) [N]."""
         part = self._lanes.rod(rod)
         return _read(self._lanes, "tensions", part.index, (len(part.lengths),), out)
 

@@ -258,7 +258,7 @@ class Record:
         return self._of_rod("twists", rod)
 
     def tensions(self, rod: Named) -> FloatArray:
-        """Axial forces of the edges, shape (frames, edges) [N]."""
+        """Axial forces of the edges, as `Simulation.tensions`, shape (frames, edges) [N]."""
         return self._of_rod("tensions", rod)
 
     def spins(self, rod: Named) -> FloatArray:

@@ -93,7 +93,11 @@ class Measurements:
         return self._session.world.twists(self._session.directory.rod(rod).index)
 
     def tensions(self, rod: Rod | str) -> FloatArray:
-        """Axial forces of the edges, pulling is positive, shape (edges,) [N]."""
+        """Axial forces of the edges, pulling is positive, shape (edges,) [N].
+
+        After a step by the midpoint rule those in its middle, where forces are in balance, as reactions are: an edge
+        that turns by w in a step is longer at its end by w^2 / 8, which takes no force. Else those of the state.
+        """
         return self._session.world.tensions(self._session.directory.rod(rod).index)
 
     def spring_tension(self, spring: Spring | str) -> float:
