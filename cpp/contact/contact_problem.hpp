@@ -43,6 +43,7 @@ struct Touching {
   double stiffness = 0, yielded = 0;
   double approach = 0, age = 0;  ///< see ContactRecord
   double before = 0;             ///< distance at the start of the step, where `law` needs it [m]
+  double turn = 0;  ///< of an impact that begins: between directions to each other at both ends of the step [rad]
   PressingLaw law;
   PressingForce pressing;
   Vec3d stick{}, roll{};  ///< likewise

@@ -24,6 +24,9 @@ constexpr double kResolvedSwings = 4.0;
 // dt over its time: after this many swings less than a hundredth, so that what gives back no more needs no steps of its
 // own.
 constexpr double kLeftBehind = 0.01, kLongSwings = 3.2;
+// Surfaces that meet within a step press along a mean of the directions in which they lie to each other at its ends,
+// which is off the one in which they meet by half of what is between these, at most [rad].
+constexpr double kMostTurn = 0.05;
 
 /// From 0 to 1 where x does, without a corner.
 double smooth_step(double x) {
@@ -42,6 +45,21 @@ double share_within(const ContactProblem& problem, const Touching& t, double swi
   if (!(t.approach > 0.0)) return 0.0;
   const double over = swings * swing_time(problem, t) + kSteps * problem.duration;
   return smooth_step(t.approach / rest_speed(problem, t.pair) - 1.0) * smooth_step(2.0 - t.age / over);
+}
+
+/// By how much the direction from one surface to the other turns in the step [rad].
+double turned(const ContactProblem& problem, const Touching& t) {
+  Vec3d first, last;
+  if (t.pair.curve()) {
+    first = problem.curve_at_start(t.pair).sample[1].normal;
+    last = t.proximity.curve.sample[1].normal;
+  } else {
+    Vec3d x[4];
+    first = problem.closest_at_start(t.pair, x).between;
+    last = t.proximity.points.between;
+  }
+  const Vec3d across = cross(first, last);
+  return std::atan2(std::sqrt(dot(across, across)), dot(first, last));
 }
 
 }  // namespace
@@ -177,11 +195,14 @@ void set_pressing(const ContactProblem& problem, Touching& t) {
   t.law.parting = kParting * std::max(t.law.restitution, kLeastParting) * t.approach * problem.duration;
   if (t.law.elastic == 0.0 && !(t.law.restitution < 1.0)) return;
   t.before = start_distance(problem, pair);
+  t.turn = t.law.elastic > 0.0 && t.age == 0.0 ? turned(problem, t) : 0.0;
   t.pressing = t.law.at(t.before, t.proximity.distance);
 }
 
 bool unresolved(const ContactProblem& problem, const Touching& t, double dt) {
-  if (t.lagged >= 0 || !(t.law.restitution < 1.0)) return false;
+  if (t.lagged >= 0) return false;
+  if (t.turn * dt > kMostTurn * problem.duration) return true;
+  if (!(t.law.restitution < 1.0)) return false;
   const double swing = swing_time(problem, t);
   const bool keeps_nothing = problem.pressing == Pressing::end && t.pair.restitution <= kLeftBehind;
   if (keeps_nothing && dt > kLongSwings * swing) return false;

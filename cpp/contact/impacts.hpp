@@ -39,7 +39,8 @@ ImpactShareSlopes impact_share_slopes(const ContactProblem& problem, const Touch
 /// rates.
 void add_approach_slopes(const ContactProblem& problem, const ContactPair& pair, double by,
                          double (&start)[kContactUnknowns], double (&velocity)[kContactUnknowns]);
-/// Whether a step of dt would be too long for what an impact loses by its restitution.
+/// Whether a step of dt would be too long for where surfaces that meet push each other, or for what an impact loses by
+/// its restitution.
 bool unresolved(const ContactProblem& problem, const Touching& t, double dt);
 /// Sets the law by which surfaces press in a step, and the force at its end, of a contact with its stiffness and speed
 /// of approach.

@@ -120,3 +120,30 @@ def test_what_grazes_within_a_step_meets(kind, offset, integrator):
     for step in (1e-3, 2e-3):
         assert grazed(kind, offset, step, integrator) > 1.0
     assert abs(grazed(kind, 0.0105, 1e-3, integrator)) < 1e-9
+
+
+@pytest.mark.parametrize("integrator", CONSERVING)
+@pytest.mark.parametrize("speed", [0.3, 1.0, 10.0])
+@pytest.mark.parametrize("off", [0.2, 0.6, 0.9])
+def test_rods_that_meet_off_centre_part_along_the_line_of_their_centres(
+    off: float, speed: float, integrator: Any
+) -> None:
+    """Smooth and alike, in default steps of .3 to 10 radii: the one that is hit takes what lies along that line. It went
+    up to 30 degrees beside it."""
+    radius = 5e-3
+    scene = withe.Scene(gravity=(0, 0, 0))
+    hit = scene.add_rod(start=(-0.025, 0, 0), end=(0.025, 0, 0), nodes=11, radius=radius, material=FLYING)
+    aside, above = 2.0 * radius * off, 0.02
+    flies = scene.add_rod(
+        start=(-0.025, aside, above), end=(0.025, aside, above), nodes=11, radius=radius, material=FLYING
+    )
+    scene.enable_contact()
+    simulation = scene.build(integrator=integrator)
+    simulation.set_velocities(flies, (0.0, 0.0, -speed))
+    energy = simulation.energy().total
+    simulation.run(0.05 / speed, progress=False)
+    velocity = simulation.velocities(hit).mean(axis=0)
+    angle = np.degrees(np.arctan2(-velocity[1], -velocity[2]))
+    assert angle == pytest.approx(np.degrees(np.arcsin(off)), abs=2.5)
+    assert np.linalg.norm(velocity) == pytest.approx(speed * np.sqrt(1.0 - off**2), abs=0.04 * speed)
+    assert simulation.energy().total == pytest.approx(energy, rel=2e-3)
