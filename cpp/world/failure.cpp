@@ -19,6 +19,9 @@ constexpr double kCrushed = 0.5;
 /// whose natural twist turns it like a motor, that says nothing, and whole turns say nothing anywhere.
 constexpr double kSharp = 2.0 / 3.0 * std::numbers::pi;
 constexpr double kBent = 0.05;  // [rad]
+/// Less twist softens bending too: where that is more than this share, on the mean over what bending stores, and where
+/// bending stores more than this share of what twisting does.
+constexpr double kMostSoftening = 0.05, kLeastBending = 1e-6;
 /// Stiffnesses of rods that differ by more leave few digits to the soft ones.
 constexpr double kMismatch = 1e6;
 
@@ -69,6 +72,33 @@ std::string World::Implementation::crushed() const {
          ", as by a force above E A / 2 or a blow faster than sound in the rod, sqrt(E / density)";
 }
 
+/// Says so where twist between edges softens bending; nothing elsewhere.
+std::string World::Implementation::softened() const {
+  if (model.planar()) return "";
+  const Configuration& c = configuration();
+  energy_scratch.coefficients.set(model, parameters);
+  const ElasticCoefficients& k = energy_scratch.coefficients.elastic;
+  double bending = 0.0, twisting = 0.0, lost = 0.0, most = 0.0;
+  int node = -1;
+  const auto add = [&](const BendTwistEnergy& energy, double tau, int where) {
+    const double part = std::sin(0.5 * tau) * std::sin(0.5 * tau) * energy.bend;
+    bending += energy.bend;
+    twisting += energy.twist;
+    lost += part;
+    if (part <= most) return;
+    most = part;
+    node = where;
+  };
+  for (int b = 0; b < static_cast<int>(model.bend.size()); ++b)
+    add(bend_energy_of(k, c, b), c.bend_strain(b, 2), model.bend[at(b)].node[1]);
+  for (int h = 0; h < static_cast<int>(model.half.size()); ++h)
+    add(half_energy_of(k, c, h), c.half_strain(h, 2), model.frame_node[at(model.half[at(h)].frame)]);
+  if (!(lost > kMostSoftening * bending) || !(bending > kLeastBending * twisting)) return "";
+  return "edges twist so far against each other that bending is " + text(100.0 * lost / bending, 2) +
+         " % too soft, as most" + place_of_node(node).words + " (time " + text(state.time, 6) +
+         " s): a stencil that twists by tau bends with cos^2(tau / 2) of its stiffness; use more nodes";
+}
+
 /// Says so where an edge turns or twists too much against the next; nothing elsewhere.
 std::string World::Implementation::unresolved() const {
   int node = -1;
@@ -103,7 +133,7 @@ std::string World::Implementation::unresolved() const {
     see_twist(state.half_tau(row), c.half_strain.row(row), parameters.half_natural(row, 2),
               angle(c.attached[h].tangent, c.edge[at(s.edge)].tangent), model.frame_node[at(s.frame)]);
   }
-  if (node < 0) return "";
+  if (node < 0) return softened();
   return std::string("an edge ") + how + " by " + text(greatest * 180.0 / std::numbers::pi, 3) +
          " degrees against the next" + place_of_node(node).words + " (time " + text(state.time, 6) +
          " s): a mesh this coarse does not resolve the motion, and bends and twists wrongly; use more nodes";
