@@ -2,6 +2,8 @@
 #include <map>
 #include <numeric>
 #include <set>
+#include <stdexcept>
+#include <string>
 #include <utility>
 
 #include "common/check.hpp"
@@ -137,8 +139,11 @@ class Builder {
     // Every hinge turns against one root, so a chain of hinges at one node starts at its middle.
     if (clusters_[static_cast<std::size_t>(child)].hinge >= 0) std::swap(parent, child);
     Cluster& c = clusters_[static_cast<std::size_t>(child)];
-    require(c.hinge < 0 && clusters_[static_cast<std::size_t>(parent)].hinge < 0,
-            "revolute joints at one node must all turn against the same rod");
+    const Cluster& other = clusters_[static_cast<std::size_t>(parent)];
+    if (c.hinge >= 0 || other.hinge >= 0)
+      throw std::invalid_argument("revolute joints at one node must all turn against the same rod: where '" +
+                                  rod(other.passes.front().rod).name + "' and '" + rod(c.passes.front().rod).name +
+                                  "' are joined, join each of the rods to one of them");
     c.hinge = static_cast<int>(model_.hinges.size());
     model_.hinges.push_back({-1, axis.normalized(), -1});
     hinge_parent_.push_back(parent);
@@ -179,7 +184,10 @@ class Builder {
     for (const SupportDescription& support : scene_.supports)
       if (holds_frame(support.kind)) {
         Cluster& cluster = cluster_at(support.pass);
-        require(cluster.hinge < 0, "a clamp must hold the fixed side of a revolute joint, not the side that turns");
+        if (cluster.hinge >= 0)
+          throw std::invalid_argument("a clamp must hold the fixed side of a revolute joint, not rod '" +
+                                      rod(support.pass.rod).name +
+                                      "', which turns: join it first, join(clamped, other, 'revolute', axis=...)");
         frame_of(cluster);
         if (support.gripped && cluster.passes.size() == 1) gripped_frames_.insert(cluster.frame);
       }

@@ -105,7 +105,7 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         discrete: bool = False,
         name: str | None = None,
     ) -> Rod:
-        """Add a rod, from end to end or along any centreline.
+        """Add a rod, from end to end or along any centreline. It stretches, bends and twists; it does not shear.
 
         Parameters
         ----------
@@ -198,7 +198,8 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
     ) -> Joint:
         """Make two nodes that coincide one.
 
-        Joins at the same node add up: any number of rods may meet there.
+        Joins at the same node add up: any number of rods may meet there. Revolute ones there all turn against one rod,
+        to which each of the others is joined; a clamp at that node holds that rod.
 
         Parameters
         ----------

@@ -87,6 +87,9 @@ class Linearisation:
     def frequencies(self, count: int = 6) -> npt.NDArray[Any]:
         """Lowest natural frequencies, shape (count,) [Hz].
 
+        Of a scene that is solved in a plane, as its `plan` says, those of motions in it; ``build(planar=False)`` gives
+        all.
+
         Negative where the configuration diverges: such a mode grows with exp(2 pi |f| t). Complex where modes flutter,
         in pairs f and its conjugate: they swing at the real part, and grow with exp(2 pi |imaginary part| t). Sorted
         by the real part of the square, so that what diverges comes first.

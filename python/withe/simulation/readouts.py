@@ -107,7 +107,8 @@ class Equilibrium:
     Attributes
     ----------
     stable : bool
-        Whether no small motion would grow.
+        Whether no small motion would grow. Of a scene that is solved in a plane, as its `plan` says, motions in it
+        count: whether it would tip over sideways ``build(planar=False)`` shows.
     stability : {"stable", "diverges", "flutters"}
         Where one grows, whether steadily or swinging, which only loads that turn with the rod can make it do; see
         `Linearisation.stability`. Friction counts as what it does to the stiffness.
