@@ -84,8 +84,8 @@ struct DrawnEdges {
         start_v.push_back(number(random));
       }
       const auto frame = [&](double share) {
-        Vec3d vector;
-        for (int i = 0; i < 3; ++i) vector[i] = along(share, 7 * e + 3 + i) - along(share, 7 * e + i);
+        const auto apart = [&](int i) { return along(share, 7 * e + 3 + i) - along(share, 7 * e + i); };
+        const Vec3d vector{apart(0), apart(1), apart(2)};
         const Vec3d source = e0(e);
         const double length = std::sqrt(dot(vector, vector)), from = std::sqrt(dot(source, source));
         const Vec3d t0 = (1.0 / from) * source, across = to_vec3(to_eigen(t0).unitOrthogonal());

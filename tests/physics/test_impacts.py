@@ -128,8 +128,10 @@ def test_what_grazes_within_a_step_meets(kind, offset, integrator):
 def test_rods_that_meet_off_centre_part_along_the_line_of_their_centres(
     off: float, speed: float, integrator: Any
 ) -> None:
-    """Smooth and alike, in default steps of .3 to 10 radii: the one that is hit takes what lies along that line. It went
-    up to 30 degrees beside it."""
+    """Smooth and alike, in default steps of .3 to 10 radii: the one that is hit takes what lies along that line.
+
+    It went up to 30 degrees beside it.
+    """
     radius = 5e-3
     scene = withe.Scene(gravity=(0, 0, 0))
     hit = scene.add_rod(start=(-0.025, 0, 0), end=(0.025, 0, 0), nodes=11, radius=radius, material=FLYING)
