@@ -258,7 +258,7 @@ class Contacts:
         -----
         Impacts are elastic by default. In implicit midpoint and energy-momentum steps the force of a step does as much
         work as contact stores [Gonzalez 1996; Laursen and Chawla 1997], so that they are elastic at any time step,
-        those of rods mostly to a thousandth, and steps are cut where surfaces that meet would pass around each other
+        those of rods mostly to a thousandth, and steps are cut where two bodies that meet would pass around each other
         within one; and rods that slide over each other are braked by friction alone. Backward Euler,
         and "lagged" and "semi_explicit" friction, lose most of an impact shorter than a few steps, and nothing in the
         limit of short ones. A restitution e below 1 is the energetic coefficient: contact gives back e^2 of the work
