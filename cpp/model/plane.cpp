@@ -137,7 +137,7 @@ bool leans(const SceneDescription& scene, const SupportDescription& support, con
   return false;
 }
 
-/// The same of all that is in the scene.
+/// Why anything in the scene leaves the plane; empty: nothing does.
 std::string why_off_plane(const SceneDescription& scene, const Vector3& normal) {
   const auto across = [&](const Vector3& v) { return v.cross(normal).norm() > kTolerance * 100 * v.norm(); };
   for (const JointDescription& joint : scene.joints)
