@@ -122,7 +122,7 @@ ctest: ctest-build
 # What only runs on newer machines must not be run on older ones: the engine's tests on an emulated first x86-64.
 ctest-baseline: ctest-build
 	@command -v qemu-x86_64 >/dev/null || { echo "make ctest-baseline needs qemu-x86_64: apt-get install qemu-user"; exit 1; }
-	@printf '%s\n' integrators contact solvers assembly elasticity model geometry common | xargs -P $(JOBS) -I ROOM \
+	@printf '%s\n' integrators contact steps solvers assembly elasticity model geometry common | xargs -P $(JOBS) -I ROOM \
 	    qemu-x86_64 -cpu qemu64 $(BUILD)/tests/cpp/test_ROOM --gtest_brief=1
 
 # Each worker has a core: threads of NumPy's and torch's matrices would only wait for each other.
