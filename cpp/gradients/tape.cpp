@@ -275,8 +275,13 @@ class Tape::Moments {
     for (; left_ > 0 && moments_[left_ - 1].steps == static_cast<long>(steps); --left_) {
       const ReadoutAdjoint& by = moments_[left_ - 1].by;
       add_unknowns(tape_.model_, by, adjoint);
-      ReadoutAdjoint of_state = by;
-      if (tensions_in_middle(static_cast<long>(steps))) of_state.tensions.resize(0);
+      ReadoutAdjoint others;
+      const bool in_middle = by.tensions.size() != 0 && tensions_in_middle(static_cast<long>(steps));
+      if (in_middle) {
+        others = by;
+        others.tensions.resize(0);
+      }
+      const ReadoutAdjoint& of_state = in_middle ? others : by;
       if (!of_state.needs_state()) continue;
       const Parameters& shown = shown_parameters(static_cast<long>(steps), &parameters);
       CoefficientAdjoint coefficients(tape_.model_, shown.loads.rows());

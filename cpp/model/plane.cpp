@@ -79,6 +79,15 @@ std::optional<Vector3> normal_of(const SceneDescription& scene, bool asked, std:
   return normal;
 }
 
+/// Directors and tangent of a rod's first edge, as columns.
+Matrix3 first_frame(const SceneDescription& scene, const RodDescription& rod) {
+  const Vector3 d1 = rod.directors.row(0);
+  const Vector3 t = (scene.positions.row(rod.nodes[1]) - scene.positions.row(rod.nodes[0])).normalized();
+  Matrix3 axes;
+  axes << d1, t.cross(d1), t;
+  return axes;
+}
+
 /// Why a rod leaves the plane in which its nodes are; empty: it does not.
 std::string why_off_plane(const SceneDescription& scene, const RodDescription& rod, const Vector3& normal) {
   if ((rod.natural_twist.array() != 0.0).any()) return "rod '" + rod.name + "' has natural twist";
@@ -91,10 +100,8 @@ std::string why_off_plane(const SceneDescription& scene, const RodDescription& r
   for (Eigen::Index e = 1; e < rod.directors.rows(); ++e)
     if (std::abs((rod.directors.row(e) - rod.directors.row(0)).dot(normal)) > 1e-8)
       return "rod '" + rod.name + "' is drawn with twist";
-  const Vector3 d1 = rod.directors.row(0);
-  const Vector3 t = (scene.positions.row(rod.nodes[1]) - scene.positions.row(rod.nodes[0])).normalized();
-  const Vector3 d2 = t.cross(d1);
-  const Vector2 p(d2.dot(normal), -d1.dot(normal));
+  const Matrix3 axes = first_frame(scene, rod);
+  const Vector2 p(axes.col(1).dot(normal), -axes.col(0).dot(normal));
   for (Eigen::Index s = 0; s < rod.natural_curvature.rows(); ++s) {
     const Vector2 k = rod.natural_curvature.row(s);
     if (std::abs(k(0) * p(1) - k(1) * p(0)) > 1e-8 * k.norm())
@@ -114,12 +121,7 @@ bool is_mirrored(const Vector3& direction, const Vector3& normal) {
 /// Axes of a hand that yields, as columns, before it moves. A rod in a plane keeps the angles of its directors to it.
 Matrix3 hand_axes(const SceneDescription& scene, const SupportDescription& support) {
   if (support.hand.posed) return support.hand.rotation;
-  const RodDescription& rod = scene.rods[static_cast<std::size_t>(support.pass.rod)];
-  const Vector3 d1 = rod.directors.row(0);
-  const Vector3 t = (scene.positions.row(rod.nodes[1]) - scene.positions.row(rod.nodes[0])).normalized();
-  Matrix3 axes;
-  axes << d1, t.cross(d1), t;
-  return axes;
+  return first_frame(scene, scene.rods[static_cast<std::size_t>(support.pass.rod)]);
 }
 
 /// Whether the springs of a hand push out of the plane what moves in it: not where the normal is an axis of both.

@@ -96,6 +96,28 @@ VectorX World::twists(int rod) const {
   return out;
 }
 
+namespace {
+
+double tension(const Model& model, const Parameters& parameters, const Configuration& c, int edge) {
+  return axial_force(c.length(edge), model.edge_length(edge), parameters.edge_stretch(edge),
+                     parameters.edge_natural_stretch(edge) - 1.0);
+}
+
+}  // namespace
+
+/// Whether axial forces are read out in the middle of the step, where those of a midpoint step are in balance: at its
+/// end an edge that has turned by w within it is longer by w^2 / 8 of its length, which its stiffness makes a force
+/// that has not acted. A part of a fourth-order step is in balance far from where the whole one ends.
+bool World::Implementation::tensions_in_middle() const {
+  return rule_of_step() == StepRule::midpoint && options.integrator != Integrator::fourth_order;
+}
+
+void World::Implementation::note_tensions() {
+  tensions.resize(tensions_in_middle() ? model.edge_count : 0);
+  for (int e = 0; e < static_cast<int>(tensions.size()); ++e)
+    tensions(e) = tension(model, parameters, work.newton.data.configuration, e);
+}
+
 VectorX World::tensions(int rod) const {
   const Implementation& self = *implementation_;
   const int first = self.model.rod_first_edge.at(at(rod)), count = self.model.rod_first_edge.at(at(rod) + 1) - first;
@@ -103,10 +125,7 @@ VectorX World::tensions(int rod) const {
   Configuration c;
   compute_configuration(self.model, self.state, self.state.q, c);
   VectorX out(count);
-  for (int e = 0; e < count; ++e)
-    out(e) =
-        axial_force(c.length(first + e), self.model.edge_length(first + e), self.parameters.edge_stretch(first + e),
-                    self.parameters.edge_natural_stretch(first + e) - 1.0);
+  for (int e = 0; e < count; ++e) out(e) = tension(self.model, self.parameters, c, first + e);
   return out;
 }
 

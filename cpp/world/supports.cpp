@@ -6,7 +6,6 @@
 #include <Eigen/LU>
 
 #include "common/check.hpp"
-#include "elasticity/stretch.hpp"
 #include "geometry/rotation.hpp"
 #include "model/edge_vectors.hpp"
 #include "world/implementation.hpp"
@@ -184,22 +183,6 @@ void World::Implementation::note_residual() {
   reaction_place = work.newton.data.z;
   hand_wrenches = work.newton.data.hands;
   reaction_current = true;
-}
-
-/// Whether axial forces are read out in the middle of the step, where those of a midpoint step are in balance: at its
-/// end an edge that has turned by w within it is longer by w^2 / 8 of its length, which its stiffness makes a force
-/// that has not acted. A part of a fourth-order step is in balance far from where the whole one ends.
-bool World::Implementation::tensions_in_middle() const {
-  return rule_of_step() == StepRule::midpoint && options.integrator != Integrator::fourth_order;
-}
-
-void World::Implementation::note_tensions() {
-  const VectorX& length = work.newton.data.configuration.length;
-  tensions.resize(tensions_in_middle() ? model.edge_count : 0);
-  if (tensions.size() == 0) return;
-  for (int e = 0; e < model.edge_count; ++e)
-    tensions(e) = axial_force(length(e), model.edge_length(e), parameters.edge_stretch(e),
-                              parameters.edge_natural_stretch(e) - 1.0);
 }
 
 /// Of a part of a time step, whose reactions are the means over all parts.
