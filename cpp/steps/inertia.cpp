@@ -20,6 +20,7 @@ void find_turning(const StepProblem& problem, const StepData& data, const Vector
   const Model& model = problem.model;
   out.head.resize(3 * Eigen::Index{model.edge_count});
   out.torque.resize(model.edge_count);
+  const bool ends = problem.conserves_energy();  // others have found no configuration there
   const TurningBatch batch{.count = model.edge_count,
                            .tail = model.tail_dof.data(),
                            .head = model.head_dof.data(),
@@ -33,7 +34,7 @@ void find_turning(const StepProblem& problem, const StepData& data, const Vector
                            .start_tangent = &problem.start->tangent.data()->x,
                            .start_length = problem.start_configuration.length.data(),
                            .end_length = data.end_configuration.length.data(),
-                           .end_frames = &data.end_configuration.edge.data()->tangent.x,
+                           .end_frames = ends ? &data.end_configuration.edge.data()->tangent.x : nullptr,
                            .force = out.head.data(),
                            .torque = out.torque.data()};
   const TurningKernels& kernels = turning_kernels();
