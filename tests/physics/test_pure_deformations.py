@@ -1,5 +1,7 @@
 """Uniform bending, stretching and twisting, where closed forms hold, and sections as a user gives them."""
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -124,6 +126,38 @@ def test_clamp_that_turns_ten_times_winds_ten_turns():
     simulation.step(100)
     twist_stiffness = 2e6 / (2.0 * 1.3) * np.pi * 5e-3**4 / 2.0
     assert simulation.reaction(grip).moment[0] == pytest.approx(20.0 * np.pi * twist_stiffness / 0.4, rel=1e-6)
+
+
+def bends_of_twisted_cantilever(twist):
+    """Under a load on its end, turns of the first edge and from each edge to the next of a round rod whose edges are
+    twisted by so much against each other, and what was warned of."""
+    scene, bar = round_bar()
+    scene.clamp(bar.start)
+    scene.add_force(bar.end, (0.0, 0.0, -1e-6))
+    simulation = rods.sharp(scene, planar=False)
+    edge = np.linalg.norm(np.diff(simulation.positions(bar)[:2], axis=0))
+    simulation.set_natural_twist(bar, twist / edge)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        simulation.equilibrium()
+    slopes = np.diff(simulation.positions(bar)[:, 2]) / edge
+    return np.diff(slopes, prepend=0.0), [str(warning.message) for warning in caught]
+
+
+@pytest.mark.parametrize("degrees", [20, 30, 60])
+def test_bending_that_twist_softens_is_warned_of(degrees):
+    """The mean of directors that differ by tau is cos(tau / 2) long, and the curvature along it as much less. A clamp's
+    first edge is twisted by half as much against the wall."""
+    twist = np.radians(degrees)
+    straight, _ = bends_of_twisted_cantilever(0.0)
+    twisted, said = bends_of_twisted_cantilever(twist)
+    np.testing.assert_allclose(twisted[1:-1] / straight[1:-1], np.cos(0.5 * twist) ** -2, rtol=1e-5)
+    assert twisted[0] / straight[0] == pytest.approx(np.cos(0.25 * twist) ** -2, rel=1e-5)
+    if np.sin(0.5 * twist) ** 2 > 0.05:
+        assert len(said) == 1
+        assert "too soft" in said[0]
+    else:
+        assert said == []
 
 
 @pytest.mark.parametrize(("push", "moment"), [((0, 0, 1), "height"), ((0, 1, 0), "width")])
