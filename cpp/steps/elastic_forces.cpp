@@ -200,8 +200,8 @@ void ElasticForces::add_discrete_gradient(const StepProblem& problem, StepData& 
   const StencilKernels& kernels = stencil_kernels();
   (model.planar() ? kernels.planar_momentum_bend : kernels.momentum_bend)(
       regular_batch(problem.elastic, data, assembler, values, data.axial_force),
-      {.start_frames = &problem.start_configuration.edge.data()->tangent.x,
-       .end_frames = &data.end_configuration.edge.data()->tangent.x,
+      {.start_frames = frames_of(problem.start_configuration),
+       .end_frames = frames_of(data.end_configuration),
        .start_strain = problem.start_configuration.bend_strain.data(),
        .end_strain = data.end_configuration.bend_strain.data()});
   for (int e : assembler.regular.other_edges) {
@@ -253,7 +253,7 @@ void ElasticForces::add_rate_slopes(const StepProblem& problem, StepData& data, 
   if (!model.planar())
     stencil_kernels().rate_slopes(regular_batch(k, data, assembler, values, nullptr),
                                   {.start_frames = nullptr,
-                                   .end_frames = &data.end_configuration.edge.data()->tangent.x,
+                                   .end_frames = frames_of(data.end_configuration),
                                    .start_strain = nullptr,
                                    .end_strain = data.end_configuration.bend_strain.data()});
   for_each_single_bend(model, assembler, [&](int b) {

@@ -8,6 +8,7 @@
 
 #include "geometry/rotation.hpp"
 #include "model/edge_vectors.hpp"
+#include "steps/regular_stencils.hpp"
 #include "steps/turning_inertia.hpp"
 #include "steps/turning_kernels.hpp"
 #include "steps/turning_slopes.hpp"
@@ -20,7 +21,6 @@ void find_turning(const StepProblem& problem, const StepData& data, const Vector
   const Model& model = problem.model;
   out.head.resize(3 * Eigen::Index{model.edge_count});
   out.torque.resize(model.edge_count);
-  const bool ends = problem.conserves_energy();  // others have found no configuration there
   const TurningBatch batch{.count = model.edge_count,
                            .tail = model.tail_dof.data(),
                            .head = model.head_dof.data(),
@@ -30,11 +30,11 @@ void find_turning(const StepProblem& problem, const StepData& data, const Vector
                            .start_v = problem.start->v.data(),
                            .interval = problem.interval,
                            .inertia = inertia.data(),
-                           .frames = &data.configuration.edge.data()->tangent.x,
+                           .frames = frames_of(data.configuration),
                            .start_tangent = &problem.start->tangent.data()->x,
                            .start_length = problem.start_configuration.length.data(),
                            .end_length = data.end_configuration.length.data(),
-                           .end_frames = ends ? &data.end_configuration.edge.data()->tangent.x : nullptr,
+                           .end_frames = frames_of(data.end_configuration),
                            .force = out.head.data(),
                            .torque = out.torque.data()};
   const TurningKernels& kernels = turning_kernels();

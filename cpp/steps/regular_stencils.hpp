@@ -35,7 +35,8 @@ inline Columns3 measured_strains(const BendMeasure& measure, const Configuration
   return out;
 }
 
-inline const double* frames_of(const Configuration& c) { return &c.edge.data()->tangent.x; }
+/// Null where no configuration has been found: that at the end of a step, under rules that do not need it.
+inline const double* frames_of(const Configuration& c) { return c.edge.empty() ? nullptr : &c.edge.data()->tangent.x; }
 
 /// The stencils that kernels take, in a configuration; no forces, no matrix.
 inline StencilBatch kernel_batch(const Assembler& assembler, const BendMeasure& measure, const Configuration& c,
