@@ -1,5 +1,6 @@
 #include "forces/stokeslets.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -118,7 +119,7 @@ StokesletFluid::StokesletFluid(const Model& model)
     v->setZero(3 * line_);
   for (Chunk& chunk : chunks_) {
     const auto n = static_cast<Eigen::Index>(3 * chunk.nodes.size());
-    chunk.matrix.resize(n, n);
+    chunk.factor.resize(n, n);
     chunk.part.resize(n);
   }
 }
@@ -215,10 +216,9 @@ bool StokesletFluid::factorize(const VectorX& q) {
         const int j = std::min(chunk.nodes[at(a)], chunk.nodes[at(b)]);
         for (int k = 0; k < 3; ++k)
           for (int l = 0; l < 3; ++l)
-            chunk.matrix(3 * a + k, 3 * b + l) = i == j ? diagonal_[kEntry[k][l] * line_ + i] : row(i, kEntry[k][l])[j];
+            chunk.factor(3 * a + k, 3 * b + l) = i == j ? diagonal_[kEntry[k][l] * line_ + i] : row(i, kEntry[k][l])[j];
       }
-    chunk.factor.compute(chunk.matrix);
-    if (chunk.factor.info() != Eigen::Success) return false;
+    if (Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>>(chunk.factor).info() != Eigen::Success) return false;
   }
   memory_.factorized_at = q;
   return true;
@@ -229,7 +229,9 @@ void StokesletFluid::precondition(const VectorX& from, VectorX& to) {
   for (Chunk& chunk : chunks_) {
     for (std::size_t a = 0; a < chunk.nodes.size(); ++a)
       for (int k = 0; k < 3; ++k) chunk.part[static_cast<Eigen::Index>(3 * a) + k] = from[k * line_ + chunk.nodes[a]];
-    chunk.factor.solveInPlace(chunk.part);
+    const auto lower = chunk.factor.triangularView<Eigen::Lower>();
+    lower.solveInPlace(chunk.part);
+    lower.adjoint().solveInPlace(chunk.part);
     for (std::size_t a = 0; a < chunk.nodes.size(); ++a)
       for (int k = 0; k < 3; ++k) to[k * line_ + chunk.nodes[a]] = chunk.part[static_cast<Eigen::Index>(3 * a) + k];
   }

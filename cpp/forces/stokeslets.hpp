@@ -11,7 +11,6 @@
 /// Without inertia the fluid answers at once: force = -8 pi mu A^-1 v, with A at given positions. Spin about tangents
 /// meets no resistance.
 
-#include <Eigen/Cholesky>
 #include <vector>
 
 #include "forces/stokeslet_kernels.hpp"
@@ -70,8 +69,7 @@ class StokesletFluid {
   /// Nodes next to each other, whose own mobility is factorised.
   struct Chunk {
     std::vector<int> nodes;
-    Eigen::LLT<Eigen::MatrixXd> factor{Eigen::MatrixXd::Identity(1, 1)};  // an empty one copies a status never set
-    Eigen::MatrixXd matrix;
+    Eigen::MatrixXd factor;  ///< Cholesky's, its lower triangle
     VectorX part;
   };
   void place(const VectorX& q);

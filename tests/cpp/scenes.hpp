@@ -2,18 +2,25 @@
 /// Small scenes to test with: rods drawn through points, with numbers of order one, so that no term hides behind
 /// another. Points that coincide become one shared node.
 
-#include <Eigen/Geometry>
 #include <cmath>
 #include <numbers>
 #include <random>
 #include <string>
 #include <vector>
 
+#include "geometry/rotation.hpp"
 #include "model/description.hpp"
 
 namespace withe::testing {
 
 constexpr double kPi = std::numbers::pi;
+
+/// The smallest rotation that turns direction `from` into `to`. (Eigen's own needs its SVD, which compiles for
+/// seconds.)
+inline Matrix3 smallest_rotation(const Vector3& from, const Vector3& to) {
+  const Vector3 normal = from.cross(to);
+  return rotation_exp(std::atan2(normal.norm(), from.dot(to)) * normal.normalized());
+}
 
 /// What a rod is made of, the same along its length.
 struct RodMaterial {
@@ -47,7 +54,7 @@ class SceneBuilder {
       const Vector3 edge = (points.row((e + 1) % points.rows()) - points.row(e)).transpose();
       const Vector3 t = edge.normalized();
       rod.rest_lengths(e) = edge.norm();
-      if (e > 0) director = Eigen::Quaterniond::FromTwoVectors(before, t) * director;
+      if (e > 0) director = smallest_rotation(before, t) * director;
       director = (director - t * t.dot(director)).normalized();
       rod.directors.row(e) = director;
       before = t;

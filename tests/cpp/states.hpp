@@ -88,7 +88,7 @@ inline Case with_frames_turned(const std::string& name, const SceneDescription& 
     }
     const Vector3 tangent = to_eigen(drawn.edge[at(s.edge)].tangent), attached = to_eigen(drawn.attached[h].tangent);
     const Vector3 back = rotation_exp(angle * tangent.unitOrthogonal()) * tangent;
-    c.state.frame[at(s.frame)] = Eigen::Quaterniond::FromTwoVectors(attached, back).toRotationMatrix();
+    c.state.frame[at(s.frame)] = smallest_rotation(attached, back);
   }
   follow_twists(c);
   return c;
