@@ -93,7 +93,7 @@ $(STAMPS)/bench_tools: $(STAMPS)/build_tools
 $(STAMPS)/installed: $(STAMPS)/build_tools $(CXX_SOURCES) $(CMAKE_FILES) $(PYTHON_SOURCES) $(SOURCE_FOLDERS) README.md
 	@echo "Building and installing withe (the first time takes some minutes)"
 	@python -m pip install --quiet --no-build-isolation --no-deps --force-reinstall \
-	    --config-settings=build-dir=$(BUILD) .
+	    --config-settings=build-dir=$(BUILD) --config-settings=cmake.define.WITHE_PRECOMPILE_HEADERS=ON .
 	@touch $@
 
 # --- use ----------------------------------------------------------------------------------------------------
@@ -148,7 +148,7 @@ SEED ?= 1
 asan-python: $(STAMPS)/build_tools
 	@cmake --preset asan-python -DPython_EXECUTABLE=$(VENV)/bin/python
 	@cmake --build --preset asan-python
-	@tools/asan_python.sh build/asan-python tests/python/random_sequences.py $(SEQUENCES) $(SEED)
+	@tools/asan_python.sh build/asan-python tests/python/random_sequences.py $(SEQUENCES) $(SEED) --jobs $(JOBS)
 
 bench: $(STAMPS)/installed $(STAMPS)/bench_tools
 	@python benchmarks $(NAME)
