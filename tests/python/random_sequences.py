@@ -1,6 +1,6 @@
 """Random sequences of sensible calls on whole scenes, the same on several simulations that must agree to the bit.
 
-`random_sequences.py COUNT SEED [SEQUENCE]` runs COUNT sequences drawn from SEED, or one by its number.
+`random_sequences.py COUNT SEED [SEQUENCE] [--jobs N]` runs COUNT sequences drawn from SEED, or one by its number.
 `make asan-python` runs it with an engine built for the address sanitizer, `test_random_sequences.py` a few with the one
 that is installed.
 
@@ -17,13 +17,18 @@ A failure names sequence, lane and call. `random_calls.py` looks for bad input i
 
 from __future__ import annotations
 
+import argparse
 import collections
+import contextlib
 import faulthandler
+import multiprocessing
 import pickle
 import random
 import sys
 import tempfile
+import traceback
 import warnings
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -314,23 +319,41 @@ def sequence(number, counted, folder):
     counted["sequences that agree"] += 1
 
 
-def main() -> int:
+def attempt(number):
+    """What was counted in a sequence, and what went wrong."""
     faulthandler.enable()
     warnings.simplefilter("ignore")
-    count, seed, *only = map(int, sys.argv[1:])
-    numbers = only or [random.Random(f"{seed} {i}").randrange(10**9) for i in range(count)]
+    print(f"sequence {number}", file=sys.stderr, flush=True)  # among the last ones is that which crashed
+    counted: collections.Counter[str] = collections.Counter()
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            sequence(number, counted, Path(folder))
+    except (Exception, KeyboardInterrupt) as error:
+        return counted, f"{type(error).__name__}: {error}\n{traceback.format_exc()}"
+    return counted, None
+
+
+def main() -> int:
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("count", type=int)
+    options.add_argument("seed", type=int)
+    options.add_argument("sequence", type=int, nargs="?", help="only this one")
+    options.add_argument("--jobs", type=int, default=1, help="processes")
+    given = options.parse_args()
+    drawn = [random.Random(f"{given.seed} {i}").randrange(10**9) for i in range(given.count)]
+    numbers = drawn if given.sequence is None else [given.sequence]
     counted: collections.Counter[str] = collections.Counter()
     failed = 0
-    with tempfile.TemporaryDirectory() as folder:
-        for number in numbers:
-            print(f"sequence {number}", file=sys.stderr, flush=True)  # the last one is that which crashed
-            try:
-                sequence(number, counted, Path(folder))
-            except (Exception, KeyboardInterrupt) as error:
+    with contextlib.ExitStack() as stack:
+        apply = map
+        if given.jobs > 1:
+            workers = ProcessPoolExecutor(given.jobs, multiprocessing.get_context("spawn"))
+            apply = stack.enter_context(workers).map
+        for number, (found, failure) in zip(numbers, apply(attempt, numbers), strict=True):
+            counted += found
+            if failure is not None:
                 failed += 1
-                print(f"sequence {number} of seed {seed}: {type(error).__name__}: {error}", flush=True)
-                if only:
-                    raise
+                print(f"sequence {number} of seed {given.seed}: {failure}", flush=True)
     print(f"{len(numbers)} sequences, {failed} failed: " + ", ".join(f"{n} {w}" for w, n in counted.most_common()))
     return min(failed, 1)
 
