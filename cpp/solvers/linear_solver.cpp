@@ -36,12 +36,11 @@ void require_length(std::string_view argument, std::size_t got, int expected) {
 }  // namespace
 
 SparsityPattern SparsityPattern::from_cliques(int size, const std::vector<std::vector<int>>& cliques) {
-  require(size >= 1, "size of a sparsity pattern must be at least 1, got " + std::to_string(size));
+  require(size >= 1, "size of a sparsity pattern must be at least 1, got ", size);
   std::vector<int> starts(size + 1, 0);  // of the cliques that each column is in
   for (const std::vector<int>& clique : cliques) {
     for (int column : clique) {
-      require(column < size,
-              "unknown in cliques must be below size " + std::to_string(size) + ", got " + std::to_string(column));
+      require(column < size, "unknown in cliques must be below size ", size, ", got ", column);
       if (column >= 0) ++starts[column + 1];
     }
   }
@@ -89,7 +88,7 @@ int SparsityPattern::half_bandwidth() const {
 }
 
 void require_valid(const SparsityPattern& pattern) {
-  require(pattern.size >= 1, "size of a sparsity pattern must be at least 1, got " + std::to_string(pattern.size));
+  require(pattern.size >= 1, "size of a sparsity pattern must be at least 1, got ", pattern.size);
   require_length("column_starts", pattern.column_starts.size(), pattern.size + 1);
   const std::vector<int>& starts = pattern.column_starts;
   require(starts.front() == 0 && std::is_sorted(starts.begin(), starts.end()),
@@ -98,11 +97,11 @@ void require_valid(const SparsityPattern& pattern) {
   for (int column = 0; column < pattern.size; ++column) {
     const auto begin = pattern.row_indices.begin() + starts[column];
     const auto end = pattern.row_indices.begin() + starts[column + 1];
-    require(std::adjacent_find(begin, end, std::greater_equal<int>()) == end,
-            "row_indices of column " + std::to_string(column) + " must increase");
-    require(begin == end || (*begin >= 0 && *(end - 1) < pattern.size),
-            "row_indices of column " + std::to_string(column) + " must lie within the matrix");
-    require(std::binary_search(begin, end, column), "pattern lacks diagonal " + entry_text(column, column));
+    require(std::adjacent_find(begin, end, std::greater_equal<int>()) == end, "row_indices of column ", column,
+            " must increase");
+    require(begin == end || (*begin >= 0 && *(end - 1) < pattern.size), "row_indices of column ", column,
+            " must lie within the matrix");
+    require(std::binary_search(begin, end, column), "pattern lacks diagonal entry (", column, ", ", column, ")");
   }
   // Column by column the mirrored entries come up in the order of their rows.
   std::vector<int> next(starts.begin(), starts.end() - 1);

@@ -58,7 +58,12 @@ World::Implementation::Implementation(SceneDescription scene, Options choice)
   }
 }
 
-World::Implementation::Implementation(const Implementation& other)
+World::Implementation::Implementation(const Implementation& other) : Implementation(other, Unbuilt{}) {
+  newton = std::make_unique<Newton>(model, options);
+  equations = std::make_unique<Equations>(model, equation_options(options));
+}
+
+World::Implementation::Implementation(const Implementation& other, Unbuilt /*unused*/)
     : Running(other),
       description(other.description),
       drawn_contact(other.drawn_contact),
@@ -75,8 +80,6 @@ World::Implementation::Implementation(const Implementation& other)
       branch_warning(other.branch_warning) {
   work.newton.counters = other.work.newton.counters;
   listen();
-  newton = std::make_unique<Newton>(model, options);
-  equations = std::make_unique<Equations>(model, equation_options(options));
 }
 
 void World::Implementation::listen() {
@@ -111,6 +114,7 @@ Model World::Implementation::model_of_active(Rebuild why) {
 /// Drops what has the sizes of the old model.
 void World::Implementation::drop_scratch() {
   static_equations.reset();
+  spatial_twin.reset();
   static_gradient.reset();
   read_equations.reset();
   fallback_equations.reset();
@@ -182,8 +186,6 @@ void World::Implementation::carry_over(const Model& old, Rebuild why) {
   set_mass(old, parameters, mass);
   const double before = kinetic_energy(old, mass, from.v);
   update_derived(model, parameters);
-  newton = std::make_unique<Newton>(model, options);
-  equations = std::make_unique<Equations>(model, equation_options(options));
   relax_frames(is_new);
   if (why == Rebuild::running) {
     regrip(held_before);
@@ -201,6 +203,8 @@ void World::Implementation::rebuild(Rebuild why) {
   Model fresh = model_of_active(why);
   drop_scratch();
   const Model old = std::exchange(model, std::move(fresh));
+  newton = std::make_unique<Newton>(model, options);
+  equations = std::make_unique<Equations>(model, equation_options(options));
   if (why == Rebuild::first)
     begin_as_drawn();
   else
@@ -208,8 +212,6 @@ void World::Implementation::rebuild(Rebuild why) {
   description.uncorrected_ends = model.description.uncorrected_ends;
   // Half stencils go with the support that has held their frame.
   if (why == Rebuild::running) support_work += elastic_energy() - stored;
-  newton = std::make_unique<Newton>(model, options);
-  equations = std::make_unique<Equations>(model, equation_options(options));
   if (Contact* contact = equations->contact()) contact->initialise(state, parameters);
   reaction_current = false;
   make_plan();
@@ -218,6 +220,7 @@ void World::Implementation::rebuild(Rebuild why) {
 void World::Implementation::remake_equations() {
   model.description.loads = description.loads;
   static_equations.reset();
+  spatial_twin.reset();
   static_gradient.reset();
   read_equations.reset();
   fallback_equations.reset();
@@ -449,8 +452,8 @@ void World::Implementation::make_plan() {
   if (model.planar()) {
     plan.plane_normal = model.plane->normal;
     notes.push_back(
-        "planar: 2 unknowns a node, no twist; a scene that could buckle out of its plane stays in it "
-        "(build(planar=False) to force 3D)");
+        "planar: 2 unknowns a node, no twist; a scene that could buckle out of its plane stays in it" +
+        std::string(options.planar.value_or(false) ? "" : " in time steps") + " (build(planar=False) to force 3D)");
   } else {
     notes.push_back("3D: " + (options.planar.has_value() && !*options.planar ? std::string("planar=False")
                               : spatial                                      ? std::string("the scene left its plane")

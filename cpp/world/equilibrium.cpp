@@ -5,6 +5,7 @@
 #include "common/timer.hpp"
 #include "geometry/rotation.hpp"
 #include "integrators/arc_length.hpp"
+#include "integrators/stiffness_signs.hpp"
 #include "world/implementation.hpp"
 
 namespace withe {
@@ -178,12 +179,35 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
     fail_equilibrium(r, dt);
   }
   const EquilibriumResult found = settle(system, r, time);
-  if (!release_left_rings()) return found;
-  // Without a ring that it has left a rod goes on.
+  if (buckles_out_of_plane())
+    leave_plane("an equilibrium that is not stable against motions out of it");
+  else if (!release_left_rings())
+    return found;
+  // In space, or without a ring that it has left, a rod goes on.
   EquilibriumResult next = equilibrium(0.0);
   next.iterations += found.iterations;
   next.branch_changed = true;
   return next;
+}
+
+bool World::Implementation::buckles_out_of_plane() {
+  if (!model.planar() || options.planar.value_or(false) || !statics().has_potential()) return false;
+  if (spatial_twin) {
+    static_cast<Running&>(*spatial_twin) = *this;
+    spatial_twin->state = spatial_twin->transferred(model, state);
+    update_derived(spatial_twin->model, spatial_twin->parameters);
+  } else {
+    spatial_twin = std::make_unique<Implementation>(*this, Unbuilt{});
+    spatial_twin->options.integrator = Integrator::statics;
+    spatial_twin->spatial = true;
+    spatial_twin->rebuild(Rebuild::running);
+  }
+  Implementation& space = *spatial_twin;
+  space.equations->begin(space.state, space.parameters, StepRule::statics, 0.0);
+  StepData& data = space.work.newton.data;
+  space.equations->evaluate(space.state.q, true, nullptr, data);
+  StiffnessSigns signs(*space.equations, space.newton->norms(), space.work.newton.counters);
+  return !signs.stable(space.state, data);
 }
 
 void World::Implementation::static_step(double end, double dt) {
@@ -308,6 +332,7 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
     const ArcVisitor visit = [&](const ArcPoint& point) {
       self.note_reactions();
       out.points.push_back(path_point(*this, self.model, point));
+      if (point.stable && self.buckles_out_of_plane()) out.points.back().stable = false;
     };
     r = follow_arc(system, *self.newton, self.options, path,
                    {wanted.start, wanted.end, wanted.most_points, wanted.turn}, self.state, self.work.newton, visit);

@@ -43,6 +43,9 @@ struct World::Implementation : Running {
   Implementation(SceneDescription description, Options options);
   /// The same scene at the same point, without what `lagged` knows: see `recall`.
   Implementation(const Implementation& other);
+  /// Likewise, but `rebuild` is to follow: there are no equations yet.
+  struct Unbuilt {};
+  Implementation(const Implementation& other, Unbuilt);
 
   SceneDescription description;
   ContactDescription drawn_contact;  ///< which holds until it is set
@@ -52,6 +55,7 @@ struct World::Implementation : Running {
   std::unique_ptr<Equations> equations;
   std::unique_ptr<Equations> fallback_equations;  ///< energy-momentum ones, made when plain midpoint gains energy
   std::unique_ptr<Equations> static_equations;    ///< symmetric ones, made when first needed
+  std::unique_ptr<Implementation> spatial_twin;   ///< of a planar scene: see `buckles_out_of_plane`
   mutable std::unique_ptr<StepGradient> static_gradient;  ///< made when first needed
   mutable std::unique_ptr<Equations> read_equations;      ///< symmetric ones, of which no matrix is yet to serve
   std::shared_ptr<Tape> tape;                             ///< of a run that is kept for gradients
@@ -287,6 +291,9 @@ struct World::Implementation : Running {
                             const std::vector<SupportMotion>& to);
   [[noreturn]] void fail_equilibrium(const StaticResult& result, double dt) const;
   EquilibriumResult settle(Equations& system, StaticResult& result, double time);
+  /// Whether a motion out of the plane lowers the potential of an equilibrium in it. Not asked where the scene is to
+  /// stay in its plane, nor where what acts has no potential.
+  bool buckles_out_of_plane();
   bool drifts(Equations& system);
   void rest();
   Equations& statics();

@@ -102,6 +102,10 @@ EULER_LOADS = {
 GREENHILL = 2.25 * brentq(lambda x: jv(-1.0 / 3.0, x), 1.5, 2.2, xtol=1e-15) ** 2
 
 
+# P L^2 / sqrt(B C) of a narrow cantilever with a load at its end [Prandtl 1899, Michell 1899]: J_(-1/4)(P / 2) = 0.
+TIPPING_LOAD = 2.0 * brentq(lambda x: jv(-0.25, x), 1.5, 2.5, xtol=1e-14)
+
+
 def critical_twisting_moment(tension: float) -> float:
     """Smallest M L / B at which a straight rod with clamped ends and tension T L^2 / B buckles.
 

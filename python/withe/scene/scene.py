@@ -266,7 +266,8 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
             Cut steps so that the error of positions stays below it, over `duration`. A fifth of it is kept for events
             such as impacts, in which steps go by the error of each rather than by that per unit of time.
         planar : bool
-            Force two or three dimensions; by default a scene that lies in a plane is solved in it. A
+            Force two or three dimensions; by default a scene that lies in a plane is solved in it. Time steps stay in
+            the plane, as exact ones would; `equilibrium` leaves it where the scene buckles out of it. A
             straight scene without gravity lies in many, and ``True`` takes that of its first director.
             Loads that are functions and custom forces may leave any plane; with ``True`` they must not.
         duration : float [s]

@@ -32,8 +32,9 @@ class EquilibriumPath(ShortRepr):
         By which loads are multiplied; or, of supports that move and of what was out of balance at the start, the
         fraction that is reached.
     stable : ndarray of shape (points,) of bool
-        Whether every small motion would be pushed back, at the point's loads and supports. With follower loads or
-        moments in space that says no more than that the stiffness can be inverted.
+        Whether every small motion would be pushed back, at the point's loads and supports; those out of the plane of a
+        planar scene too, as in `Equilibrium`, but the path stays in it. With follower loads or moments in space that
+        says no more than that the stiffness can be inverted.
     limit_points : ndarray of shape (limits,) of int
         Points at which the load factor has an extremum: they are found to nine digits of the load factor. A
         bifurcation, where a symmetric branch only becomes unstable, is none: `stable` tells of it.

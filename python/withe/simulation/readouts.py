@@ -107,8 +107,9 @@ class Equilibrium:
     Attributes
     ----------
     stable : bool
-        Whether no small motion would grow. Of a scene that is solved in a plane, as its `plan` says, motions in it
-        count: whether it would tip over sideways ``build(planar=False)`` shows.
+        Whether no small motion would grow. A scene that lay in a plane and buckles out of it is three-dimensional from
+        then on. Built with planar=True, or under friction, custom forces or loads that turn with the rod, it stays in
+        its plane, and only motions in that count.
     stability : {"stable", "diverges", "flutters"}
         Where one grows, whether steadily or swinging, which only loads that turn with the rod can make it do; see
         `Linearisation.stability`. Friction counts as what it does to the stiffness.
