@@ -152,6 +152,23 @@ void pressure_on_edge(const Model& model, const VectorX& q, int edge, const Vect
     }
 }
 
+/// Edges that a load at a place of a rod acts on: those of the rod, and what is bent against them there, as the next
+/// rod in a row of rods is.
+std::vector<int> edges_at(const Model& model, const RodPass& pass) {
+  const RodDescription& rod = model.description.rods[at(pass.rod)];
+  const int first = model.rod_first_edge[at(pass.rod)], last = model.rod_first_edge[at(pass.rod) + 1] - 1;
+  std::vector<int> edges;
+  if (pass.node > 0 || rod.closed) edges.push_back(pass.node > 0 ? first + pass.node - 1 : last);
+  if (first + pass.node <= last) edges.push_back(first + pass.node);
+  const auto known = [&](int edge) { return std::find(edges.begin(), edges.end(), edge) != edges.end(); };
+  for (const int b : model.bend_across) {
+    const BendStencil& s = model.bend[at(b)];
+    if (s.node[1] != rod.nodes[at(pass.node)] || known(s.edge[0]) == known(s.edge[1])) continue;
+    edges.push_back(known(s.edge[0]) ? s.edge[1] : s.edge[0]);
+  }
+  return edges;
+}
+
 /// Custom moments: each on the joint at its node, or else shared evenly by the edges there.
 void add_node_moments(const Model& model, Loads& loads) {
   loads.node_moments = model.node_count;
@@ -198,24 +215,25 @@ Loads resolve_loads(const Model& model) {
                                   .along = true});
     } else {
       const int node = rod.nodes[at(load.pass.node)];
-      const int count = last - first + 1;
-      int in = load.pass.node > 0 ? first + load.pass.node - 1 : rod.closed ? last : -1;
-      int out = load.pass.node < count ? first + load.pass.node : -1;
+      const std::vector<int> edges = edges_at(model, load.pass);
+      const double share = 1.0 / static_cast<double>(edges.size());
+      if (load.kind == LoadKind::force && !load.follower) {
+        loads.pieces.push_back({LoadShape::dead_node, index, 1.0, node});
+        continue;
+      }
       if (load.kind == LoadKind::force) {
-        loads.pieces.push_back(
-            {load.follower ? LoadShape::follower : LoadShape::dead_node, index, 1.0, node, in >= 0 ? in : out});
+        for (int e : edges) loads.pieces.push_back({LoadShape::follower, index, share, node, e});
+        continue;
+      }
+      int frame = -1;
+      for (const FrameStencil& half : model.half)
+        if (half.hinge < 0 && std::find(edges.begin(), edges.end(), half.edge) != edges.end() &&
+            model.frame_node[at(half.frame)] == node)
+          frame = half.frame;
+      if (frame >= 0) {
+        loads.pieces.push_back({LoadShape::frame_moment, index, 1.0, node, -1, frame, load.follower});
       } else {
-        int frame = -1;
-        for (const FrameStencil& half : model.half)
-          if (half.hinge < 0 && (half.edge == in || half.edge == out) && model.frame_node[at(half.frame)] == node)
-            frame = half.frame;
-        if (frame >= 0) {
-          loads.pieces.push_back({LoadShape::frame_moment, index, 1.0, node, -1, frame, load.follower});
-        } else {
-          const double share = in >= 0 && out >= 0 ? 0.5 : 1.0;
-          for (int e : {in, out})
-            if (e >= 0) loads.pieces.push_back({LoadShape::edge_moment, index, share, node, e, -1, load.follower});
-        }
+        for (int e : edges) loads.pieces.push_back({LoadShape::edge_moment, index, share, node, e, -1, load.follower});
       }
     }
   }

@@ -13,6 +13,8 @@
 
 #include "steps/fluid_forces.hpp"
 
+#include <algorithm>
+#include <numeric>
 #include <stdexcept>
 
 #include "common/check.hpp"
@@ -74,21 +76,46 @@ void StokesletForces::recall(const StokesletFluid::Memory& memory, double excess
   fluid_.recall(memory);
 }
 
+namespace {
+
+/// Length of each rod along its arc, with those of the rods that go on from it in line, of which it is as slender a
+/// body.
+std::vector<double> lengths_in_line(const Model& model) {
+  const auto rods = at(static_cast<int>(model.description.rods.size()));
+  std::vector<int> row(rods);
+  std::iota(row.begin(), row.end(), 0);
+  std::vector<int> stencils(at(model.node_count), 0);
+  for (const BendStencil& s : model.bend) ++stencils[at(s.node[1])];
+  for (const int b : model.bend_across) {
+    const BendStencil& s = model.bend[at(b)];
+    if (stencils[at(s.node[1])] > 1) continue;  // a star, not a row
+    const int one = row[at(model.edge_rod[at(s.edge[0])])], other = row[at(model.edge_rod[at(s.edge[1])])];
+    std::replace(row.begin(), row.end(), other, one);
+  }
+  std::vector<double> length(rods, 0.0), of_rod(rods);
+  for (int e = 0; e < model.edge_count; ++e) length[at(row[at(model.edge_rod[at(e)])])] += model.edge_arc(e);
+  for (std::size_t r = 0; r < rods; ++r) of_rod[r] = length[at(row[r])];
+  return of_rod;
+}
+
+}  // namespace
+
 ResistiveForces::ResistiveForces(const Model& model) {
   const SceneDescription& scene = model.description;
+  const std::vector<double> length = lengths_in_line(model);
   for (int e = 0; e < model.edge_count; ++e) {
     const auto rod = at(model.edge_rod[at(e)]);
     const RodDescription& d = scene.rods[rod];
     require(d.fluid_radius.size() == d.rest_lengths.size(), "a rod in a fluid needs one radius an edge");
     const double radius = d.fluid_radius[e - model.rod_first_edge[rod]];
-    resistance_.push_back(resistive_coefficients(radius, d.rest_lengths.sum(), scene.fluid.wavelength));
+    resistance_.push_back(resistive_coefficients(radius, length[rod], scene.fluid.wavelength));
   }
 }
 
 ResistiveEdge ResistiveForces::edge_of(const StepProblem& problem, const StepData& data, int edge) const {
   const Model& model = problem.model;
   const EdgeFrame<double>& f = data.configuration.edge[at(edge)];
-  const double half = 0.5 * model.edge_length[edge] * problem.parameters->fluid_viscosity;
+  const double half = 0.5 * model.edge_arc(edge) * problem.parameters->fluid_viscosity;
   ResistiveEdge resistive{.dimension = model.dimension,
                           .along = half * resistance_[at(edge)].along,
                           .across = half * resistance_[at(edge)].across,

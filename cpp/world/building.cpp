@@ -77,7 +77,8 @@ World::Implementation::Implementation(const Implementation& other, Unbuilt /*unu
       spatial(other.spatial),
       mesh_warning(other.mesh_warning),
       step_warning(other.step_warning),
-      branch_warning(other.branch_warning) {
+      branch_warning(other.branch_warning),
+      plane_warning(other.plane_warning) {
   work.newton.counters = other.work.newton.counters;
   listen();
 }
@@ -452,8 +453,8 @@ void World::Implementation::make_plan() {
   if (model.planar()) {
     plan.plane_normal = model.plane->normal;
     notes.push_back(
-        "planar: 2 unknowns a node, no twist; a scene that could buckle out of its plane stays in it" +
-        std::string(options.planar.value_or(false) ? "" : " in time steps") + " (build(planar=False) to force 3D)");
+        "planar: 2 unknowns a node, no twist; a scene that could buckle out of its plane stays in it "
+        "(build(planar=False) to force 3D)");
   } else {
     notes.push_back("3D: " + (options.planar.has_value() && !*options.planar ? std::string("planar=False")
                               : spatial                                      ? std::string("the scene left its plane")
@@ -461,6 +462,9 @@ void World::Implementation::make_plan() {
   }
   if (!plane_left_by.empty()) notes.push_back("left the plane while running: " + plane_left_by);
   for (const std::string& reason : equations->asymmetries()) notes.push_back("unsymmetric Jacobian: " + reason);
+  if (parameters.held_lumped)
+    notes.emplace_back(
+        "fourth order, and a support has moved: the mass of edges that supports hold sits at their nodes");
   if (!parameters.dragged) notes.push_back("no drag: its terms are left out");
   notes.push_back(fluid_note());
   if (!parameters.viscous) notes.push_back("no viscosity: its terms are left out");

@@ -14,6 +14,11 @@ namespace {
 // Times that an equilibrium is sought anew as contact becomes stiffer.
 constexpr int kMostStiffenings = 8;
 
+constexpr const char* kSideways =
+    "the equilibrium in the plane of the scene is not stable against motions out of it: in space the scene would "
+    "buckle, "
+    "or tip over, sideways; build(planar=False) lets it, build(planar=True) says that something keeps it in its plane";
+
 }  // namespace
 
 Equations& World::Implementation::statics() {
@@ -178,12 +183,15 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
     undo();
     fail_equilibrium(r, dt);
   }
-  const EquilibriumResult found = settle(system, r, time);
-  if (buckles_out_of_plane())
-    leave_plane("an equilibrium that is not stable against motions out of it");
-  else if (!release_left_rings())
+  EquilibriumResult found = settle(system, r, time);
+  if (!release_left_rings()) {
+    if (found.stable && buckles_out_of_plane()) {
+      found.stable = false;
+      if (!plane_warning) plane_warning = kSideways;
+    }
     return found;
-  // In space, or without a ring that it has left, a rod goes on.
+  }
+  // Without a ring that it has left a rod goes on.
   EquilibriumResult next = equilibrium(0.0);
   next.iterations += found.iterations;
   next.branch_changed = true;

@@ -148,7 +148,7 @@ void World::Implementation::check_resolution() {
 Warnings World::take_warnings() {
   const auto take = [](std::optional<std::string>& warning) { return warning ? std::exchange(*warning, {}) : ""; };
   Implementation& self = *implementation_;
-  return {take(self.mesh_warning), take(self.step_warning), take(self.branch_warning)};
+  return {take(self.mesh_warning), take(self.step_warning), take(self.branch_warning), take(self.plane_warning)};
 }
 
 /// What to try where something has turned by nearly half a turn in a hand that yields, whose moment has no bound there.

@@ -91,6 +91,7 @@ struct World::Implementation : Running {
   std::optional<std::string> mesh_warning;
   std::optional<std::string> step_warning;    ///< likewise, of steps too long for the motion
   std::optional<std::string> branch_warning;  ///< likewise, of a static step that left its branch
+  std::optional<std::string> plane_warning;   ///< likewise, of an equilibrium that is unstable out of its plane
   std::vector<LeftRing> left_rings;           ///< not heard of yet
   NewtonResult last_newton;
 

@@ -142,6 +142,7 @@ void World::Implementation::lump_held() {
   update_derived(model, parameters);
   set_mass(model, parameters, mass);
   support_work += kinetic_energy(model, mass, state.v);
+  plan_current = false;
 }
 
 void World::prescribe_support(int support, const std::optional<Vector3>& position,

@@ -80,6 +80,7 @@ struct Warnings {
   std::string mesh;    ///< it is too coarse for the motion
   std::string steps;   ///< they are too long for it
   std::string branch;  ///< a static step has left it
+  std::string plane;   ///< an equilibrium in it is not stable against motions out of it
 };
 
 struct EquilibriumResult {

@@ -18,6 +18,7 @@ from withe.errors import (
     CoarseMeshWarning,
     CoarseStepWarning,
     ConvergenceError,
+    OutOfPlaneWarning,
     RingLeftWarning,
 )
 from withe.parts.friction_fields import FrictionMap
@@ -68,6 +69,7 @@ __all__ = [
     "Momentum",
     "NodeHandle",
     "Obstacle",
+    "OutOfPlaneWarning",
     "Plan",
     "Reaction",
     "Record",

@@ -7,6 +7,7 @@ __all__ = [
     "CoarseMeshWarning",
     "CoarseStepWarning",
     "ConvergenceError",
+    "OutOfPlaneWarning",
     "RingLeftWarning",
 ]
 
@@ -39,6 +40,15 @@ class CoarseStepWarning(UserWarning):
     what touches.
 
     Given once a simulation, within 64 steps.
+    """
+
+
+class OutOfPlaneWarning(UserWarning):
+    """An equilibrium of a scene that is solved in its plane is not stable against motions out of it.
+
+    In space the scene would buckle or tip over sideways, as a deep beam does, or a truss that nothing holds there.
+    ``build(planar=False)`` lets it; ``build(planar=True)`` says that something keeps it in its plane. Given once a
+    simulation.
     """
 
 

@@ -10,6 +10,7 @@ import withe
 from convergence import assert_order
 
 GAUSS = np.polynomial.legendre.leggauss
+PIECE = {"radius": 1e-3, "stiffness": rods.stiffness(bend=1e3, twist=1e3), "line_density": 0.05}
 
 
 def stokeslets(targets, sources, regularization):
@@ -96,6 +97,43 @@ def test_the_ratio_of_the_two_speeds_tends_to_two_as_rods_become_slender():
         logarithm = np.log(slenderness)
         assert ratios[-1] == pytest.approx(2.0 * (logarithm - 0.5) / (logarithm + 0.5), rel=1e-5)
     assert np.all(np.diff(ratios) > 0.0)
+
+
+@pytest.mark.parametrize("parts", [2, 4])
+def test_a_row_of_joined_rods_falls_through_a_resistive_fluid_as_one_rod(parts):
+    """Its slenderness is that of the whole."""
+    speeds = []
+    for pieces in (1, parts):
+        scene = withe.Scene()
+        scene.add_fluid(1.0, model="resistive")
+        ends = np.linspace(0.0, 1.0, pieces + 1)
+        row = [
+            scene.add_rod(start=(a, 0, 0), end=(b, 0, 0), nodes=16 // pieces + 1, **PIECE)
+            for a, b in itertools.pairwise(ends)
+        ]
+        for one, other in itertools.pairwise(row):
+            scene.join(one.end, other.start)
+        simulation = scene.build(integrator="backward_euler", time_step=0.02)
+        simulation.step(250)
+        speeds.append([simulation.velocities(rod)[[0, -1], 2] for rod in (row[0], row[-1])])
+    np.testing.assert_allclose(speeds[1][0][0], speeds[0][0][0], rtol=1e-9)
+    np.testing.assert_allclose(speeds[1][1][1], speeds[0][1][1], rtol=1e-9)
+
+
+def test_a_ring_meets_the_resistance_of_its_arc_on_any_mesh():
+    """It falls along its axis, across all of its length: c_n a unit length, of the circle and not of its chords."""
+    weight, radius, wavelength = 0.05 * 9.81, 1e-3, 0.5
+    across = 4.0 * np.pi / (np.log(0.18 * wavelength / radius) + 0.5)
+    for nodes in (6, 24):
+        turn = np.linspace(0.0, 2.0 * np.pi, 2001)[:-1]
+        scene = withe.Scene()
+        scene.add_fluid(1.0, model="resistive", wavelength=wavelength)
+        ring = scene.add_rod(
+            points=0.1 * np.stack([np.cos(turn), np.sin(turn), 0.0 * turn], axis=1), nodes=nodes, closed=True, **PIECE
+        )
+        simulation = scene.build(integrator="backward_euler", time_step=0.02, planar=False)
+        simulation.step(250)
+        np.testing.assert_allclose(-simulation.velocities(ring)[:, 2], weight / across, rtol=1e-4)
 
 
 def test_speed_of_a_falling_ring_converges_at_second_order_to_the_integral_over_a_circle():

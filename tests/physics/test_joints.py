@@ -1,5 +1,7 @@
 """Joints carry what they should and nothing else."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -35,6 +37,83 @@ LOADS = pytest.mark.parametrize("load", [(0.0, 0.0, -1.0), (0.0, 0.8, -0.6)], id
 @LOADS
 def test_two_rods_end_to_end_are_one(load):
     np.testing.assert_allclose(beam(40, load, True), beam(40, load, False), atol=1e-9)
+
+
+def half_way(edges, put, parts, name):
+    """Nodes of a cantilever of one, two or four rods in a row, with what `put(scene, node)` puts half-way along it."""
+    scene = rods.weightless()
+    corners = np.linspace(0.0, 1.0, parts + 1)
+    row = [
+        scene.add_rod(
+            start=(a, 0, 0),
+            end=(b, 0, 0),
+            nodes=edges // parts + 1,
+            stiffness=rods.stiffness(),
+            line_density=1.0,
+            radius=1e-3,
+        )
+        for a, b in pairwise(corners)
+    ]
+    for one, next_one in pairwise(row):
+        scene.join(one.end, next_one.start)
+    scene.clamp(row[0].start)
+    before, after = row[(parts - 1) // 2], row[parts // 2]
+    put(scene, before.node(edges // 2) if parts == 1 else before.end if name == "end" else after.start)
+    simulation = rods.sharp(scene, planar=False)
+    simulation.equilibrium()
+    directors = simulation.directors(row[-1])[-1]
+    return np.vstack([simulation.positions(row[-1])[-1], directors])
+
+
+@pytest.mark.parametrize("follower", [False, True])
+@pytest.mark.parametrize("kind", ["force", "moment"])
+@pytest.mark.parametrize(("parts", "name"), [(2, "end"), (2, "start"), (4, "end"), (4, "start")])
+def test_loads_where_rods_are_joined_in_a_row_act_as_on_one_rod(parts, name, kind, follower):
+    """By the end of one rod and by the start of the next, which are the same node."""
+
+    def put(scene, node):
+        if kind == "force":
+            scene.add_force(node, (0.2, 1.0, -0.5), follower=follower)
+        else:
+            scene.add_moment(node, (0.3, 0.5, -1.0), follower=follower)
+
+    np.testing.assert_allclose(half_way(8, put, parts, name), half_way(8, put, 1, name), atol=1e-9)
+
+
+def test_a_moment_half_way_bends_and_twists_as_beams_do():
+    """M h (L - h / 2) of deflection, T h of twist, for unit stiffnesses, at second order."""
+    errors = []
+    for edges in (8, 16, 32):
+        tip = half_way(edges, lambda scene, node: scene.add_moment(node, (0.0, 0.0, 1e-4)), 2, "start")
+        errors.append(tip[0, 1] / (1e-4 * 0.5 * 0.75) - 1.0)
+        still, turned = (
+            half_way(edges, lambda scene, node, M=M: scene.add_moment(node, (M, 0.0, 0.0)), 2, "start")
+            for M in (0.0, 1e-3)
+        )
+        assert np.linalg.norm(np.cross(still[1], turned[1])) == pytest.approx(0.5e-3, rel=1e-6)
+    assert abs(errors[-1]) < 3e-4
+    assert_order_at_least(errors, 2.0)
+
+
+def test_a_follower_force_within_a_rod_acts_alike_whichever_end_the_rod_is_drawn_from():
+    """And its error is of second order."""
+    tips = []
+    for edges in (20, 40, 80, 160):
+        ends = []
+        for way in (1, -1):
+            scene = rods.weightless()
+            points = np.stack([np.linspace(0.0, 1.0, edges + 1), *np.zeros((2, edges + 1))], axis=1)[::way]
+            rod = scene.add_rod(points=points, stiffness=rods.stiffness(), line_density=1.0, radius=1e-3)
+            scene.clamp(rod.node(0 if way == 1 else edges))
+            scene.add_force(rod.node(edges // 2), (0.0, 0.0, 6.0), follower=True)
+            scene.add_force(rod.node(edges if way == 1 else 0), (0.0, 0.0, 4.0))  # so that it bends there
+            simulation = rods.sharp(scene)
+            simulation.equilibrium()
+            ends.append(simulation.positions(rod)[::way][-1])
+        np.testing.assert_allclose(*ends, atol=1e-10)
+        tips.append(ends[0])
+    # The clamp and what a force leaves of the curvature's slope come to their order late, as under dead forces.
+    assert_order_at_least(np.linalg.norm(np.diff(tips, axis=0), axis=1), 2.0, slack=0.25)
 
 
 @LOADS
@@ -211,7 +290,7 @@ def test_ring_of_three_pinned_links_is_a_truss():
     scene.pin(base.start)
     scene.pin(base.end, free=(1, 0, 0))
     scene.add_force(right.end, (0.0, 0.0, -1.0))
-    simulation = rods.sharp(scene)
+    simulation = rods.sharp(scene, planar=True)  # in space it would tip over
     assert simulation.equilibrium().stable
     np.testing.assert_allclose(simulation.tensions(base), 0.5, rtol=1e-5)
     np.testing.assert_allclose(simulation.tensions(left), -np.sqrt(0.5), rtol=1e-5)

@@ -55,7 +55,7 @@ class AppliedLoads(ABC):
         node : NodeHandle or str
         force : array_like of shape (3,) [N], or a function of time [s] that returns it
         follower : bool
-            Whether it turns with the edge that ends at the node (or starts there, at the first node).
+            Whether it turns with the rod: half of it with either edge at the node.
         name : str
 
         Returns

@@ -207,8 +207,9 @@ class Loads:
         wavelength : float [m]
             Of "resistive" (not used by the other): of waves along the rods, such as the length of one turn of a helix,
             for c_t = 2 pi / ln(.18 wavelength / radius), c_n = 4 pi / (ln(.18 wavelength / radius) + 1/2)
-            [Lighthill 1976]. By default rods are taken as straight: c_t = 2 pi / (ln(length / radius) - 1/2), c_n =
-            4 pi / (ln(length / radius) + 1/2), as of spheroids [Happel and Brenner 1965].
+            [Lighthill 1976]. By default rods are taken as straight, those that are joined in a row as one of their
+            whole length: c_t = 2 pi / (ln(length / radius) - 1/2), c_n = 4 pi / (ln(length / radius) + 1/2), as of
+            spheroids [Happel and Brenner 1965].
         name : str
 
         Returns

@@ -253,8 +253,11 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         ----------
         integrator : {"implicit_midpoint", "backward_euler", "energy_momentum", "fourth_order", "verlet", "static"}
             "fourth_order" is five midpoint steps in one, the third back in time; it takes no viscosity, and
-            drag only up to mass over time_step. "energy_momentum" follows what turns fast best: the tip of an
-            arm on a turning hub ten times more closely than midpoint at the same step.
+            drag only up to mass over time_step. Once a support has moved, the mass of the edges that supports hold
+            sits at their nodes, an error of the mesh that no step removes: 3 % of how far a cantilever bends when its
+            clamp is accelerated with 5 nodes, .02 % with 17. The midpoint rule has none of it. "energy_momentum"
+            follows what turns fast best: the tip of an arm on a turning hub ten times more closely than midpoint at
+            the same step.
         time_step : float [s]
         adaptive : bool
             Whether an implicit step that fails is halved; steps grow back. So are those in which surfaces that graze
@@ -266,8 +269,8 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
             Cut steps so that the error of positions stays below it, over `duration`. A fifth of it is kept for events
             such as impacts, in which steps go by the error of each rather than by that per unit of time.
         planar : bool
-            Force two or three dimensions; by default a scene that lies in a plane is solved in it. Time steps stay in
-            the plane, as exact ones would; `equilibrium` leaves it where the scene buckles out of it. A
+            Force two or three dimensions; by default a scene that lies in a plane is solved in it, also where it
+            could buckle out of it: `equilibrium` warns of that, and steps stay in the plane as exact ones would. A
             straight scene without gravity lies in many, and ``True`` takes that of its first director.
             Loads that are functions and custom forces may leave any plane; with ``True`` they must not.
         duration : float [s]

@@ -235,7 +235,7 @@ class Measurements:
         return ring_passage(self._session, ring)
 
     def pose(self, support: Support | NodeHandle | str) -> HeldPose:
-        """Position and rotation of a support or a hand now.
+        """Position and rotation of a support or a hand now; with `free`, where its node slides from.
 
         Raises
         ------
@@ -280,9 +280,9 @@ class Measurements:
     def plan(self) -> Plan:
         """What was decided for this scene: ``print(simulation.plan)``."""
         plan, parts = self._session.world.plan, self._session.directory.all(RodPart)
-        length = sum(float(part.lengths.sum()) for part in parts)
+        length = sum(float(part.arcs.sum()) for part in parts)
         rods = zip(parts, self._session.settings.rods, strict=True)
-        mass = sum(float(np.sum(numbers.line_density * part.lengths)) for part, numbers in rods)
+        mass = sum(float(np.sum(numbers.line_density * part.arcs)) for part, numbers in rods)
         mass += sum(self._session.settings.masses.values())
         return Plan(
             planar=plan.planar,

@@ -33,7 +33,7 @@ class EquilibriumPath(ShortRepr):
         fraction that is reached.
     stable : ndarray of shape (points,) of bool
         Whether every small motion would be pushed back, at the point's loads and supports; those out of the plane of a
-        planar scene too, as in `Equilibrium`, but the path stays in it. With follower loads or moments in space that
+        planar scene too, as in `Equilibrium`. With follower loads or moments in space that
         says no more than that the stiffness can be inverted.
     limit_points : ndarray of shape (limits,) of int
         Points at which the load factor has an extremum: they are found to nine digits of the load factor. A

@@ -107,9 +107,9 @@ class Equilibrium:
     Attributes
     ----------
     stable : bool
-        Whether no small motion would grow. A scene that lay in a plane and buckles out of it is three-dimensional from
-        then on. Built with planar=True, or under friction, custom forces or loads that turn with the rod, it stays in
-        its plane, and only motions in that count.
+        Whether no small motion would grow. A scene that is solved in a plane, as its `plan` says, stays in it, but
+        motions out of it count too, with an `OutOfPlaneWarning` where one would grow; not so if it was built with
+        planar=True, or under friction, custom forces and loads that turn with the rod.
     stability : {"stable", "diverges", "flutters"}
         Where one grows, whether steadily or swinging, which only loads that turn with the rod can make it do; see
         `Linearisation.stability`. Friction counts as what it does to the stiffness.

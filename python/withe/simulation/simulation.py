@@ -145,8 +145,8 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
         moved with (from the drawn shape at first), and loads that were changed come in, along the branch of equilibria
         that begins at the present state, in steps in which no edge turns far. Where that branch ends (at a limit point)
         or is not stable any more, the scene goes on dynamically: then `branch_changed` is true. Saddles are left, so
-        that a straight column that carries too much buckles, and a deep beam sideways: a scene that is solved in a
-        plane becomes three-dimensional where its equilibrium would not be stable there, unless built with planar=True.
+        that a straight column that carries too much buckles. A scene that is solved in a plane stays in it, with an
+        `OutOfPlaneWarning` where it would not stay in space.
 
         With ``path="arc_length"`` the branch is followed through limit points, stable or not, by pseudo-arc-length
         continuation [Riks 1979, Int. J. Solids Struct. 15; Crisfield 1981, Comput. Struct. 13], and all its points are

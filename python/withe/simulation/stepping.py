@@ -14,6 +14,7 @@ from withe.errors import (
     CoarseMeshWarning,
     CoarseStepWarning,
     ConvergenceError,
+    OutOfPlaneWarning,
     RingLeftWarning,
 )
 from withe.recording.recorder import Recorder
@@ -187,14 +188,16 @@ def convergence_error(session: Session, numbers: tuple[Any, ...]) -> Convergence
     return ConvergenceError(message, time, step, name, node if node >= 0 else None, residual)
 
 
-def pass_on(sessions: Iterable[Session], mesh: str, steps: str, branch: str) -> None:
-    """Give warnings of the engine, of coarse meshes, coarse steps and branches that were left, where there are any."""
+def pass_on(sessions: Iterable[Session], mesh: str, steps: str, branch: str, plane: str) -> None:
+    """Give warnings of the engine where there are any: of coarse meshes, coarse steps, branches and planes."""
     if mesh:
         warnings.warn(mesh, CoarseMeshWarning, stacklevel=_levels_to_user())
     if steps and any(session.options.time_step > session.longest_meant for session in sessions):
         warnings.warn(steps, CoarseStepWarning, stacklevel=_levels_to_user())
     if branch:
         warnings.warn(branch, BranchChangedWarning, stacklevel=_levels_to_user())
+    if plane:
+        warnings.warn(plane, OutOfPlaneWarning, stacklevel=_levels_to_user())
 
 
 def report_left(what: str) -> None:
