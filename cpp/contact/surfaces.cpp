@@ -295,6 +295,21 @@ void Surfaces::add_edges(const ContactPair& prototype, const Obstacle& obstacle)
   }
 }
 
+/// The edge that goes on from the first or the last one of a rod, of a rod that is joined to it in line and drawn the
+/// same way, if that may meet the obstacle too; or -1. What is between both has the friction of the one before.
+int Surfaces::next_in_row(int edge, bool behind, int obstacle) const {
+  const int node = behind ? model_.edge_head[at(edge)] : model_.edge_tail[at(edge)];
+  int stencils = 0, found = -1;
+  for (const int b : model_.bend_across) {
+    const BendStencil& s = model_.bend[at(b)];
+    if (s.node[1] != node) continue;
+    ++stencils;
+    if (s.edge[behind ? 0 : 1] == edge && s.sign[0] > 0 && s.sign[1] > 0) found = s.edge[behind ? 1 : 0];
+  }
+  if (stencils != 1 || found < 0) return -1;  // or a star
+  return may_meet(model_.edge_rod[at(found)], obstacle) ? found : -1;
+}
+
 void Surfaces::add_pieces(const ContactPair& prototype, const Obstacle& obstacle, int rod) {
   const int first = model_.rod_first_edge[at(rod)], end = model_.rod_first_edge[at(rod + 1)];
   const bool closed = model_.description.rods[at(rod)].closed;
@@ -317,10 +332,16 @@ void Surfaces::add_pieces(const ContactPair& prototype, const Obstacle& obstacle
     }
     obstacle_pairs_.push_back(p);
   };
+  const auto neighbour = [&](int edge, bool behind) {
+    const int next = behind ? edge + 1 : edge - 1;
+    if (next >= first && next < end) return next;
+    if (closed) return behind ? first : end - 1;
+    return next_in_row(edge, behind, prototype.key.b);
+  };
   const bool flat = obstacle.kind == ObstacleKind::plane;
   for (int e = first; e < end; ++e) {
     if (!smooth(obstacle, e)) continue;
-    const int before = e > first ? e - 1 : closed ? end - 1 : -1, behind = e + 1 < end ? e + 1 : closed ? first : -1;
+    const int before = neighbour(e, false), behind = neighbour(e, true);
     if (before < 0 || !smooth(obstacle, before)) add(flat ? kCurveFirst : kCurveStart, e, e, 0);
     if (behind < 0 || !smooth(obstacle, behind))
       add(flat ? kCurveLast : kCurveEnd, e, e, 1);

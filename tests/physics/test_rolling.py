@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -218,3 +219,36 @@ def test_a_cylinder_that_is_thrown_keeps_two_thirds_of_its_speed(integrator: Any
     simulation.step(300)
     assert simulation.velocities(rod)[:, 0].mean() == pytest.approx(4.0, rel=2e-3)
     assert simulation.energy().dissipated == pytest.approx(kinetic / 3.0, rel=5e-3)
+
+
+@pytest.mark.parametrize("surface", ["floor", "capsule"])
+@pytest.mark.parametrize("parts", [1, 2])
+def test_a_hoop_of_joined_rods_rolls_as_one_closed_rod(parts: int, surface: str) -> None:
+    """The smooth curve that touches goes on from rod to rod.
+
+    Up to the stiffness of contacts, which follows the forces on each rod.
+    """
+    angle = 2.0 * np.pi * np.arange(13) / 12 - np.pi / 2.0 + 0.1
+    circle = 0.1 * np.stack([np.cos(angle), 0.0 * angle, np.sin(angle)], axis=1) + (0.0, 0.0, 0.104)
+    circle[-1] = circle[0]
+    stiff = withe.Material(youngs_modulus=1e9, poisson_ratio=0.3, density=1000.0, viscosity=1e5)
+    ends = []
+    for pieces in (0, parts):
+        scene = withe.Scene(gravity=(1.7, 0.0, -9.66))
+        if pieces == 0:
+            row = [scene.add_rod(points=circle[:-1], closed=True, radius=4e-3, material=stiff)]
+        else:
+            cuts = np.linspace(0, 12, pieces + 1).astype(int)
+            row = [scene.add_rod(points=circle[a : b + 1], radius=4e-3, material=stiff) for a, b in pairwise(cuts)]
+            for rod, after in zip(row, [*row[1:], row[0]], strict=True):
+                scene.join(rod.end, after.start)
+        if surface == "floor":
+            scene.add_floor(friction=0.8)
+        else:
+            scene.add_capsule((-1.0, 0.0, -1.0), (1.0, 0.0, -1.0), 1.0, friction=0.8)
+        scene.enable_contact(rods=False)
+        simulation = scene.build(time_step=2e-3)
+        simulation.step(150)
+        ends.append(np.concatenate([simulation.positions(rod)[: 12 // max(pieces, 1)] for rod in row]))
+    assert ends[0][:, 0].mean() > 0.01  # it has rolled
+    np.testing.assert_allclose(ends[1], ends[0], atol=1e-4)
