@@ -200,7 +200,8 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
 
 bool World::Implementation::buckles_out_of_plane() {
   if (!model.planar() || options.planar.value_or(false) || !statics().has_potential()) return false;
-  if (spatial_twin) {
+  // Hinges, which in their plane are pins, have frames and angles in space only: they are found as the model is built.
+  if (spatial_twin && spatial_twin->model.hinges.size() == model.hinges.size()) {
     static_cast<Running&>(*spatial_twin) = *this;
     spatial_twin->state = spatial_twin->transferred(model, state);
     update_derived(spatial_twin->model, spatial_twin->parameters);
@@ -208,7 +209,12 @@ bool World::Implementation::buckles_out_of_plane() {
     spatial_twin = std::make_unique<Implementation>(*this, Unbuilt{});
     spatial_twin->options.integrator = Integrator::statics;
     spatial_twin->spatial = true;
-    spatial_twin->rebuild(Rebuild::running);
+    try {
+      spatial_twin->rebuild(Rebuild::running);
+    } catch (const std::invalid_argument&) {  // it exists in its plane only, with hinges that are pins there
+      spatial_twin.reset();
+      return false;
+    }
   }
   Implementation& space = *spatial_twin;
   space.equations->begin(space.state, space.parameters, StepRule::statics, 0.0);

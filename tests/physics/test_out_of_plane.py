@@ -2,6 +2,7 @@
 
 import warnings
 
+import numpy as np
 import pytest
 
 import rods
@@ -106,3 +107,51 @@ def test_the_scene_in_space_follows_parameters_loads_and_supports():
     assert not simulation.equilibrium().stable
     simulation.pin(rod.end, free=(0.0, 0.0, 1.0))  # in the plane and sideways too
     assert simulation.equilibrium().stable
+
+
+def test_a_scene_that_can_be_built_in_its_plane_only_is_not_looked_at_in_space():
+    """A clamp on what turns about a hinge, which in its plane is a pin."""
+    scene = rods.weightless()
+    parts = {"stiffness": rods.stiffness(), "line_density": 1.0, "radius": 1e-3, "nodes": 9}
+    post = scene.add_rod(start=(0, 0, 0), end=(0, 0, -1), **parts)
+    arms = [scene.add_rod(start=(0, 0, -1), end=(way, 0, -1), **parts) for way in (1, -1)]
+    for arm in arms:
+        scene.join(post.end, arm.start, "revolute", axis=(0, 1, 0))
+    scene.clamp(arms[0].start)
+    scene.pin(post.start)
+    with pytest.raises(ValueError, match="fixed side of a revolute joint"):
+        scene.build(planar=False)
+    simulation = rods.sharp(scene, planar=None)
+    assert simulation.plan.planar
+    assert simulation.equilibrium().stable
+
+
+def test_hinges_follow_into_space_at_every_equilibrium():
+    """An arm that hangs from a hinge on a stiff post, which is turned round by half a turn in steps."""
+    scene = withe.Scene()
+    post = scene.add_rod(
+        start=(0, 0, 0),
+        end=(0, 0, 0.2),
+        nodes=5,
+        radius=1e-3,
+        line_density=1.0,
+        stiffness=rods.stiffness(bend=1e3, twist=1e3),
+    )
+    arm = scene.add_rod(
+        start=(0, 0, 0.2),
+        end=(0.1, 0, -0.3),
+        nodes=9,
+        radius=1e-3,
+        line_density=1.0,
+        stiffness=rods.stiffness(bend=10.0),
+    )
+    scene.join(post.end, arm.start, "revolute", axis=(0, 1, 0))
+    clamp = scene.clamp(post.start)
+    simulation = scene.build(integrator="static")
+    assert simulation.plan.planar
+    for degrees in (0, 40, 80, 120, 160):
+        turn = np.radians(degrees)
+        simulation.move(clamp, tangent=(np.sin(turn), 0.0, np.cos(turn)))
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            assert simulation.equilibrium().stable, degrees
