@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "geometry/segment_distance.hpp"
+#include "model/rod_rows.hpp"
 
 namespace withe {
 namespace {
@@ -295,21 +296,6 @@ void Surfaces::add_edges(const ContactPair& prototype, const Obstacle& obstacle)
   }
 }
 
-/// The edge that goes on from the first or the last one of a rod, of a rod that is joined to it in line and drawn the
-/// same way, if that may meet the obstacle too; or -1. What is between both has the friction of the one before.
-int Surfaces::next_in_row(int edge, bool behind, int obstacle) const {
-  const int node = behind ? model_.edge_head[at(edge)] : model_.edge_tail[at(edge)];
-  int stencils = 0, found = -1;
-  for (const int b : model_.bend_across) {
-    const BendStencil& s = model_.bend[at(b)];
-    if (s.node[1] != node) continue;
-    ++stencils;
-    if (s.edge[behind ? 0 : 1] == edge && s.sign[0] > 0 && s.sign[1] > 0) found = s.edge[behind ? 1 : 0];
-  }
-  if (stencils != 1 || found < 0) return -1;  // or a star
-  return may_meet(model_.edge_rod[at(found)], obstacle) ? found : -1;
-}
-
 void Surfaces::add_pieces(const ContactPair& prototype, const Obstacle& obstacle, int rod) {
   const int first = model_.rod_first_edge[at(rod)], end = model_.rod_first_edge[at(rod + 1)];
   const bool closed = model_.description.rods[at(rod)].closed;
@@ -336,7 +322,10 @@ void Surfaces::add_pieces(const ContactPair& prototype, const Obstacle& obstacle
     const int next = behind ? edge + 1 : edge - 1;
     if (next >= first && next < end) return next;
     if (closed) return behind ? first : end - 1;
-    return next_in_row(edge, behind, prototype.key.b);
+    // A rod that goes on from this one, if it may meet the obstacle; the piece between has the friction of the one
+    // before.
+    const int in_row = next_in_row(model_, edge, behind);
+    return in_row >= 0 && may_meet(model_.edge_rod[at(in_row)], prototype.key.b) ? in_row : -1;
   };
   const bool flat = obstacle.kind == ObstacleKind::plane;
   for (int e = first; e < end; ++e) {

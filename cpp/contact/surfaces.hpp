@@ -100,7 +100,6 @@ class Surfaces {
   /// Pairs of an obstacle with straight edges, and with the pieces of curves between others.
   void add_edges(const ContactPair& prototype, const Obstacle& obstacle);
   void add_pieces(const ContactPair& prototype, const Obstacle& obstacle, int rod);
-  int next_in_row(int edge, bool behind, int obstacle) const;
   /// Whether an obstacle is large enough to be touched by a curve.
   bool smooth(const Obstacle& obstacle, int edge) const;
   /// Coefficients of two bodies along and across a, wherever they touch; and the place of their pair among those given,

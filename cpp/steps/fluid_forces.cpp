@@ -18,6 +18,7 @@
 #include <stdexcept>
 
 #include "common/check.hpp"
+#include "model/rod_rows.hpp"
 #include "steps/inertia.hpp"
 
 namespace withe {
@@ -78,19 +79,16 @@ void StokesletForces::recall(const StokesletFluid::Memory& memory, double excess
 
 namespace {
 
-/// Length of each rod along its arc, with those of the rods that go on from it in line, of which it is as slender a
-/// body.
-std::vector<double> lengths_in_line(const Model& model) {
-  const auto rods = at(static_cast<int>(model.description.rods.size()));
+/// Length of each rod along its arc, with those of its row: they are one slender body.
+std::vector<double> lengths_of_rows(const Model& model) {
+  const std::size_t rods = model.description.rods.size();
   std::vector<int> row(rods);
   std::iota(row.begin(), row.end(), 0);
-  std::vector<int> stencils(at(model.node_count), 0);
-  for (const BendStencil& s : model.bend) ++stencils[at(s.node[1])];
-  for (const int b : model.bend_across) {
-    const BendStencil& s = model.bend[at(b)];
-    if (stencils[at(s.node[1])] > 1) continue;  // a star, not a row
-    const int one = row[at(model.edge_rod[at(s.edge[0])])], other = row[at(model.edge_rod[at(s.edge[1])])];
-    std::replace(row.begin(), row.end(), other, one);
+  for (std::size_t r = 0; r < rods; ++r) {
+    const int next = next_in_row(model, model.rod_first_edge[r + 1] - 1, true);
+    if (next < 0) continue;
+    const int mine = row[r], theirs = row[at(model.edge_rod[at(next)])];
+    std::replace(row.begin(), row.end(), theirs, mine);
   }
   std::vector<double> length(rods, 0.0), of_rod(rods);
   for (int e = 0; e < model.edge_count; ++e) length[at(row[at(model.edge_rod[at(e)])])] += model.edge_arc(e);
@@ -102,7 +100,7 @@ std::vector<double> lengths_in_line(const Model& model) {
 
 ResistiveForces::ResistiveForces(const Model& model) {
   const SceneDescription& scene = model.description;
-  const std::vector<double> length = lengths_in_line(model);
+  const std::vector<double> length = lengths_of_rows(model);
   for (int e = 0; e < model.edge_count; ++e) {
     const auto rod = at(model.edge_rod[at(e)]);
     const RodDescription& d = scene.rods[rod];

@@ -15,9 +15,8 @@ namespace {
 constexpr int kMostStiffenings = 8;
 
 constexpr const char* kSideways =
-    "the equilibrium in the plane of the scene is not stable against motions out of it: in space the scene would "
-    "buckle, "
-    "or tip over, sideways; build(planar=False) lets it, build(planar=True) says that something keeps it in its plane";
+    "the equilibrium in the plane of the scene is not stable against motions out of it: in space the scene buckles or "
+    "tips over sideways; build(planar=False) lets it, build(planar=True) says that something keeps it in its plane";
 
 }  // namespace
 
