@@ -117,7 +117,7 @@ struct Allocated {
 };
 
 Allocated allocated_by(World& world, int steps) {
-  constexpr std::size_t kLayout = 1000;  // for every column several
+  constexpr std::size_t kLayout = 200;  // for every element one, and more
   Allocated sum;
   for (int k = 0; k < steps; ++k) {
     const std::size_t before = allocation_count;
