@@ -59,9 +59,7 @@ def falling(direction, fluid, edges=60, starts=((0.0, 0.0, 0.0),), radius=5e-3):
             start=start,
             end=np.add(start, direction),
             nodes=edges + 1,
-            radius=radius,
-            stiffness=rods.stiffness(bend=1e3, twist=1e3),
-            line_density=0.05,
+            **(PIECE | {"radius": radius}),
         )
         for start in starts
     ]
