@@ -2,9 +2,10 @@
 /// Bending and twisting between two frames: two edges, or an edge and the frame of a joint or a wall.
 ///
 /// Strains [Bergou et al. 2010, section 3; Choi, dissertation 3.3-3.6], with t the tangents and d the directors:
-///   kb = 2 t0 x t1 / (1 + t0 . t1),  kappa1 = kb . (d2_0 + d2_1) / 2,  kappa2 = - kb . (d1_0 + d1_1) / 2,
-///   tau = angle about t1 from the transported d1_0 to d1_1.
-/// |kb| = 2 tan(phi / 2) for a turn by phi. kappa1 > 0 bends towards d1, kappa2 > 0 towards d2.
+///   kb = 2 t0 x t1 / (1 + t0 . t1),  kappa1 = g kb . (d2_0 + d2_1) / 2,  kappa2 = - g kb . (d1_0 + d1_1) / 2,
+///   tau = angle about t1 from the transported d1_0 to d1_1,
+/// g(tau) of geometry/curvature.hpp, without which twist would soften bending. |kb| = 2 tan(phi / 2) for a turn by phi.
+/// kappa1 > 0 bends towards d1, kappa2 > 0 towards d2.
 /// Energy E = (K1 (f kappa1 - n1)^2 + K2 (f kappa2 - n2)^2 + Kt (f tau - nt)^2) / 2, f(|kappa|^2) of
 /// geometry/bend_measure.hpp, stiffnesses K = EI / V and GJ / V in N m, V the Voronoi length.
 ///
@@ -32,7 +33,7 @@ struct BendTwistDerivatives {
   Scalar angle_angle[2][2];    // [1][0] is not filled
 };
 
-/// Energy [J] and its derivatives with respect to (kappa1, kappa2, tau) [N m].
+/// Energy [J] and its derivatives with respect to (kappa1, kappa2, tau) [N m], or to (kappa1 / g, kappa2 / g, tau).
 template <class Scalar>
 struct BendTwistMoments {
   Scalar energy, by[3];
@@ -78,19 +79,54 @@ BendTwistMoments<Scalar> bend_twist_moments(const BendMeasure& measure, const Be
   return m;
 }
 
+/// How two frames are twisted against each other, and what follows for curvatures.
+template <class Scalar>
+struct TwistBetween {
+  Scalar cosine, sine;
+  HalfwayFactor<Scalar> g;
+
+  TwistBetween(const EdgeFrame<Scalar>& f0, const EdgeFrame<Scalar>& f1, const Scalar& inverse_chi)
+      : cosine(inverse_chi * (dot(f0.d1, f1.d1) + dot(f0.d2, f1.d2))),
+        sine(inverse_chi * (dot(f0.d2, f1.d1) - dot(f0.d1, f1.d2))),
+        g(cosine) {}
+};
+
+/// From derivatives by (kappa1, kappa2, tau) to those by (kappa1 / g, kappa2 / g, tau).
+template <bool second_too, class Scalar>
+void apply_halfway(const TwistBetween<Scalar>& twist, const BendTwistStrain<Scalar>& s, BendTwistMoments<Scalar>& m) {
+  const Scalar g = twist.g.value, r = twist.g.first(twist.sine), u[2] = {s.kappa1, s.kappa2};
+  const Scalar work = u[0] * m.by[0] + u[1] * m.by[1];
+  if constexpr (second_too) {
+    Scalar along[2], total{0.0}, mixed{0.0};
+    for (int i = 0; i < 2; ++i) {
+      along[i] = u[0] * m.second[i][0] + u[1] * m.second[i][1] + m.by[i];
+      total += u[i] * (along[i] - m.by[i]);
+      mixed += u[i] * m.second[i][2];
+    }
+    m.second[2][2] += r * (2.0 * mixed + r * total) + twist.g.second(twist.cosine, twist.sine) * work;
+    for (int i = 0; i < 2; ++i) {
+      m.second[i][2] = m.second[2][i] = g * (m.second[i][2] + r * along[i]);
+      for (int j = 0; j < 2; ++j) m.second[i][j] = (g * g) * m.second[i][j];
+    }
+  }
+  m.by[2] += r * work;
+  for (int i = 0; i < 2; ++i) m.by[i] = g * m.by[i];
+}
+
 /// Energy and gradient only.
 template <class Scalar>
 void bend_twist_gradient(const BendMeasure& measure, const EdgeFrame<Scalar>& f0, const EdgeFrame<Scalar>& f1,
                          const BendTwistStrain<Scalar>& s, const BendTwistStrain<Scalar>& natural,
                          const BendTwistStiffness<Scalar>& k, BendTwistDerivatives<Scalar>& out) {
-  const BendTwistMoments<Scalar> m = bend_twist_moments<false>(measure, s, natural, k);
-  const Scalar &c1 = m.by[0], &c2 = m.by[1], &ct = m.by[2];
+  BendTwistMoments<Scalar> m = bend_twist_moments<false>(measure, s, natural, k);
+  const Scalar K = m.by[0] * s.kappa1 + m.by[1] * s.kappa2;
   const Scalar inverse_chi = 1.0 / (1.0 + dot(f0.tangent, f1.tangent));
+  apply_halfway<false>(TwistBetween<Scalar>(f0, f1, inverse_chi), s, m);
+  const Scalar &c1 = m.by[0], &c2 = m.by[1], &ct = m.by[2];
   const Vec3<Scalar> kb = (2.0 * inverse_chi) * cross(f0.tangent, f1.tangent);
   const Vec3<Scalar> t = inverse_chi * (f0.tangent + f1.tangent);
   // kappa2 follows from kappa1 by (d1, d2) -> (d2, -d1), so both appear through two combined directors.
   const Vec3<Scalar> D = inverse_chi * (c1 * (f0.d2 + f1.d2) - c2 * (f0.d1 + f1.d1));
-  const Scalar K = c1 * s.kappa1 + c2 * s.kappa2;
   out.energy = m.energy;
   out.gradient_e[0] = f0.inverse_length * (cross(f1.tangent, D) - K * t + (0.5 * ct) * kb);
   out.gradient_e[1] = f1.inverse_length * ((0.5 * ct) * kb - K * t - cross(f0.tangent, D));
@@ -103,18 +139,21 @@ template <class Scalar>
 void bend_twist_hessian(const BendMeasure& measure, const EdgeFrame<Scalar>& f0, const EdgeFrame<Scalar>& f1,
                         const BendTwistStrain<Scalar>& s, const BendTwistStrain<Scalar>& natural,
                         const BendTwistStiffness<Scalar>& k, BendTwistDerivatives<Scalar>& out) {
-  const BendTwistMoments<Scalar> m = bend_twist_moments<true>(measure, s, natural, k);
+  BendTwistMoments<Scalar> m = bend_twist_moments<true>(measure, s, natural, k);
+  const Scalar K = m.by[0] * s.kappa1 + m.by[1] * s.kappa2;
   const Scalar &c1 = m.by[0], &c2 = m.by[1], &ct = m.by[2];
   const Vec3<Scalar>&t0 = f0.tangent, &t1 = f1.tangent;
   const Scalar i0 = f0.inverse_length, i1 = f1.inverse_length;
   const Scalar inverse_chi = 1.0 / (1.0 + dot(t0, t1));
+  const TwistBetween<Scalar> twist(f0, f1, inverse_chi);
+  apply_halfway<true>(twist, s, m);
+  const Scalar kappa1 = twist.g.inverse * s.kappa1, kappa2 = twist.g.inverse * s.kappa2;
   const Vec3<Scalar> kb = (2.0 * inverse_chi) * cross(t0, t1);
   const Vec3<Scalar> t = inverse_chi * (t0 + t1);
   const Scalar half_ct = 0.5 * ct;
   const Vec3<Scalar> D0 = c1 * f0.d2 - c2 * f0.d1, D1 = c1 * f1.d2 - c2 * f1.d1;
   const Vec3<Scalar> C[2] = {c1 * f0.d1 + c2 * f0.d2, c1 * f1.d1 + c2 * f1.d2};
   const Vec3<Scalar> D = inverse_chi * (D0 + D1);
-  const Scalar K = c1 * s.kappa1 + c2 * s.kappa2;
   const Vec3<Scalar> t1D = cross(t1, D), t0D = cross(t0, D);
 
   out.energy = m.energy;
@@ -146,10 +185,10 @@ void bend_twist_hessian(const BendMeasure& measure, const EdgeFrame<Scalar>& f0,
   add_cross(B, ct * inverse_chi, t0);
   add_outer(B, -half_ct, kb, t);
 
-  // First derivatives of the strains: g1, g2 for the curvatures, kb / 2 for the twist.
+  // First derivatives of kappa1 / g, kappa2 / g and, kb / 2, of the twist.
   const Vec3<Scalar> a1 = inverse_chi * (f0.d2 + f1.d2), a2 = -(inverse_chi * (f0.d1 + f1.d1));
-  const Vec3<Scalar> p1 = cross(t1, a1) - s.kappa1 * t, p2 = cross(t1, a2) - s.kappa2 * t;
-  const Vec3<Scalar> q1 = -(cross(t0, a1) + s.kappa1 * t), q2 = -(cross(t0, a2) + s.kappa2 * t);
+  const Vec3<Scalar> p1 = cross(t1, a1) - kappa1 * t, p2 = cross(t1, a2) - kappa2 * t;
+  const Vec3<Scalar> q1 = -(cross(t0, a1) + kappa1 * t), q2 = -(cross(t0, a2) + kappa2 * t);
   const Vec3<Scalar> half_kb = 0.5 * kb;
   const Vec3<Scalar> p[3] = {p1, p2, half_kb}, q[3] = {q1, q2, half_kb};
   for (int i = 0; i < 3; ++i) {

@@ -6,11 +6,13 @@
 /// product of vectors of two frames changes exactly by a1 . b1 - a0 . b0 = (w_a - w_b) . (mean a x mean b), and is left
 /// alone where both turn alike [Gonzalez 1996: discrete gradients in quadratic invariants]. Strains are quotients of
 /// such products: with x = t_a . t_b, X = 1 + x,
-///   kappa_i = y_i / X,  y_i = di_a . t_b - t_a . di_b,
+///   kappa_i / g = y_i / X,  y_i = di_a . t_b - t_a . di_b,
 ///   X cos(tau) = c = d1_a . d1_b + d2_a . d2_b,  X sin(tau) = s = d2_a . d1_b - d1_a . d2_b,
 /// and change exactly (means with bars, D for differences) by
-///   D kappa_i = (D y_i - mean kappa_i D x) / mean X,  D tau = D tau / (X0 X1 sin D tau) (mean c D s - mean s D c).
-/// The energy is a sum of squares of f(|kappa|^2) times these, f rational, whose differences are exact products too.
+///   D (kappa_i / g) = (D y_i - mean (kappa_i / g) D x) / mean X,
+///   D tau = D tau / (X0 X1 sin D tau) (mean c D s - mean s D c).
+/// The energy is a sum of squares of f(|kappa|^2) times strains, f rational and g rational in cos(tau), whose
+/// differences are exact products too.
 /// What follows is a moment m with m . (w_a - w_b) = E1 - E0, without a quotient of differences: it is as smooth as the
 /// energy, where Gonzalez's correction along a direction of the unknowns depends on how little a stencil deforms while
 /// it turns.
@@ -83,6 +85,52 @@ DividedMoments<Scalar> divided_moments(const BendMeasure& measure, const Vec3<Sc
   return h;
 }
 
+/// How far two frames are twisted against each other at both ends of a step, and what follows for curvatures: with
+/// z = (1 - cos(tau)) / 2,  D z / D tau = (mean sin(tau)) tan(D tau / 2) / D tau.
+template <class Scalar>
+struct DividedTwist {
+  HalfwayFactor<Scalar> g0, g1;
+  Scalar sine1;
+  Scalar by_tau, slope;  ///< D g / D tau, and how it changes with tau at the end
+
+  /// `turn` of the step's D tau, whose sine and cosine come with it.
+  DividedTwist(const Scalar& cosine0, const Scalar& sine0, const Scalar& cosine, const Scalar& sine,
+               const TurnOverSine<Scalar>& turn, const Scalar& sine_of_step, const Scalar& cosine_of_step)
+      : g0(cosine0), g1(cosine), sine1(sine) {
+    const Scalar halved = 1.0 / (1.0 + cosine_of_step), inverse = 1.0 / turn.value;
+    const Scalar tangent = halved * inverse;  // tan(D tau / 2) / D tau
+    const Scalar tangent_slope = tangent * (sine_of_step * halved - turn.slope * inverse);
+    const Scalar mean = 0.5 * (sine0 + sine), z = mean * tangent,
+                 z_slope = 0.5 * cosine * tangent + mean * tangent_slope;
+    by_tau = 0.5 * (g0.pole * g1.pole) * z;
+    slope = 0.5 * (g0.pole * g1.pole) * (z_slope + (0.375 * (g1.pole * sine)) * z);
+  }
+};
+
+/// From moments that belong to (kappa1, kappa2, tau) to those of u = (kappa1 / g, kappa2 / g, tau), with the means of
+/// these.
+template <bool second_too, class Scalar>
+void apply_halfway(const DividedTwist<Scalar>& twist, const Scalar (&mean)[2], const Scalar (&end)[2],
+                   DividedMoments<Scalar>& h) {
+  const Scalar g1 = twist.g1.value, g = 0.5 * (twist.g0.value + g1), first = g1 * twist.g1.first(twist.sine1);
+  const Scalar work = mean[0] * h.by[0] + mean[1] * h.by[1];
+  if constexpr (second_too) {
+    // d kappa_j = g1 d u_j + g1' u_j d tau at the end.
+    Scalar by_kappa[2], by_tau[3];  // sum_i mean_i of d h_i by kappa_j; d h_i by tau
+    for (int j = 0; j < 2; ++j) by_kappa[j] = mean[0] * h.second[0][j] + mean[1] * h.second[1][j];
+    for (int i = 0; i < 3; ++i)
+      by_tau[i] = h.second[i][2] + first * (end[0] * h.second[i][0] + end[1] * h.second[i][1]);
+    h.second[2][2] = by_tau[2] + twist.slope * work + twist.by_tau * (mean[0] * by_tau[0] + mean[1] * by_tau[1]);
+    for (int j = 0; j < 2; ++j) {
+      h.second[2][j] = g1 * h.second[2][j] + twist.by_tau * (0.5 * h.by[j] + g1 * by_kappa[j]);
+      h.second[j][2] = 0.5 * first * h.by[j] + g * by_tau[j];
+      for (int i = 0; i < 2; ++i) h.second[i][j] = (g * g1) * h.second[i][j];
+    }
+  }
+  h.by[2] += twist.by_tau * work;
+  for (int i = 0; i < 2; ++i) h.by[i] = g * h.by[i];
+}
+
 /// The moment m [N m] with m . (w_a - w_b) = E1 - E0, and its derivatives by spins of the two frames at the end.
 template <class Scalar>
 struct DiscreteMoment {
@@ -95,7 +143,7 @@ void discrete_moment(const BendMeasure& measure, const EdgeFrame<Scalar>& a0, co
                      const EdgeFrame<Scalar>& b0, const EdgeFrame<Scalar>& b1, const Vec3<Scalar>& start,
                      const Vec3<Scalar>& end, const Vec3<Scalar>& natural, const Vec3<Scalar>& stiffness,
                      DiscreteMoment<Scalar>& out) {
-  const DividedMoments<Scalar> h = divided_moments<with_matrix>(measure, start, end, natural, stiffness);
+  DividedMoments<Scalar> h = divided_moments<with_matrix>(measure, start, end, natural, stiffness);
   const auto mean = [](const Vec3<Scalar>& p, const Vec3<Scalar>& q) { return Scalar(0.5) * (p + q); };
   const Vec3<Scalar> ta = mean(a0.tangent, a1.tangent), tb = mean(b0.tangent, b1.tangent);
   const Vec3<Scalar> a[2] = {mean(a0.d1, a1.d1), mean(a0.d2, a1.d2)}, b[2] = {mean(b0.d1, b1.d1), mean(b0.d2, b1.d2)};
@@ -104,11 +152,14 @@ void discrete_moment(const BendMeasure& measure, const EdgeFrame<Scalar>& a0, co
   const Scalar c0 = dot(a0.d1, b0.d1) + dot(a0.d2, b0.d2), s0 = dot(a0.d2, b0.d1) - dot(a0.d1, b0.d2);
   const Scalar c1 = dot(a1.d1, b1.d1) + dot(a1.d2, b1.d2), s1 = dot(a1.d2, b1.d1) - dot(a1.d1, b1.d2);
   const Scalar c = 0.5 * (c0 + c1), s = 0.5 * (s0 + s1);
-  const Scalar inverse_chi = 1.0 / (X0 * X1);
-  const TurnOverSine<Scalar> turn =
-      turn_over_sine(end.z - start.z, inverse_chi * (c0 * s1 - s0 * c1), inverse_chi * (c0 * c1 + s0 * s1));
+  const Scalar inverse_chi = 1.0 / (X0 * X1), i0 = inverse_chi * X1, i1 = inverse_chi * X0;
+  const Scalar sine = inverse_chi * (c0 * s1 - s0 * c1), cosine = inverse_chi * (c0 * c1 + s0 * s1);
+  const TurnOverSine<Scalar> turn = turn_over_sine(end.z - start.z, sine, cosine);
   const Scalar g = turn.value * inverse_chi;
-  const Scalar k[2] = {0.5 * (start.x + end.x), 0.5 * (start.y + end.y)};
+  const DividedTwist<Scalar> twist(i0 * c0, i0 * s0, i1 * c1, i1 * s1, turn, sine, cosine);
+  const Scalar u[2] = {twist.g1.inverse * end.x, twist.g1.inverse * end.y};
+  const Scalar k[2] = {0.5 * (twist.g0.inverse * start.x + u[0]), 0.5 * (twist.g0.inverse * start.y + u[1])};
+  apply_halfway<with_matrix>(twist, k, u, h);
 
   // m = sum of weights times the cross products that belong to x, y1, y2, c and s.
   const Scalar w[2] = {inverse * h.by[0], inverse * h.by[1]}, wx = -(w[0] * k[0] + w[1] * k[1]);
@@ -135,7 +186,6 @@ void discrete_moment(const BendMeasure& measure, const EdgeFrame<Scalar>& a0, co
     const Vec3<Scalar> x = cross(a1.tangent, b1.tangent);
     const Vec3<Scalar> vx = cross(ta, tb), vc = cross(a[0], b[0]) + cross(a[1], b[1]),
                        vs = cross(a[1], b[0]) - cross(a[0], b[1]);
-    const Scalar i1 = 1.0 / X1, u[2] = {end.x, end.y};
     Vec3<Scalar> strain[3], y[2];
     for (int i = 0; i < 2; ++i) {
       y[i] = cross(a[i], tb) - cross(ta, b[i]);

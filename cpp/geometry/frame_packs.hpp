@@ -9,28 +9,28 @@ namespace withe::WITHE_INSTRUCTION_SET {
 namespace {
 
 /// The kLanes indices from `first`, the last one repeated; returns how many are real.
-int lanes_from(int first, int count, int (&index)[kLanes]) {
+inline int lanes_from(int first, int count, int (&index)[kLanes]) {
   for (int l = 0; l < kLanes; ++l) index[l] = first + l < count ? first + l : count - 1;
   return count - first < kLanes ? count - first : kLanes;
 }
 
-void store_first(double* place, Pack a, int count) {
+inline void store_first(double* place, Pack a, int count) {
   if (count == kLanes) return store(place, a);
   for (int l = 0; l < count; ++l) place[l] = a[l];
 }
 
 /// Rows of a table of three columns.
-Vec3<Pack> rows_from(const double* table, int first, int live) {
+inline Vec3<Pack> rows_from(const double* table, int first, int live) {
   Pack number[3];
   load_threes(table + std::ptrdiff_t{3} * first, live, number);
   return {number[0], number[1], number[2]};
 }
-void store_rows(double* table, int first, int live, const Vec3<Pack>& v) {
+inline void store_rows(double* table, int first, int live, const Vec3<Pack>& v) {
   store_threes(table + std::ptrdiff_t{3} * first, live, {v.x, v.y, v.z});
 }
 
 /// Three unknowns from each index on; read with the one before, as there may be none behind.
-Vec3<Pack> three_unknowns(const double* q, const int (&index)[kLanes]) {
+inline Vec3<Pack> three_unknowns(const double* q, const int (&index)[kLanes]) {
   const double* place[kLanes];
   for (int l = 0; l < kLanes; ++l) {
     if (index[l] == 0) return {gather(q, index), gather(q + 1, index), gather(q + 2, index)};
@@ -42,7 +42,7 @@ Vec3<Pack> three_unknowns(const double* q, const int (&index)[kLanes]) {
 }
 
 /// Of kLanes edges, from a table.
-EdgeFrame<Pack> frames_of(const double* frames, const int (&edge)[kLanes]) {
+inline EdgeFrame<Pack> frames_of(const double* frames, const int (&edge)[kLanes]) {
   const double* place[kLanes];
   for (int l = 0; l < kLanes; ++l) place[l] = frames + std::ptrdiff_t{kFrameNumbers} * edge[l];
   Pack number[kFrameNumbers];

@@ -14,14 +14,12 @@ namespace {
 /// An edge as short as this, over its length at rest, is one that the motion crushes.
 constexpr double kCrushed = 0.5;
 /// An edge that turns by more than 120 degrees against the next, or is twisted so far from its natural twist, is too
-/// long for the motion. So is one that is turned against the next by kSharp about its tangent, counted or not, and
-/// bent: a stencil that twists by tau bends with cos^2(tau / 2) of its stiffness. Where it is straight, as in a shaft
-/// whose natural twist turns it like a motor, that says nothing, and whole turns say nothing anywhere.
-constexpr double kSharp = 2.0 / 3.0 * std::numbers::pi;
+/// long for the motion. So is one that is turned against the next by kTwisted about its tangent, counted or not, and
+/// bent: beyond it directors halfway between both are not what they are taken for (geometry/curvature.hpp). Where it is
+/// straight, as in a shaft whose natural twist turns it like a motor, that says nothing, and whole turns say nothing
+/// anywhere.
+constexpr double kSharp = 2.0 / 3.0 * std::numbers::pi, kTwisted = 0.5 * std::numbers::pi;
 constexpr double kBent = 0.05;  // [rad]
-/// Less twist softens bending too: where that is more than this share, on the mean over what bending stores, and where
-/// bending stores more than this share of what twisting does.
-constexpr double kMostSoftening = 0.05, kLeastBending = 1e-6;
 /// Stiffnesses of rods that differ by more leave few digits to the soft ones.
 constexpr double kMismatch = 1e6;
 
@@ -72,49 +70,23 @@ std::string World::Implementation::crushed() const {
          ", as by a force above E A / 2 or a blow faster than sound in the rod, sqrt(E / density)";
 }
 
-/// Says so where twist between edges softens bending; nothing elsewhere.
-std::string World::Implementation::softened() const {
-  if (model.planar()) return "";
-  const Configuration& c = configuration();
-  energy_scratch.coefficients.set(model, parameters);
-  const ElasticCoefficients& k = energy_scratch.coefficients.elastic;
-  double bending = 0.0, twisting = 0.0, lost = 0.0, most = 0.0;
-  int node = -1;
-  const auto add = [&](const BendTwistEnergy& energy, double tau, int where) {
-    const double part = std::sin(0.5 * tau) * std::sin(0.5 * tau) * energy.bend;
-    bending += energy.bend;
-    twisting += energy.twist;
-    lost += part;
-    if (part <= most) return;
-    most = part;
-    node = where;
-  };
-  for (int b = 0; b < static_cast<int>(model.bend.size()); ++b)
-    add(bend_energy_of(k, c, b), c.bend_strain(b, 2), model.bend[at(b)].node[1]);
-  for (int h = 0; h < static_cast<int>(model.half.size()); ++h)
-    add(half_energy_of(k, c, h), c.half_strain(h, 2), model.frame_node[at(model.half[at(h)].frame)]);
-  if (!(lost > kMostSoftening * bending) || !(bending > kLeastBending * twisting)) return "";
-  return "edges twist so far against each other that bending is " + text(100.0 * lost / bending, 2) +
-         " % too soft, as most" + place_of_node(node).words + " (time " + text(state.time, 6) +
-         " s): a stencil that twists by tau bends with cos^2(tau / 2) of its stiffness; use more nodes";
-}
-
 /// Says so where an edge turns or twists too much against the next; nothing elsewhere.
 std::string World::Implementation::unresolved() const {
   int node = -1;
-  double greatest = kSharp;
+  double greatest = 0.0, most = 1.0;
   const char* how = "";
-  const auto see = [&](double angle, int where, const char* does) {
-    if (!(std::abs(angle) > greatest)) return;
+  const auto see = [&](double angle, double limit, int where, const char* does) {
+    if (!(std::abs(angle) > most * limit)) return;
     greatest = std::abs(angle);
+    most = greatest / limit;
     node = where;
     how = does;
   };
   const Configuration& c = configuration();
   const auto see_twist = [&](double tau, const auto& kappa, double natural, double turn, int where) {
     const double x = kappa(0) * kappa(0) + kappa(1) * kappa(1);
-    see(bend_factor(parameters.measure, x).value * tau - natural, where, "twists");
-    if (turn > kBent) see(std::remainder(tau, 2.0 * std::numbers::pi), where, "twists");
+    see(bend_factor(parameters.measure, x).value * tau - natural, kSharp, where, "twists");
+    if (turn > kBent) see(std::remainder(tau, 2.0 * std::numbers::pi), kTwisted, where, "twists");
   };
   const auto angle = [](const Vec3d& a, const Vec3d& b) {
     return std::atan2(to_eigen(a).cross(to_eigen(b)).norm(), dot(a, b));
@@ -123,7 +95,7 @@ std::string World::Implementation::unresolved() const {
     const BendStencil& s = model.bend[b];
     const auto row = static_cast<Eigen::Index>(b);
     const double turn = angle(s.sign[0] * c.edge[at(s.edge[0])].tangent, s.sign[1] * c.edge[at(s.edge[1])].tangent);
-    see(turn, s.node[1], "turns");
+    see(turn, kSharp, s.node[1], "turns");
     if (!model.planar())
       see_twist(state.bend_tau(row), c.bend_strain.row(row), parameters.bend_natural(row, 2), turn, s.node[1]);
   }
@@ -133,7 +105,7 @@ std::string World::Implementation::unresolved() const {
     see_twist(state.half_tau(row), c.half_strain.row(row), parameters.half_natural(row, 2),
               angle(c.attached[h].tangent, c.edge[at(s.edge)].tangent), model.frame_node[at(s.frame)]);
   }
-  if (node < 0) return softened();
+  if (node < 0) return "";
   return std::string("an edge ") + how + " by " + text(greatest * 180.0 / std::numbers::pi, 3) +
          " degrees against the next" + place_of_node(node).words + " (time " + text(state.time, 6) +
          " s): a mesh this coarse does not resolve the motion, and bends and twists wrongly; use more nodes";

@@ -248,7 +248,6 @@ struct World::Implementation : Running {
   Place place_of(int row) const;
   Place place_of_node(int node) const;
   std::string crushed() const;
-  std::string softened() const;
   std::string unresolved() const;
   void check_resolution();
   std::string overturned() const;

@@ -57,9 +57,9 @@ def test_bend_of_45_degrees_converges_at_second_order():
     exact = bent.tip(BEND_LOAD * UP)
     # Their beam of eight elements, which shears.
     np.testing.assert_allclose(exact, (15.79, 47.23, 53.37), atol=0.15)
-    errors = [missed(bend_of_45_degrees(n), exact) for n in (8, 32, 64, 128)]
+    errors = [missed(bend_of_45_degrees(n), exact) for n in (8, 64, 128, 256)]
     print("45-degree bend:", errors)
-    assert errors[0] < 6e-2
+    assert errors[0] < 3e-2
     assert_order(errors[1:])
 
 
