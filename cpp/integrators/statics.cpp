@@ -105,6 +105,10 @@ class Statics {
         path_.go_to(reached);
         path_.find_tangent(tangent_);
         ++last.iterations;
+        if (points == 1 && falls()) {
+          if (!let_fall(reached, result)) return false;
+          continue;
+        }
         if (reached > 0.0 && !firm()) {
           // A branch that was stable and is so no more is left where that happens.
           if (was_stable && equations_.has_potential() && !stable(reached)) {
@@ -133,8 +137,7 @@ class Statics {
       ++cuts;
       if (!singular && cuts <= most_cuts && increment > kShortest * std::min(by_turn, 1.0)) continue;
       if (++jumps > kMostJumps) return false;
-      // Forces may come all at once to a scene that goes on dynamically; supports may not.
-      const double beyond = path_.supports_move() ? std::min(1.0, reached + kBeyond * increment) : 1.0;
+      const double beyond = beyond_jump(reached, increment);
       if (!jump(beyond, beyond - reached, result)) return false;
       reached = beyond;
       longest = kBeyond * increment;
@@ -157,6 +160,26 @@ class Statics {
 
   bool firm() const {
     return tangent_.factorization.status == FactorStatus::ok && tangent_.factorization.negative_pivots == 0;
+  }
+
+  /// Whether what the present state is out of balance by would not hold it: it falls then, as what is let go between
+  /// two wells does, and a path on which that force fades would lead back to the saddle between them. Surfaces that an
+  /// obstacle has been pushed into are to leave each other, not to fall.
+  bool falls() {
+    if (!equations_.has_potential() || firm() || !tangent_.found) return false;
+    if (equations_.contact() && equations_.contact()->contacts().depth() > kDeepest) return false;
+    return newton_.norms().displacement(tangent_.rate) > kNear * equations_.model().length_scale && !stable(0.0);
+  }
+  bool let_fall(double& reached, StaticResult& result) {
+    const double beyond = beyond_jump(reached, kShortest);
+    if (!jump(beyond, 0.0, result)) return false;
+    reached = beyond;
+    return true;
+  }
+
+  /// Forces may come all at once to a scene that goes on dynamically; supports may not.
+  double beyond_jump(double reached, double increment) const {
+    return path_.supports_move() ? std::min(1.0, reached + kBeyond * increment) : 1.0;
   }
 
   /// The point of the path at the factor `next`, predicted along the tangent.

@@ -103,6 +103,46 @@ def lee(edges):
 UNIT = LEE["bend"] / LEE["length"] ** 2
 
 
+def buckled_beam(planar):
+    """A beam between clamps that are nearer to each other than it is long, on its upper side; its height."""
+    rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+    x = np.linspace(-0.1, 0.1, 41)
+    scene = withe.Scene(gravity=(0.0, 0.0, 0.0))
+    beam = scene.add_rod(
+        points=np.stack([x, 0.0 * x, 0.01 * (1.0 + np.cos(np.pi * x / 0.1))], axis=1),
+        section=withe.Rectangle(width=1e-3, height=10e-3),
+        normal=(0, 0, 1),
+        material=rubber,
+        natural="straight",
+    )
+    scene.clamp(beam.start)
+    scene.clamp(beam.end)
+    simulation = scene.build(planar=planar)
+    assert simulation.equilibrium().stable
+    return simulation, beam, simulation.positions(beam)[20, 2]
+
+
+@pytest.mark.parametrize("planar", [True, False], ids=["planar", "spatial"])
+@pytest.mark.parametrize("share", [0.3, 0.05, -0.05, -0.3, -0.6, -0.9, -1.0])
+def test_what_is_pushed_through_and_let_go_comes_to_rest_on_the_side_where_it_was(planar, share):
+    """Energy alone keeps it there: on its way back to the other side it would have to climb."""
+    simulation, beam, top = buckled_beam(planar)
+    pin = simulation.pin(beam.node(20))
+    simulation.move(pin, position=(0.0, 0.0, share * top))
+    simulation.equilibrium()
+    simulation.release(pin)
+    assert simulation.equilibrium().stable
+    assert simulation.positions(beam)[20, 2] == pytest.approx(np.copysign(top, share), rel=2e-3)
+
+
+@pytest.mark.parametrize("share", [0.6, -0.2, -0.6])
+def test_what_is_set_to_a_state_between_two_wells_falls_into_its_own(share):
+    simulation, beam, top = buckled_beam(True)
+    simulation.set_state(beam, positions=simulation.positions(beam) * (1.0, 1.0, share))
+    assert simulation.equilibrium().stable
+    assert simulation.positions(beam)[20, 2] == pytest.approx(np.copysign(top, share), rel=2e-3)
+
+
 def test_limit_loads_of_lees_frame_by_force_and_by_displacement():
     """18.55 EI / L^2 [Lee, Manuel and Rossow 1968], at second order in the mesh; snap-through to a negative load."""
     by_force, by_displacement = [], []
