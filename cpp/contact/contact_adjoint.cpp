@@ -225,7 +225,7 @@ void add_impact(const ContactProblem& problem, const Touching& t, const Rows& ro
     law.elastic = 0.0;
     by_share -= law.at(t.before, t.proximity.distance).first;
     by_share *= times_forces(problem, t, rows, true) / t.pressing.first;
-    const ImpactShareSlopes slopes = impact_share_slopes(problem, t);
+    const ElasticShareSlopes slopes = elastic_share_slopes(problem, t);
     by_approach += by_share * slopes.approach;
     out.slip_tolerance += by_share * slopes.slip_tolerance;
     out.gravity += by_share * slopes.gravity;

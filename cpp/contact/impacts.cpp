@@ -29,6 +29,9 @@ constexpr double kLeftBehind = 0.01, kLongSwings = 3.2;
 // contacts take over from others as these slide, time and again: there it counts for this share. Within one rod it does
 // not: knots that are pulled by some radii a step come out right without, in a tenth of the steps.
 constexpr double kMostTurn = 0.05, kHandover = 0.125;
+// A rod rolls if an end of a piece of its curve goes up against the other faster than this, over the speed of rest, and
+// has rolled off the piece when its slope has changed by so much, over what changes it by a whole piece.
+constexpr double kTilting = 0.03, kRolledOff = 2.0;
 
 /// From 0 to 1 where x does, without a corner.
 double smooth_step(double x) {
@@ -42,12 +45,15 @@ double smooth_slope(double x) { return x > 0.0 && x < 1.0 ? 6.0 * x * (1.0 - x) 
 /// turns round nothing of the speed is lost, which is the more the less is to be left.
 double steps_in_swing(double restitution) { return std::clamp(10.0 / std::max(restitution, 1e-3), 12.0, 40.0); }
 
-/// As `impact_share`, of an impact that is over after so many swings.
+/// 1 for surfaces that have just met, 0 for those that rest on each other: of an impact that is over after so many
+/// swings.
 double share_within(const ContactProblem& problem, const Touching& t, double swings) {
   if (!(t.approach > 0.0)) return 0.0;
   const double over = swings * swing_time(problem, t) + kSteps * problem.duration;
   return smooth_step(t.approach / rest_speed(problem, t.pair) - 1.0) * smooth_step(2.0 - t.age / over);
 }
+
+double impact_share(const ContactProblem& problem, const Touching& t) { return share_within(problem, t, kSwings); }
 
 /// Whether the step begins with contacts of the same bodies.
 bool touches_already(const ContactProblem& problem, const ContactPair& pair) {
@@ -55,6 +61,21 @@ bool touches_already(const ContactProblem& problem, const ContactPair& pair) {
   return std::any_of(problem.start->contacts.begin(), problem.start->contacts.end(), [&](const ContactRecord& record) {
     return body(record.key.a) == body(pair.key.a) && body(record.key.b) == body(pair.key.b);
   });
+}
+
+/// Whether a rod rolls on or off a piece of its curve, which then tilts against the obstacle, and has not touched it
+/// for longer than that takes. What such a piece takes the next one gives back: they do not come to rest.
+bool rolls(const ContactProblem& problem, const Touching& t) {
+  const ContactPair& pair = t.pair;
+  if (!(t.approach > 0.0) || !pair.curve() || pair.piece.weights->edges < 2) return false;
+  Vec3d v[4];
+  problem.bodies.end_points(pair, problem.start->v, v);
+  const Vec3d moved = problem.velocity_of(pair);
+  const CurveDistance<double> start = problem.curve_at_start(pair);
+  const CurveSlopes slopes = curve_slopes(pair.piece, start);
+  double rate = 0.0;
+  for (int i = 0; i < 9; ++i) rate += slopes.slope[i] * (v[i / 3] - moved)[i % 3];
+  return std::abs(rate) > kTilting * rest_speed(problem, pair) && std::abs(rate) * t.age < kRolledOff * start.stiff;
 }
 
 /// By how much the direction from one surface to the other turns in the step [rad].
@@ -93,15 +114,18 @@ double swing_time(const ContactProblem& problem, const Touching& t) {
   return std::numbers::pi * std::sqrt(0.5 * problem.mass_of(t.pair) * t.pair.share / t.stiffness);
 }
 
-double impact_share(const ContactProblem& problem, const Touching& t) { return share_within(problem, t, kSwings); }
-
-bool impact_lasts(const ContactProblem& problem, const Touching& t) {
-  return impact_share(problem, t) > 0.0 || (t.pair.restitution < 1.0 && share_within(problem, t, kSwingsOut) > 0.0);
+double elastic_share(const ContactProblem& problem, const Touching& t) {
+  const double share = impact_share(problem, t);
+  return share < 1.0 && problem.pressing >= Pressing::mean && rolls(problem, t) ? 1.0 : share;
 }
 
-ImpactShareSlopes impact_share_slopes(const ContactProblem& problem, const Touching& t) {
-  ImpactShareSlopes out;
-  if (!(t.approach > 0.0)) return out;
+bool impact_lasts(const ContactProblem& problem, const Touching& t) {
+  return elastic_share(problem, t) > 0.0 || (t.pair.restitution < 1.0 && share_within(problem, t, kSwingsOut) > 0.0);
+}
+
+ElasticShareSlopes elastic_share_slopes(const ContactProblem& problem, const Touching& t) {
+  ElasticShareSlopes out;
+  if (!(t.approach > 0.0) || elastic_share(problem, t) == 1.0) return out;
   const double rest = rest_speed(problem, t.pair), swing = swing_time(problem, t),
                over = kSwings * swing + kSteps * problem.duration;
   const double fast = t.approach / rest - 1.0, fresh = 2.0 - t.age / over;
@@ -194,7 +218,7 @@ void set_pressing(const ContactProblem& problem, Touching& t) {
   t.energy.second *= t.stiffness;
   t.pressing = {t.energy.first, t.energy.second, 0.0};
   if (problem.pressing == Pressing::still) return;
-  const double share = impact_share(problem, t);
+  const double share = elastic_share(problem, t);
   const double lost =
       pair.restitution < 1.0 ? (1.0 - pair.restitution * pair.restitution) * share_within(problem, t, kSwingsOut) : 0.0;
   if (share == 0.0 && lost == 0.0) return;

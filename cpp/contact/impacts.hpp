@@ -23,18 +23,19 @@ bool meets(const ContactProblem& problem, const ContactPair& pair);
 double first_approach(const ContactProblem& problem, const ContactPair& pair);
 /// Half a period of an edge on its contact: as long as an impact lasts at least [s].
 double swing_time(const ContactProblem& problem, const Touching& t);
-/// 1 for surfaces that have just met, 0 for those that rest on each other.
-double impact_share(const ContactProblem& problem, const Touching& t);
+/// What presses elastically in a step: 1 of surfaces that have just met, and where a rod rolls; 0 of those that rest on
+/// each other.
+double elastic_share(const ContactProblem& problem, const Touching& t);
 /// Whether surfaces still behave otherwise for having met: in restitution for longer than in what presses elastically.
 bool impact_lasts(const ContactProblem& problem, const Touching& t);
-/// Derivatives of the share.
-struct ImpactShareSlopes {
+/// Its derivatives.
+struct ElasticShareSlopes {
   double approach = 0;        ///< by the speed at which they met [s/m]
   double slip_tolerance = 0;  ///< [s/m]
   double gravity = 0;         ///< by its size [s^2/m]
   double mass = 0;            ///< by what the contact holds up [1/kg]
 };
-ImpactShareSlopes impact_share_slopes(const ContactProblem& problem, const Touching& t);
+ElasticShareSlopes elastic_share_slopes(const ContactProblem& problem, const Touching& t);
 /// Adds `by` times the derivatives of the approach speed by unknowns of a contact as the step begins, and by their
 /// rates.
 void add_approach_slopes(const ContactProblem& problem, const ContactPair& pair, double by,
