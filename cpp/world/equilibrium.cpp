@@ -241,11 +241,12 @@ void World::Implementation::fail_equilibrium(const StaticResult& result, double 
   const bool lies = !description.contact.obstacles.empty();
   fail(result.newton, dt,
        std::string("no static equilibrium was found") +
-           (result.restless ? ": the scene does not come to rest; loads without a potential, as moments and follower "
-                              "forces, may drive it round for ever"
-            : held          ? ""
-            : lies ? ", and nothing but contact holds the scene, where friction may not be enough: clamp or pin a node"
-                   : ", and no support holds the scene: clamp or pin a node"),
+           (!held && lies     ? ", and nothing but contact holds the scene, where friction may not be enough: clamp or "
+                                "pin a node"
+            : !held           ? ", and no support holds the scene: clamp or pin a node"
+            : result.restless ? ": the scene does not come to rest; loads without a potential, as moments and follower "
+                                "forces, may drive it round for ever"
+                              : ""),
        dt > 0.0 ? "" : "Try to get there in parts: small changes of loads and supports, or time steps with viscosity");
 }
 

@@ -38,7 +38,7 @@ class CoarseStepWarning(UserWarning):
     rules, whose velocities then turn round from step to step. Stiff vibrations that carry no energy do not count, nor
     what touches.
 
-    Given once a simulation, within 64 steps.
+    Given once a simulation, within 24 steps.
     """
 
 

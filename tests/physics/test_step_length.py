@@ -57,7 +57,20 @@ def test_a_vibration_warns_where_a_step_turns_it_by_more_than_a_radian(integrato
 def test_the_frequency_that_is_said_is_the_one_that_moves():
     simulation, frequency = string(5e-3)
     ((message, _),) = heard(simulation)
-    assert float(message.split("at about ")[1].split(" Hz")[0]) == pytest.approx(frequency, rel=0.05)
+    assert float(message.split(" m at ")[1].split(" Hz")[0]) == pytest.approx(frequency, rel=0.05)
+    # On the mean over the string and in time.
+    size = SPEED / 2.0 / (2.0 * np.pi * frequency)
+    assert float(message.split("by about ")[1].split(" m")[0]) == pytest.approx(size, rel=0.1)
+
+
+@pytest.mark.parametrize("step", [0.05, 0.03, 0.02, 0.01])
+def test_two_seconds_of_a_fall_are_long_enough_to_see_that_steps_are_too_long(step):
+    """A cantilever does not vibrate at first; then its tip is .05 to .8 of its length off."""
+    scene = withe.Scene()
+    rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+    beam = scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=21, radius=2e-3, material=rubber)
+    scene.clamp(beam.start)
+    assert len(heard(scene.build(time_step=step), round(2.0 / step))) == 1
 
 
 def test_it_is_said_once():

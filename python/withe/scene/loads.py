@@ -52,7 +52,7 @@ class Loads:
         Parameters
         ----------
         a, b : NodeHandle or str
-            Of one rod or of two; held or free.
+            Of one rod or of two; held or free. To a place in the room: of a rod that is pinned there.
         stiffness : float [N/m]
         rest_length : float [m]
             By default the distance as drawn. With 0 the force is proportional to that between the nodes.
