@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -145,24 +145,25 @@ class Decomposed:
     Attributes
     ----------
     matrix : ndarray
-    range : ndarray
-        An orthonormal basis of what it reaches.
+    range, values, vectors : ndarray
+        Left singular vectors as columns, an orthonormal basis of what it reaches; its singular values, but for those
+        that are zero to rounding; right singular vectors as rows.
     """
 
     def __init__(self, matrix: FloatArray) -> None:
         self.matrix = matrix
         u, values, vectors = np.linalg.svd(matrix, full_matrices=False)
         rank = int(np.count_nonzero(values > _RANK * values[0])) if values.size else 0
-        self.range, self._values, self._vectors = u[:, :rank], values[:rank], vectors[:rank]
+        self.range, self.values, self.vectors = u[:, :rank], values[:rank], vectors[:rank]
 
     def bounded(self, right: FloatArray, radius: float) -> FloatArray:
         """The x of least |matrix x - right| among those with no coordinate beyond a radius, by Levenberg's damping."""
-        values, along = self._values, right @ self.range
+        values, along = self.values, right @ self.range
 
         def step(damping: float) -> FloatArray:
-            return np.asarray((values * along / (values**2 + damping)) @ self._vectors)
+            return np.asarray((values * along / (values**2 + damping)) @ self.vectors)
 
-        whole = np.asarray((along / values) @ self._vectors)
+        whole = np.asarray((along / values) @ self.vectors)
         if np.abs(whole).max(initial=0.0) <= radius:
             return whole
         low, high = values[-1] ** 2 * 1e-6, values[0] ** 2 * max(1.0, np.linalg.norm(along / values) / radius)
@@ -298,48 +299,66 @@ def _total(solutions: dict[int, FrameSolution]) -> float:
     return float(np.sqrt(sum(_size(solution.residual) ** 2 for solution in solutions.values())))
 
 
+class _Frame:
+    """Derivatives of a frame, those by its own coordinates by their singular values.
+
+    Of the least |J_shared x + J_own y + r|^2 + damping |y|^2 over y is left (J_shared x + r)^T W (J_shared x + r),
+    W = I - U (S^2 / (S^2 + damping)) U^T with J_own = U S V^T.
+    """
+
+    def __init__(self, solution: FrameSolution, local: BoolArray) -> None:
+        self._shared, self._residual = solution.jacobian[:, ~local], seen(solution.residual)
+        self._own = Decomposed(solution.jacobian[:, local])
+
+    def left(self, damping: float) -> tuple[FloatArray, FloatArray]:
+        """The square root of W times J_shared, and times r."""
+        basis, values = self._own.range, self._own.values
+        taken = 1.0 - np.sqrt(damping / (values**2 + damping))
+        rows = self._shared - basis @ (taken[:, None] * (basis.T @ self._shared))
+        return rows, self._residual - basis @ (taken * (basis.T @ self._residual))
+
+    def own(self, shared: FloatArray, damping: float) -> FloatArray:
+        """The least y."""
+        values = self._own.values
+        along = self._own.range.T @ (self._shared @ shared + self._residual)
+        return np.asarray(-(values / (values**2 + damping) * along) @ self._own.vectors)
+
+
 def reduced(solutions: dict[int, FrameSolution], local: BoolArray) -> tuple[FloatArray, FloatArray]:
     """Derivatives by shared coordinates, and residuals, without what each frame's own coordinates make good."""
-    rows, right = [], []
-    for solution in solutions.values():
-        basis = Decomposed(solution.jacobian[:, local]).range
-        shared, residual = solution.jacobian[:, ~local], seen(solution.residual)
-        rows.append(shared - basis @ (basis.T @ shared))
-        right.append(residual - basis @ (basis.T @ residual))
+    return _stacked([_Frame(solution, local) for solution in solutions.values()], 0.0)
+
+
+def _stacked(frames: Iterable[_Frame], damping: float) -> tuple[FloatArray, FloatArray]:
+    rows, right = zip(*(frame.left(damping) for frame in frames), strict=True)
     return np.concatenate(rows), np.concatenate(right)
 
 
 def _joint_step(solutions: dict[int, FrameSolution], local: BoolArray, radius: float) -> dict[int, FloatArray]:
     """Steps of all frames together, with so much of Levenberg's damping that no coordinate goes beyond a radius."""
     greatest = max(float(np.sum(solution.jacobian**2)) for solution in solutions.values())
+    frames = {number: _Frame(solution, local) for number, solution in solutions.items()}
     damping = 0.0
     while True:
-        steps = _damped_step(solutions, local, damping)
+        steps = _damped_step(frames, local, damping)
         if not max(float(np.abs(step).max()) for step in steps.values()) > radius:
             return steps
         damping = 3.0 * damping or 1e-9 * greatest
 
 
-def _damped_step(solutions: dict[int, FrameSolution], local: BoolArray, damping: float) -> dict[int, FloatArray]:
+def _damped_step(frames: dict[int, _Frame], local: BoolArray, damping: float) -> dict[int, FloatArray]:
     """Least of sum |J s + r|^2 + damping |s|^2, s the steps: what frames share, and then what each needs besides."""
-    root, count = np.sqrt(damping), int(local.sum())
-    extra = {}
-    for frame, solution in solutions.items():
-        rows = np.zeros((count, len(local)))
-        rows[:, local] = root * np.eye(count)
-        residual = np.concatenate([seen(solution.residual), np.zeros(count)])
-        extra[frame] = replace(solution, residual=residual, jacobian=np.concatenate([solution.jacobian, rows]))
-    matrix, right = reduced(extra, local)
+    matrix, right = _stacked(frames.values(), damping)
     free = matrix.shape[1]
-    matrix, right = np.concatenate([matrix, root * np.eye(free)]), np.concatenate([right, np.zeros(free)])
+    if damping > 0.0:
+        matrix = np.concatenate([matrix, np.sqrt(damping) * np.eye(free)])
+        right = np.concatenate([right, np.zeros(free)])
     shared = Decomposed(matrix).bounded(-right, np.inf)
     steps = {}
-    for frame, solution in extra.items():
+    for number, frame in frames.items():
         step = np.empty(len(local))
-        step[~local] = shared
-        left = -solution.residual - solution.jacobian[:, ~local] @ shared
-        step[local] = Decomposed(solution.jacobian[:, local]).bounded(left, np.inf)
-        steps[frame] = step
+        step[~local], step[local] = shared, frame.own(shared, damping)
+        steps[number] = step
     return steps
 
 
