@@ -3,10 +3,27 @@
 #include <algorithm>
 #include <iterator>
 
+#include "geometry/curvature.hpp"
+
 namespace withe {
 
 NaturalShape natural_shape(const Parameters& p) {
   return {p.natural_curvature, p.natural_twist, p.edge_natural_stretch};
+}
+
+MatrixX3 drawn_strains(const MatrixX3& tangents, const MatrixX3& directors, bool closed) {
+  const Eigen::Index edges = tangents.rows(), stencils = closed ? edges : edges - 1;
+  const auto frame = [&](Eigen::Index edge) {
+    const Vec3d t = to_vec3(Vector3(tangents.row(edge))), d = to_vec3(Vector3(directors.row(edge)));
+    return EdgeFrame<double>{t, d, cross(t, d), 1.0, {}, {}};
+  };
+  MatrixX3 out(stencils, 3);
+  for (Eigen::Index s = 0; s < stencils; ++s) {
+    const Eigen::Index after = closed ? s : s + 1, before = after > 0 ? after - 1 : edges - 1;
+    const BendTwistStrain<double> strain = bend_twist_strain(frame(before), frame(after), 0.0);
+    out.row(s) << strain.kappa1, strain.kappa2, strain.tau;
+  }
+  return out;
 }
 
 NaturalShape relaxed_shape(const Model& model, const Parameters& p, const Configuration& c) {

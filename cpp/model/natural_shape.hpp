@@ -15,6 +15,8 @@ struct NaturalShape {
   VectorX stretch;                  ///< per edge [-]
 };
 NaturalShape natural_shape(const Parameters& parameters);
+/// Strains (kappa1, kappa2, tau) of the stencils of a rod as it is drawn, by its edges' tangents and first directors.
+MatrixX3 drawn_strains(const MatrixX3& tangents, const MatrixX3& directors, bool closed);
 /// That of rods free of stress in a configuration, as far as what they are joined by lets it be told.
 NaturalShape relaxed_shape(const Model& model, const Parameters& parameters, const Configuration& configuration);
 /// One between two; derived numbers follow.

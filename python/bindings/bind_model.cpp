@@ -3,6 +3,7 @@
 
 #include "bindings.hpp"
 #include "model/model.hpp"
+#include "model/natural_shape.hpp"
 
 namespace withe::bindings {
 namespace {
@@ -195,6 +196,9 @@ void register_model(py::module_& module) {
       "smooth_curvatures", &smooth_curvatures, py::arg("discrete"), py::arg("voronoi"),
       "Curvatures [1/m] of the smooth rod that turns by the same angles as discrete ones 2 tan(phi / 2), a row a "
       "stencil.");
+  module.def("drawn_strains", &drawn_strains, py::arg("tangents"), py::arg("directors"), py::arg("closed"),
+             "Strains (kappa1, kappa2, tau) of the stencils of a rod as it is drawn, by its edges' tangents and first "
+             "directors, a row each.");
   module.def(
       "check_turns",
       [](const MatrixX2& smooth, const VectorX& voronoi, const std::string& owner) {

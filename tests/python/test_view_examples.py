@@ -35,7 +35,7 @@ EXAMPLES = {
     ),
     "gripper.py": (["--duration", "4"], r"friction 0.5: \d+ contacts, nearest ([-+.\d]+) radii", -0.05, 0.1),
     "helix.py": ([], r"(\d+) um from the public code", 0.0, 100.0),
-    "knot.py": (["--nodes", "301", "--points", "2"], r" 200 .*?([-+.\d]+)%", -6.0, 6.0),
+    "knot.py": (["--nodes", "201", "--points", "2", "--speed", "4e-3"], r" 200 .*?([-+.\d]+)%", -6.0, 6.0),
     "knot_limit.py": (["--points", "4"], r"at epsilon = 0: pull ([.\d]+) of the limit", 0.97, 1.03),
     "overhand.py": (["--knots", "1", "--speed", "8e-3"], r" 200 .* ([.\d]+)\n", 0.75, 0.92),
     "plectoneme.py": (["--forces", ".01", "--turns", "2"], r"moment at most ([.\d]+)% off", 0.0, 3.0),
@@ -47,7 +47,7 @@ EXAMPLES = {
     "soft_limb.py": ([], r"tip ([.\d]+) mm off on the mean", 0.3, 0.7),
     "tapered_arm.py": ([], r"tapered: clearance off by ([.\d]+) mm", 0.0, 1.0),
     "throwing_tip.py": ([], r"within ([.\d]+) mm of each point", 0.0, 1.0),
-    "tie_knot.py": (["--knots", "trefoil", "--nodes", "100"], r"trefoil: tied (\d) of 1", 1, 1),
+    "tie_knot.py": (["--knots", "trefoil", "--nodes", "80"], r"trefoil: tied (\d) of 1", 1, 1),
     "write_word.py": (["--nodes", "200", "--ways", "exact"], r"exact: ([.\d]+) mm off on the mean", 0.0, 2.5),
     "spider.py": (["--duration", "0.2"], r"half the step: no node moves by more than ([.\d]+)%", 0.0, 2.0),
 }

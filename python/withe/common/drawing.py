@@ -130,27 +130,11 @@ def natural_shape(
         Of the smooth rod, towards d1 and d2.
     twist : ndarray of shape (stencils,) [rad/m]
     """
-    before, after = _stencil_pairs(tangents, closed)
-    d1_before, d1_after = _stencil_pairs(directors, closed)
-    d2_before, d2_after = np.cross(before, d1_before), np.cross(after, d1_after)
-    binormal = 2.0 * np.cross(before, after) / (1.0 + np.sum(before * after, axis=1))[:, None]
-    discrete = np.stack(
-        [
-            0.5 * np.sum(binormal * (d2_before + d2_after), axis=1),
-            -0.5 * np.sum(binormal * (d1_before + d1_after), axis=1),
-        ],
-        axis=1,
-    )
-    carried = _transport(d1_before, before, after)
-    angle = np.arctan2(-np.sum(carried * d2_after, axis=1), np.sum(carried * d1_after, axis=1))
+    strains = np.asarray(_core.drawn_strains(tangents, directors, closed))
+    discrete, angle = strains[:, :2].copy(), strains[:, 2].copy()
     discrete[np.sqrt(np.sum(discrete**2, axis=1)) <= rounding] = 0.0
     angle[np.abs(angle) <= rounding] = 0.0
     return smooth_curvature(discrete, voronoi), angle / voronoi
-
-
-def _stencil_pairs(rows: FloatArray, closed: bool) -> tuple[FloatArray, FloatArray]:
-    """Rows of the edge before and after each stencil."""
-    return (np.roll(rows, 1, axis=0), rows) if closed else (rows[:-1], rows[1:])
 
 
 def rotation_about(vector: FloatArray) -> FloatArray:
