@@ -29,9 +29,11 @@ constexpr double kLeftBehind = 0.01, kLongSwings = 3.2;
 // contacts take over from others as these slide, time and again: there it counts for this share. Within one rod it does
 // not: knots that are pulled by some radii a step come out right without, in a tenth of the steps.
 constexpr double kMostTurn = 0.05, kHandover = 0.125;
-// A rod rolls if an end of a piece of its curve goes up against the other faster than this, over the speed of rest, and
-// has rolled off the piece when its slope has changed by so much, over what changes it by a whole piece.
-constexpr double kTilting = 0.03, kRolledOff = 2.0;
+// A rod rolls if where it touches tilts against the obstacle so that one end of that goes up against its middle faster
+// than this, over the speed of rest: so far from there it is as much nearer as surfaces are deep in each other, or so
+// many pieces of its curve at most. It has rolled off a piece when its slope has changed by so much, over what changes
+// it by a whole piece.
+constexpr double kTilting = 0.03, kMostPieces = 16.0, kRolledOff = 2.0;
 
 /// From 0 to 1 where x does, without a corner.
 double smooth_step(double x) {
@@ -75,7 +77,9 @@ bool rolls(const ContactProblem& problem, const Touching& t) {
   const CurveSlopes slopes = curve_slopes(pair.piece, start);
   double rate = 0.0;
   for (int i = 0; i < 9; ++i) rate += slopes.slope[i] * (v[i / 3] - moved)[i % 3];
-  return std::abs(rate) > kTilting * rest_speed(problem, pair) && std::abs(rate) * t.age < kRolledOff * start.stiff;
+  const double depth = kDepth * pair.small_radius(), pieces = std::sqrt(2.0 * depth / std::abs(start.bend));
+  return std::abs(rate) * std::clamp(pieces, 1.0, kMostPieces) > kTilting * rest_speed(problem, pair) &&
+         std::abs(rate) * t.age < kRolledOff * start.stiff;
 }
 
 /// By how much the direction from one surface to the other turns in the step [rad].

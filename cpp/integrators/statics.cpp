@@ -78,10 +78,10 @@ class Statics {
     }
     if (!result.converged) return result;
     result.stable = stable(1.0);
-    for (int tries = 0; tries < 4 && !result.stable && equations_.has_potential(); ++tries) {
+    for (int tries = 0; tries < 4 && !result.stable && equations_.has_potential_here(); ++tries) {
       result.branch_changed = true;
       leave_saddle(1.0, tries);
-      result.converged = settle(1.0, result) || descend(1000, result.newton);
+      result.converged = settle(1.0, result) || (equations_.has_potential() && descend(1000, result.newton));
       if (!result.converged) return result;
       result.stable = stable(1.0);
     }
@@ -166,7 +166,8 @@ class Statics {
   /// two wells does, and a path on which that force fades would lead back to the saddle between them. Surfaces that an
   /// obstacle has been pushed into are to leave each other, not to fall.
   bool falls() {
-    if (!equations_.has_potential() || firm() || !tangent_.found) return false;
+    // Signs of pivots are known of symmetric matrices only.
+    if (!equations_.has_potential_here() || (equations_.has_potential() && firm()) || !tangent_.found) return false;
     if (equations_.contact() && equations_.contact()->contacts().depth() > kDeepest) return false;
     return newton_.norms().displacement(tangent_.rate) > kNear * equations_.model().length_scale && !stable(0.0);
   }

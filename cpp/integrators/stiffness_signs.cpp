@@ -39,11 +39,11 @@ bool StiffnessSigns::definite(LinearSolver& stiffness, double damping, const Vec
 
 bool StiffnessSigns::stable(const State& state, StepData& data) {
   LinearSolver& solver = equations_.assembler().solver();
-  if (solver.symmetry() == Symmetry::unsymmetric) {
+  if (solver.symmetry() == Symmetry::unsymmetric && !equations_.has_potential_here()) {
     ++counters_.factorizations;
     return solver.factorize().status == FactorStatus::ok;
   }
-  if (definite(solver, -1.0, neutral_shift(equations_, kDoubtful))) return true;
+  if (definite(symmetric_part(), -1.0, neutral_shift(equations_, kDoubtful))) return true;
   const Lowest found = lowest(lowest_mode(0), state, data);
   return found.curvature > -found.unknown;
 }
@@ -54,7 +54,7 @@ bool StiffnessSigns::neutral(const State& state, StepData& data) {
 }
 
 VectorX StiffnessSigns::neutral_motion(const State& state, StepData& data, double slack) {
-  if (definite(equations_.assembler().solver(), -1.0, neutral_shift(equations_, kDoubtful))) return {};
+  if (definite(symmetric_part(), -1.0, neutral_shift(equations_, kDoubtful))) return {};
   VectorX mode = lowest_mode(0);
   // A hundredth of what rounding leaves of the matrix: what is softer than that is none of its motions.
   const double least = 0.01 * neutral_shift(equations_, kRounded).dot(mode.cwiseAbs2());
@@ -80,7 +80,7 @@ StiffnessSigns::Lowest StiffnessSigns::lowest(const VectorX& mode, const State& 
 
 VectorX StiffnessSigns::lowest_mode(int seed) {
   const Model& model = equations_.model();
-  LinearSolver& solver = equations_.assembler().solver();
+  LinearSolver& solver = symmetric_part();
   const VectorX weight = equations_.mass().rows.cwiseMax(1e-300);
   const double stiffness = equations_.assembler().greatest_stiffness(weight);
   double damping = 1e-16 * stiffness;

@@ -18,16 +18,16 @@ class StiffnessSigns {
   LinearSolver& symmetric_part();
   /// Factorises a symmetric matrix plus `damping` of the weight; whether all its eigenvalues are positive.
   bool definite(LinearSolver& stiffness, double damping, const VectorX& weight);
-  /// Whether no motion lowers the potential; of unsymmetric equations, whether they can be solved. `data`: of the
-  /// evaluation, and scratch.
+  /// Whether no motion lowers the potential; of unsymmetric equations where there is none, whether they can be solved.
+  /// `data`: of the evaluation, and scratch.
   bool stable(const State& state, StepData& data);
   /// Whether a motion is neutral, as of a free body, or of a rod that may spin about its axis; of unsymmetric
   /// equations, whether one may be.
   bool neutral(const State& state, StepData& data);
-  /// Of symmetric equations, that motion, of length 1, or nothing. `slack`: times what is rounded here, as what was
+  /// Where there is a potential, that motion, of length 1, or nothing. `slack`: times what is rounded here, as what was
   /// given may be: a drawing that is straight but for its last digits prefers one side.
   VectorX neutral_motion(const State& state, StepData& data, double slack = 1.0);
-  /// Direction of most negative curvature against mass, by inverse iteration on a matrix shifted until it is definite.
+  /// Likewise the direction of most negative curvature against mass, by inverse iteration on a matrix shifted until it is definite.
   VectorX lowest_mode(int seed);
 
  private:

@@ -47,7 +47,18 @@ Equations::Equations(const Model& model, const EquationOptions& options)
     assembler_.couple(terms_.contact->rows().unknowns(), kContactUnknowns);
     ordered_ = terms_.contact->rows().keys();
   }
-  for (const std::unique_ptr<Term>& term : terms_.all) has_potential_ = has_potential_ && term->has_potential();
+  for (const std::unique_ptr<Term>& term : terms_.all) {
+    if (term->has_potential()) continue;
+    has_potential_ = false;
+    if (term.get() != terms_.contact) only_friction_has_none_ = false;
+  }
+}
+
+bool Equations::has_potential_here() const {
+  if (has_potential_) return true;
+  if (!only_friction_has_none_ || !contact()) return false;
+  const ContactSet& touching = contact()->contacts();
+  return std::none_of(touching.begin(), touching.end(), [](const Touching& t) { return t.pair.rubs(); });
 }
 
 void Equations::set_parameters(const Parameters& parameters) {

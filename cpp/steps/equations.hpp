@@ -52,6 +52,8 @@ class Equations {
   std::vector<std::string> notes() const;
   /// True where statics minimise a potential.
   bool has_potential() const { return has_potential_; }
+  /// Likewise as long as what touches at the last evaluation is all that does: nothing rubs there.
+  bool has_potential_here() const;
 
   const std::vector<std::unique_ptr<Term>>& terms() const { return terms_.all; }
 
@@ -123,7 +125,7 @@ class Equations {
 
   StepProblem problem_;
   Terms terms_;
-  bool has_potential_ = true;
+  bool has_potential_ = true, only_friction_has_none_ = true;
   std::vector<std::string> asymmetries_;
   Assembler assembler_;
   double static_duration_;

@@ -198,7 +198,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
 }
 
 bool World::Implementation::buckles_out_of_plane() {
-  if (!model.planar() || options.planar.value_or(false) || !statics().has_potential()) return false;
+  if (!model.planar() || options.planar.value_or(false) || !statics().has_potential_here()) return false;
   // Hinges, which in their plane are pins, have frames and angles in space only: they are found as the model is built.
   if (spatial_twin && spatial_twin->model.hinges.size() == model.hinges.size()) {
     static_cast<Running&>(*spatial_twin) = *this;

@@ -73,14 +73,10 @@ def test_a_ring_rolls_in_every_scheme(integrator: Any) -> None:
     assert abs(error) < (0.005 if integrator == "energy_momentum" else 0.03)
 
 
-@pytest.mark.parametrize("friction", [0.1, 0.6])
-@pytest.mark.parametrize(
-    ("edges", "step"), [(30, 5e-3), (60, 5e-3), (120, 1e-2), (120, 5e-3), (120, 1e-3), (240, 5e-3)]
-)
-def test_a_ring_that_rolls_on_a_level_floor_rolls_on(edges: int, step: float, friction: float) -> None:
-    """What one piece of its curve takes in coming onto the floor the piece that leaves it gives back. It begins with a
-    small jump: drawn as it just touches, it sinks in."""
-    ring, thick, speed = 0.05, 2e-3, 0.2
+def rolled(edges: int, step: float, friction: float, speed: float) -> tuple[NDArray[Any], float]:
+    """Speeds of a ring on a level floor in each quarter of a second, over that with which it was sent off, and what is
+    dissipated of its energy then."""
+    ring, thick = 0.05, 2e-3
     turn = np.linspace(0.0, 2.0 * np.pi, edges, endpoint=False)
     points = np.stack([ring * np.sin(turn), 0.0 * turn, ring + thick - ring * np.cos(turn)], axis=1)
     scene = withe.Scene()
@@ -96,10 +92,30 @@ def test_a_ring_that_rolls_on_a_level_floor_rolls_on(edges: int, step: float, fr
         simulation.run(0.25, progress=False)
         centres.append(simulation.positions(hoop)[:, 0].mean())
     speeds = np.diff(centres) / 0.25 / speed
-    print("level floor:", edges, step, friction, speeds, simulation.energy().dissipated / before)
+    lost = simulation.energy().dissipated / before
+    print("level floor:", edges, step, friction, speed, speeds, lost)
+    return speeds, lost
+
+
+@pytest.mark.parametrize("friction", [0.1, 0.6])
+@pytest.mark.parametrize(
+    ("edges", "step"), [(30, 5e-3), (60, 5e-3), (120, 1e-2), (120, 5e-3), (120, 1e-3), (240, 5e-3)]
+)
+def test_a_ring_that_rolls_on_a_level_floor_rolls_on(edges: int, step: float, friction: float) -> None:
+    """What one piece of its curve takes in coming onto the floor the piece that leaves it gives back. It begins with a
+    small jump: drawn as it just touches, it sinks in."""
+    speeds, lost = rolled(edges, step, friction, 0.2)
     assert np.all(np.abs(speeds - 0.995) < 0.005)
     assert speeds[-1] > speeds[0] - 0.002
-    assert simulation.energy().dissipated < 0.01 * before
+    assert lost < 0.01
+
+
+@pytest.mark.parametrize("edges", [60, 240, 480])
+def test_a_ring_rolls_on_slowly_on_fine_meshes_too(edges: int) -> None:
+    """Where it touches is a few pieces long. What it loses at first is what it sinks in by, m g p / 2 of m v^2."""
+    speeds, _ = rolled(edges, 5e-3, 0.5, 0.05)
+    assert speeds[0] > 0.9
+    np.testing.assert_allclose(speeds[2:], speeds[1], rtol=5e-3)
 
 
 RAIL, CABLE, PULL, FRICTION, LINE = 0.1, 2e-3, 10.0, 0.3, 0.05
