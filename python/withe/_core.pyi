@@ -56,6 +56,7 @@ __all__: list[str] = [
     "check_turns",
     "close_and_open",
     "dragged_sheet",
+    "drawn_strains",
     "foreground_mask",
     "hsv_mask",
     "sheets_at_forces",
@@ -1375,6 +1376,15 @@ def dragged_sheet(
 ) -> tuple:
     """
     A sheet moved from pose to pose, sliding by Coulomb's law: one row a pose, and how far it has slid.
+    """
+
+def drawn_strains(
+    tangents: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+    directors: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+    closed: bool,
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]:
+    """
+    Strains (kappa1, kappa2, tau) of the stencils of a rod as it is drawn, by its edges' tangents and first directors, a row each.
     """
 
 def foreground_mask(
