@@ -27,7 +27,8 @@ class StiffnessSigns {
   /// Where there is a potential, that motion, of length 1, or nothing. `slack`: times what is rounded here, as what was
   /// given may be: a drawing that is straight but for its last digits prefers one side.
   VectorX neutral_motion(const State& state, StepData& data, double slack = 1.0);
-  /// Likewise the direction of most negative curvature against mass, by inverse iteration on a matrix shifted until it is definite.
+  /// Likewise the direction of most negative curvature against mass, by inverse iteration on a matrix that is shifted
+  /// until it is definite.
   VectorX lowest_mode(int seed);
 
  private:
