@@ -65,21 +65,34 @@ bool touches_already(const ContactProblem& problem, const ContactPair& pair) {
   });
 }
 
+/// The rate, as the step begins, of what depends on the place of a piece of a curve against its obstacle, by what it
+/// changes with the nodes.
+double curve_rate(const ContactProblem& problem, const ContactPair& pair, const double (&slope)[9]) {
+  Vec3d v[4];
+  problem.bodies.end_points(pair, problem.start->v, v);
+  const Vec3d moved = problem.velocity_of(pair);
+  double rate = 0.0;
+  for (int i = 0; i < 3 * pair.piece.weights->nodes; ++i) rate += slope[i] * (v[i / 3] - moved)[i % 3];
+  return rate;
+}
+
 /// Whether a rod rolls on or off a piece of its curve, which then tilts against the obstacle, and has not touched it
 /// for longer than that takes. What such a piece takes the next one gives back: they do not come to rest.
 bool rolls(const ContactProblem& problem, const Touching& t) {
   const ContactPair& pair = t.pair;
   if (!(t.approach > 0.0) || !pair.curve() || pair.piece.weights->edges < 2) return false;
-  Vec3d v[4];
-  problem.bodies.end_points(pair, problem.start->v, v);
-  const Vec3d moved = problem.velocity_of(pair);
   const CurveDistance<double> start = problem.curve_at_start(pair);
-  const CurveSlopes slopes = curve_slopes(pair.piece, start);
-  double rate = 0.0;
-  for (int i = 0; i < 9; ++i) rate += slopes.slope[i] * (v[i / 3] - moved)[i % 3];
+  const double rate = curve_rate(problem, pair, curve_slopes(pair.piece, start).slope);
   const double depth = kDepth * pair.small_radius(), pieces = std::sqrt(2.0 * depth / std::abs(start.bend));
   return std::abs(rate) * std::clamp(pieces, 1.0, kMostPieces) > kTilting * rest_speed(problem, pair) &&
          std::abs(rate) * t.age < kRolledOff * start.stiff;
+}
+
+/// What presses elastically in a step: 1 of surfaces that have just met, and where a rod rolls; 0 of those that rest on
+/// each other.
+double elastic_share(const ContactProblem& problem, const Touching& t) {
+  const double share = impact_share(problem, t);
+  return share < 1.0 && problem.pressing >= Pressing::mean && rolls(problem, t) ? 1.0 : share;
 }
 
 /// By how much the direction from one surface to the other turns in the step [rad].
@@ -118,11 +131,6 @@ double swing_time(const ContactProblem& problem, const Touching& t) {
   return std::numbers::pi * std::sqrt(0.5 * problem.mass_of(t.pair) * t.pair.share / t.stiffness);
 }
 
-double elastic_share(const ContactProblem& problem, const Touching& t) {
-  const double share = impact_share(problem, t);
-  return share < 1.0 && problem.pressing >= Pressing::mean && rolls(problem, t) ? 1.0 : share;
-}
-
 bool impact_lasts(const ContactProblem& problem, const Touching& t) {
   return elastic_share(problem, t) > 0.0 || (t.pair.restitution < 1.0 && share_within(problem, t, kSwingsOut) > 0.0);
 }
@@ -158,16 +166,13 @@ double first_approach(const ContactProblem& problem, const ContactPair& pair) {
 }
 
 double approach_speed(const ContactProblem& problem, const ContactPair& pair) {
-  Vec3d x[4], v[4];
-  problem.bodies.end_points(pair, problem.start->v, v);
-  const Vec3d moved = problem.velocity_of(pair);
   if (pair.curve()) {
     const CurveSlopes slopes = curve_slopes(pair.piece, problem.curve_at_start(pair));
-    double rate = 0.0;
-    for (int i = 0; i < 3 * pair.piece.weights->nodes; ++i) rate += slopes.distance[i] * (v[i / 3] - moved)[i % 3];
-    return std::max(0.0, -rate);
+    return std::max(0.0, -curve_rate(problem, pair, slopes.distance));
   }
-  if (pair.key.b < 0) v[2] = v[3] = moved;
+  Vec3d x[4], v[4];
+  problem.bodies.end_points(pair, problem.start->v, v);
+  if (pair.key.b < 0) v[2] = v[3] = problem.velocity_of(pair);
   const ClosestPoints c = problem.closest_at_start(pair, x);
   double w[4];
   end_weights(c.s, c.t, w);

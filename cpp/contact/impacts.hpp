@@ -23,12 +23,9 @@ bool meets(const ContactProblem& problem, const ContactPair& pair);
 double first_approach(const ContactProblem& problem, const ContactPair& pair);
 /// Half a period of an edge on its contact: as long as an impact lasts at least [s].
 double swing_time(const ContactProblem& problem, const Touching& t);
-/// What presses elastically in a step: 1 of surfaces that have just met, and where a rod rolls; 0 of those that rest on
-/// each other.
-double elastic_share(const ContactProblem& problem, const Touching& t);
 /// Whether surfaces still behave otherwise for having met: in restitution for longer than in what presses elastically.
 bool impact_lasts(const ContactProblem& problem, const Touching& t);
-/// Its derivatives.
+/// Derivatives of how much presses elastically in a step, `PressingLaw::elastic`.
 struct ElasticShareSlopes {
   double approach = 0;        ///< by the speed at which they met [s/m]
   double slip_tolerance = 0;  ///< [s/m]
