@@ -13,27 +13,31 @@ struct StrainRows {
 
   StrainRows(const BendMeasure& measure, const EdgeFrame<Pack>& f0, const EdgeFrame<Pack>& f1, const Vec3<Pack>& s) {
     const Pack inverse_chi = 1.0 / (1.0 + dot(f0.tangent, f1.tangent));
-    const TwistBetween<Pack> twist(f0, f1, inverse_chi);
+    const HalfTwist<Pack> half = half_twist(s.z);
+    const Vec2<Pack> kappa = half.to_first({s.x, s.y});
     const Vec3<Pack> kb = (2.0 * inverse_chi) * cross(f0.tangent, f1.tangent);
     const Vec3<Pack> t = inverse_chi * (f0.tangent + f1.tangent);
-    const Vec3<Pack> a[2] = {inverse_chi * (f0.d2 + f1.d2), -(inverse_chi * (f0.d1 + f1.d1))};
+    const Vec3<Pack> a[2] = {(2.0 * inverse_chi) * f0.d2, (-2.0 * inverse_chi) * f0.d1};
     for (int k = 0; k < 2; ++k) {
-      const Vec3<Pack> shortened = (twist.g.inverse * s[k]) * t;
+      const Vec3<Pack> shortened = (k == 0 ? kappa.x : kappa.y) * t;
       edge[k][0] = f0.inverse_length * (cross(f1.tangent, a[k]) - shortened);
       edge[k][1] = -(f1.inverse_length * (cross(f0.tangent, a[k]) + shortened));
-      angle[k][0] = -0.5 * dot(kb, k == 0 ? f0.d1 : f0.d2);
-      angle[k][1] = -0.5 * dot(kb, k == 0 ? f1.d1 : f1.d2);
+      angle[k][0] = -dot(kb, k == 0 ? f0.d1 : f0.d2);
+      angle[k][1] = 0.0;
     }
     edge[2][0] = (0.5 * f0.inverse_length) * kb;
     edge[2][1] = (0.5 * f1.inverse_length) * kb;
     angle[2][0] = -1.0;
     angle[2][1] = 1.0;
-    const Pack r = twist.g.first(twist.sine);
-    for (int k = 0; k < 2; ++k)
-      for (int j = 0; j < 2; ++j) {
-        edge[k][j] = twist.g.value * edge[k][j] + (r * s[k]) * edge[2][j];
-        angle[k][j] = twist.g.value * angle[k][j] + (r * s[k]) * angle[2][j];
-      }
+    const auto halfway = [&half, &s](auto& first, auto& second, const auto& twist) {
+      const auto along = half.cosine * first + half.sine * second;
+      second = half.cosine * second - half.sine * first - (0.5 * s.x) * twist;
+      first = along + (0.5 * s.y) * twist;
+    };
+    for (int j = 0; j < 2; ++j) {
+      halfway(edge[0][j], edge[1][j], edge[2][j]);
+      halfway(angle[0][j], angle[1][j], angle[2][j]);
+    }
     apply_measure(measure, s);
     for (int k = 0; k < 3; ++k) {
       edge[k][0] += angle[k][0] * f0.spin;

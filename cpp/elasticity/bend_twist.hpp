@@ -2,10 +2,10 @@
 /// Bending and twisting between two frames: two edges, or an edge and the frame of a joint or a wall.
 ///
 /// Strains [Bergou et al. 2010, section 3; Choi, dissertation 3.3-3.6], with t the tangents and d the directors:
-///   kb = 2 t0 x t1 / (1 + t0 . t1),  kappa1 = g kb . (d2_0 + d2_1) / 2,  kappa2 = - g kb . (d1_0 + d1_1) / 2,
-///   tau = angle about t1 from the transported d1_0 to d1_1,
-/// g(tau) of geometry/curvature.hpp, without which twist would soften bending. |kb| = 2 tan(phi / 2) for a turn by phi.
-/// kappa1 > 0 bends towards d1, kappa2 > 0 towards d2.
+///   kb = 2 t0 x t1 / (1 + t0 . t1),  tau = angle about t1 from the transported d1_0 to d1_1,
+///   kappa1 = kb . d2,  kappa2 = - kb . d1,  in the directors of the first frame turned by tau / 2
+/// (geometry/curvature.hpp), where those of the source are the mean of both frames', which twist would soften.
+/// |kb| = 2 tan(phi / 2) for a turn by phi. kappa1 > 0 bends towards d1, kappa2 > 0 towards d2.
 /// Energy E = (K1 (f kappa1 - n1)^2 + K2 (f kappa2 - n2)^2 + Kt (f tau - nt)^2) / 2, f(|kappa|^2) of
 /// geometry/bend_measure.hpp, stiffnesses K = EI / V and GJ / V in N m, V the Voronoi length.
 ///
@@ -33,7 +33,8 @@ struct BendTwistDerivatives {
   Scalar angle_angle[2][2];    // [1][0] is not filled
 };
 
-/// Energy [J] and its derivatives with respect to (kappa1, kappa2, tau) [N m], or to (kappa1 / g, kappa2 / g, tau).
+/// Energy [J] and its derivatives with respect to (kappa1, kappa2, tau) [N m], or to tau and the curvatures in the
+/// directors of the first frame.
 template <class Scalar>
 struct BendTwistMoments {
   Scalar energy, by[3];
@@ -79,38 +80,32 @@ BendTwistMoments<Scalar> bend_twist_moments(const BendMeasure& measure, const Be
   return m;
 }
 
-/// How two frames are twisted against each other, and what follows for curvatures.
-template <class Scalar>
-struct TwistBetween {
-  Scalar cosine, sine;
-  HalfwayFactor<Scalar> g;
-
-  TwistBetween(const EdgeFrame<Scalar>& f0, const EdgeFrame<Scalar>& f1, const Scalar& inverse_chi)
-      : cosine(inverse_chi * (dot(f0.d1, f1.d1) + dot(f0.d2, f1.d2))),
-        sine(inverse_chi * (dot(f0.d2, f1.d1) - dot(f0.d1, f1.d2))),
-        g(cosine) {}
-};
-
-/// From derivatives by (kappa1, kappa2, tau) to those by (kappa1 / g, kappa2 / g, tau).
+/// From derivatives by the curvatures halfway and tau to those by the curvatures v in the first frame, and tau: with
+/// R(tau) the turn by half a twist, kappa = R v and d kappa / d tau = (kappa2, -kappa1) / 2.
 template <bool second_too, class Scalar>
-void apply_halfway(const TwistBetween<Scalar>& twist, const BendTwistStrain<Scalar>& s, BendTwistMoments<Scalar>& m) {
-  const Scalar g = twist.g.value, r = twist.g.first(twist.sine), u[2] = {s.kappa1, s.kappa2};
-  const Scalar work = u[0] * m.by[0] + u[1] * m.by[1];
+void apply_half_twist(const HalfTwist<Scalar>& half, const BendTwistStrain<Scalar>& s, BendTwistMoments<Scalar>& m) {
+  const Vec2<Scalar> by_tau{0.5 * s.kappa2, -0.5 * s.kappa1}, moment{m.by[0], m.by[1]};
   if constexpr (second_too) {
-    Scalar along[2], total{0.0}, mixed{0.0};
-    for (int i = 0; i < 2; ++i) {
-      along[i] = u[0] * m.second[i][0] + u[1] * m.second[i][1] + m.by[i];
-      total += u[i] * (along[i] - m.by[i]);
-      mixed += u[i] * m.second[i][2];
-    }
-    m.second[2][2] += r * (2.0 * mixed + r * total) + twist.g.second(twist.cosine, twist.sine) * work;
-    for (int i = 0; i < 2; ++i) {
-      m.second[i][2] = m.second[2][i] = g * (m.second[i][2] + r * along[i]);
-      for (int j = 0; j < 2; ++j) m.second[i][j] = (g * g) * m.second[i][j];
-    }
+    const Scalar by1 = m.second[0][0] * by_tau.x + m.second[0][1] * by_tau.y;
+    const Scalar by2 = m.second[1][0] * by_tau.x + m.second[1][1] * by_tau.y;
+    const Scalar mixed = m.second[0][2] * by_tau.x + m.second[1][2] * by_tau.y;
+    m.second[2][2] += 2.0 * mixed + by1 * by_tau.x + by2 * by_tau.y -
+                      0.25 * (moment.x * s.kappa1 + moment.y * s.kappa2);
+    const Vec2<Scalar> with_tau =
+        half.to_first({m.second[0][2] + by1 - 0.5 * moment.y, m.second[1][2] + by2 + 0.5 * moment.x});
+    m.second[0][2] = m.second[2][0] = with_tau.x;
+    m.second[1][2] = m.second[2][1] = with_tau.y;
+    const Vec2<Scalar> first = half.to_first({m.second[0][0], m.second[1][0]});
+    const Vec2<Scalar> second = half.to_first({m.second[0][1], m.second[1][1]});
+    const Vec2<Scalar> row1 = half.to_first({first.x, second.x}), row2 = half.to_first({first.y, second.y});
+    m.second[0][0] = row1.x;
+    m.second[0][1] = m.second[1][0] = row1.y;
+    m.second[1][1] = row2.y;
   }
-  m.by[2] += r * work;
-  for (int i = 0; i < 2; ++i) m.by[i] = g * m.by[i];
+  m.by[2] += dot(moment, by_tau);
+  const Vec2<Scalar> first = half.to_first(moment);
+  m.by[0] = first.x;
+  m.by[1] = first.y;
 }
 
 /// Energy and gradient only.
@@ -121,17 +116,17 @@ void bend_twist_gradient(const BendMeasure& measure, const EdgeFrame<Scalar>& f0
   BendTwistMoments<Scalar> m = bend_twist_moments<false>(measure, s, natural, k);
   const Scalar K = m.by[0] * s.kappa1 + m.by[1] * s.kappa2;
   const Scalar inverse_chi = 1.0 / (1.0 + dot(f0.tangent, f1.tangent));
-  apply_halfway<false>(TwistBetween<Scalar>(f0, f1, inverse_chi), s, m);
+  apply_half_twist<false>(half_twist(s.tau), s, m);
   const Scalar &c1 = m.by[0], &c2 = m.by[1], &ct = m.by[2];
   const Vec3<Scalar> kb = (2.0 * inverse_chi) * cross(f0.tangent, f1.tangent);
   const Vec3<Scalar> t = inverse_chi * (f0.tangent + f1.tangent);
   // kappa2 follows from kappa1 by (d1, d2) -> (d2, -d1), so both appear through two combined directors.
-  const Vec3<Scalar> D = inverse_chi * (c1 * (f0.d2 + f1.d2) - c2 * (f0.d1 + f1.d1));
+  const Vec3<Scalar> D = (2.0 * inverse_chi) * (c1 * f0.d2 - c2 * f0.d1);
   out.energy = m.energy;
   out.gradient_e[0] = f0.inverse_length * (cross(f1.tangent, D) - K * t + (0.5 * ct) * kb);
   out.gradient_e[1] = f1.inverse_length * ((0.5 * ct) * kb - K * t - cross(f0.tangent, D));
-  out.gradient_angle[0] = -0.5 * (c1 * dot(kb, f0.d1) + c2 * dot(kb, f0.d2)) - ct;
-  out.gradient_angle[1] = -0.5 * (c1 * dot(kb, f1.d1) + c2 * dot(kb, f1.d2)) + ct;
+  out.gradient_angle[0] = -(c1 * dot(kb, f0.d1) + c2 * dot(kb, f0.d2)) - ct;
+  out.gradient_angle[1] = ct;
 }
 
 /// Energy, gradient and symmetric Hessian. [Bergou et al. 2010, appendix], combined over the two curvatures.
@@ -145,23 +140,22 @@ void bend_twist_hessian(const BendMeasure& measure, const EdgeFrame<Scalar>& f0,
   const Vec3<Scalar>&t0 = f0.tangent, &t1 = f1.tangent;
   const Scalar i0 = f0.inverse_length, i1 = f1.inverse_length;
   const Scalar inverse_chi = 1.0 / (1.0 + dot(t0, t1));
-  const TwistBetween<Scalar> twist(f0, f1, inverse_chi);
-  apply_halfway<true>(twist, s, m);
-  const Scalar kappa1 = twist.g.inverse * s.kappa1, kappa2 = twist.g.inverse * s.kappa2;
+  const HalfTwist<Scalar> half = half_twist(s.tau);
+  apply_half_twist<true>(half, s, m);
+  const Vec2<Scalar> kappa = half.to_first({s.kappa1, s.kappa2});
   const Vec3<Scalar> kb = (2.0 * inverse_chi) * cross(t0, t1);
   const Vec3<Scalar> t = inverse_chi * (t0 + t1);
   const Scalar half_ct = 0.5 * ct;
-  const Vec3<Scalar> D0 = c1 * f0.d2 - c2 * f0.d1, D1 = c1 * f1.d2 - c2 * f1.d1;
-  const Vec3<Scalar> C[2] = {c1 * f0.d1 + c2 * f0.d2, c1 * f1.d1 + c2 * f1.d2};
-  const Vec3<Scalar> D = inverse_chi * (D0 + D1);
+  const Vec3<Scalar> d1 = 2.0 * f0.d1, d2 = 2.0 * f0.d2;
+  const Vec3<Scalar> D0 = c1 * d2 - c2 * d1, C = c1 * d1 + c2 * d2, D = inverse_chi * D0;
   const Vec3<Scalar> t1D = cross(t1, D), t0D = cross(t0, D);
 
   out.energy = m.energy;
   out.gradient_e[0] = i0 * (t1D - K * t + half_ct * kb);
   out.gradient_e[1] = i1 * (half_ct * kb - K * t - t0D);
-  const Scalar kbC[2] = {dot(kb, C[0]), dot(kb, C[1])};
-  out.gradient_angle[0] = -0.5 * kbC[0] - ct;
-  out.gradient_angle[1] = -0.5 * kbC[1] + ct;
+  const Scalar kbC = dot(kb, C);
+  out.gradient_angle[0] = -0.5 * kbC - ct;
+  out.gradient_angle[1] = ct;
 
   // Second derivatives of the strains, weighted by the moments.
   Mat3<Scalar> A{}, B{}, F{};
@@ -176,7 +170,7 @@ void bend_twist_hessian(const BendMeasure& measure, const EdgeFrame<Scalar>& f0,
   add_identity(F, -k_chi);
   add_outer(F, k_chi, t1, t1);
   add_symmetric_outer(A, Scalar(0.25), kb, D0 - ct * (t0 + t));
-  add_symmetric_outer(F, Scalar(0.25), kb, D1 - ct * (t1 + t));
+  add_symmetric_outer(F, -0.25 * ct, kb, t1 + t);
   add_identity(B, -k_chi);
   add_outer(B, -k_chi, t0, t1);
   add_outer(B, Scalar(-1.0), t1D, t);
@@ -185,10 +179,10 @@ void bend_twist_hessian(const BendMeasure& measure, const EdgeFrame<Scalar>& f0,
   add_cross(B, ct * inverse_chi, t0);
   add_outer(B, -half_ct, kb, t);
 
-  // First derivatives of kappa1 / g, kappa2 / g and, kb / 2, of the twist.
-  const Vec3<Scalar> a1 = inverse_chi * (f0.d2 + f1.d2), a2 = -(inverse_chi * (f0.d1 + f1.d1));
-  const Vec3<Scalar> p1 = cross(t1, a1) - kappa1 * t, p2 = cross(t1, a2) - kappa2 * t;
-  const Vec3<Scalar> q1 = -(cross(t0, a1) + kappa1 * t), q2 = -(cross(t0, a2) + kappa2 * t);
+  // First derivatives of the curvatures in the first frame and, kb / 2, of the twist.
+  const Vec3<Scalar> a1 = inverse_chi * d2, a2 = -(inverse_chi * d1);
+  const Vec3<Scalar> p1 = cross(t1, a1) - kappa.x * t, p2 = cross(t1, a2) - kappa.y * t;
+  const Vec3<Scalar> q1 = -(cross(t0, a1) + kappa.x * t), q2 = -(cross(t0, a2) + kappa.y * t);
   const Vec3<Scalar> half_kb = 0.5 * kb;
   const Vec3<Scalar> p[3] = {p1, p2, half_kb}, q[3] = {q1, q2, half_kb};
   for (int i = 0; i < 3; ++i) {
@@ -203,22 +197,19 @@ void bend_twist_hessian(const BendMeasure& measure, const EdgeFrame<Scalar>& f0,
     out.ee[1][1].row[i] = (i1 * i1) * F.row[i];
   }
 
-  const Vec3<Scalar> d1[2] = {f0.d1, f1.d1}, d2[2] = {f0.d2, f1.d2};
-  Scalar w[2][3], v[2][3];  // first derivatives in the angles, and the second derivatives times these
-  for (int j = 0; j < 2; ++j) {
-    w[j][0] = -0.5 * dot(kb, d1[j]);
-    w[j][1] = -0.5 * dot(kb, d2[j]);
-    w[j][2] = Scalar(j == 0 ? -1.0 : 1.0);
-    for (int i = 0; i < 3; ++i)
-      v[j][i] = m.second[i][0] * w[j][0] + m.second[i][1] * w[j][1] + m.second[i][2] * w[j][2];
-    const Vec3<Scalar> common = (0.5 * kbC[j]) * t + v[j][2] * half_kb;
-    out.e_angle[0][j] = i0 * (common - inverse_chi * cross(t1, C[j]) + v[j][0] * p1 + v[j][1] * p2);
-    out.e_angle[1][j] = i1 * (common + inverse_chi * cross(t0, C[j]) + v[j][0] * q1 + v[j][1] * q2);
-  }
-  const Scalar own[2] = {-0.5 * dot(kb, D0), -0.5 * dot(kb, D1)};
-  const auto both = [&](int i, int j) { return v[i][0] * w[j][0] + v[i][1] * w[j][1] + v[i][2] * w[j][2]; };
-  for (int j = 0; j < 2; ++j) out.angle_angle[j][j] = own[j] + both(j, j);
-  out.angle_angle[0][1] = both(0, 1);
+  // First derivatives of the strains in the first angle, and the second derivatives times these; the second angle is
+  // part of the twist only.
+  const Scalar w1 = -0.5 * dot(kb, d1), w2 = -0.5 * dot(kb, d2);
+  Scalar v[3];
+  for (int i = 0; i < 3; ++i) v[i] = m.second[i][0] * w1 + m.second[i][1] * w2 - m.second[i][2];
+  const Vec3<Scalar> common = (0.5 * kbC) * t + v[2] * half_kb, twisted = m.second[2][2] * half_kb;
+  out.e_angle[0][0] = i0 * (common - inverse_chi * cross(t1, C) + v[0] * p1 + v[1] * p2);
+  out.e_angle[1][0] = i1 * (common + inverse_chi * cross(t0, C) + v[0] * q1 + v[1] * q2);
+  out.e_angle[0][1] = i0 * (twisted + m.second[2][0] * p1 + m.second[2][1] * p2);
+  out.e_angle[1][1] = i1 * (twisted + m.second[2][0] * q1 + m.second[2][1] * q2);
+  out.angle_angle[0][0] = v[0] * w1 + v[1] * w2 - v[2] - 0.5 * dot(kb, D0);
+  out.angle_angle[0][1] = v[2];
+  out.angle_angle[1][1] = m.second[2][2];
 }
 
 /// From psi to theta, psi = theta + (spin of direct transport): the term that a finite rotation within a

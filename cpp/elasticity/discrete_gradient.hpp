@@ -4,15 +4,16 @@
 ///
 /// In a step a frame F turns from F0 to F1 by a rotation with the Cayley vector w, F1 - F0 = w x (F0 + F1) / 2. So a
 /// product of vectors of two frames changes exactly by a1 . b1 - a0 . b0 = (w_a - w_b) . (mean a x mean b), and is left
-/// alone where both turn alike [Gonzalez 1996: discrete gradients in quadratic invariants]. Strains are quotients of
-/// such products: with x = t_a . t_b, X = 1 + x,
-///   kappa_i / g = y_i / X,  y_i = di_a . t_b - t_a . di_b,
+/// alone where both turn alike [Gonzalez 1996: discrete gradients in quadratic invariants]. The twist and the curvatures
+/// v in the directors of the first frame are quotients of such products: with x = t_a . t_b, X = 1 + x,
+///   v_i = y_i / X,  y_i = 2 di_a . t_b,
 ///   X cos(tau) = c = d1_a . d1_b + d2_a . d2_b,  X sin(tau) = s = d2_a . d1_b - d1_a . d2_b,
-/// and change exactly (means with bars, D for differences) by
-///   D (kappa_i / g) = (D y_i - mean (kappa_i / g) D x) / mean X,
+/// and change exactly (D for differences) by
+///   D v_i = (D y_i - mean v_i D x) / mean X,
 ///   D tau = D tau / (X0 X1 sin D tau) (mean c D s - mean s D c).
-/// The energy is a sum of squares of f(|kappa|^2) times strains, f rational and g rational in cos(tau), whose
-/// differences are exact products too.
+/// Those halfway are kappa = R v, R a turn by tau / 2, and with J (x, y) = (y, -x)
+///   D kappa = mean R D v + D R mean v,  D R = (2 tan(D tau / 4) / D tau) J mean R D tau.
+/// The energy is a sum of squares of f(|kappa|^2) times strains, f rational, whose differences are exact products too.
 /// What follows is a moment m with m . (w_a - w_b) = E1 - E0, without a quotient of differences: it is as smooth as the
 /// energy, where Gonzalez's correction along a direction of the unknowns depends on how little a stencil deforms while
 /// it turns.
@@ -85,50 +86,45 @@ DividedMoments<Scalar> divided_moments(const BendMeasure& measure, const Vec3<Sc
   return h;
 }
 
-/// How far two frames are twisted against each other at both ends of a step, and what follows for curvatures: with
-/// z = (1 - cos(tau)) / 2,  D z / D tau = (mean sin(tau)) tan(D tau / 2) / D tau.
-template <class Scalar>
-struct DividedTwist {
-  HalfwayFactor<Scalar> g0, g1;
-  Scalar sine1;
-  Scalar by_tau, slope;  ///< D g / D tau, and how it changes with tau at the end
-
-  /// `turn` of the step's D tau, whose sine and cosine come with it.
-  DividedTwist(const Scalar& cosine0, const Scalar& sine0, const Scalar& cosine, const Scalar& sine,
-               const TurnOverSine<Scalar>& turn, const Scalar& sine_of_step, const Scalar& cosine_of_step)
-      : g0(cosine0), g1(cosine), sine1(sine) {
-    const Scalar halved = 1.0 / (1.0 + cosine_of_step), inverse = 1.0 / turn.value;
-    const Scalar tangent = halved * inverse;  // tan(D tau / 2) / D tau
-    const Scalar tangent_slope = tangent * (sine_of_step * halved - turn.slope * inverse);
-    const Scalar mean = 0.5 * (sine0 + sine), z = mean * tangent,
-                 z_slope = 0.5 * cosine * tangent + mean * tangent_slope;
-    by_tau = 0.5 * (g0.pole * g1.pole) * z;
-    slope = 0.5 * (g0.pole * g1.pole) * (z_slope + (0.375 * (g1.pole * sine)) * z);
-  }
-};
-
-/// From moments that belong to (kappa1, kappa2, tau) to those of u = (kappa1 / g, kappa2 / g, tau), with the means of
-/// these.
+/// From moments that belong to the curvatures halfway and tau to those of the curvatures v in the first frame, and tau.
+/// `end` has kappa and tau at the end, `v` is the mean, and `turn` of the step's D tau.
 template <bool second_too, class Scalar>
-void apply_halfway(const DividedTwist<Scalar>& twist, const Scalar (&mean)[2], const Scalar (&end)[2],
-                   DividedMoments<Scalar>& h) {
-  const Scalar g1 = twist.g1.value, g = 0.5 * (twist.g0.value + g1), first = g1 * twist.g1.first(twist.sine1);
-  const Scalar work = mean[0] * h.by[0] + mean[1] * h.by[1];
+void apply_half_twist(const HalfTwist<Scalar>& half0, const HalfTwist<Scalar>& half1, const TurnOverSine<Scalar>& turn,
+                      const Vec3<Scalar>& end, const Vec2<Scalar>& v, DividedMoments<Scalar>& h) {
+  const HalfTwist<Scalar> mean{0.5 * (half0.cosine + half1.cosine), 0.5 * (half0.sine + half1.sine)};
+  const Scalar C = half0.cosine * half1.cosine + half0.sine * half1.sine;  // cos(D tau / 2)
+  const Scalar q = 1.0 / (turn.value * C * (1.0 + C));                     // 2 tan(D tau / 4) / D tau
+  const Vec2<Scalar> kappa = mean.to_halfway(v), by_tau{q * kappa.y, -(q * kappa.x)}, moment{h.by[0], h.by[1]};
   if constexpr (second_too) {
-    // d kappa_j = g1 d u_j + g1' u_j d tau at the end.
-    Scalar by_kappa[2], by_tau[3];  // sum_i mean_i of d h_i by kappa_j; d h_i by tau
-    for (int j = 0; j < 2; ++j) by_kappa[j] = mean[0] * h.second[0][j] + mean[1] * h.second[1][j];
-    for (int i = 0; i < 3; ++i)
-      by_tau[i] = h.second[i][2] + first * (end[0] * h.second[i][0] + end[1] * h.second[i][1]);
-    h.second[2][2] = by_tau[2] + twist.slope * work + twist.by_tau * (mean[0] * by_tau[0] + mean[1] * by_tau[1]);
-    for (int j = 0; j < 2; ++j) {
-      h.second[2][j] = g1 * h.second[2][j] + twist.by_tau * (0.5 * h.by[j] + g1 * by_kappa[j]);
-      h.second[j][2] = 0.5 * first * h.by[j] + g * by_tau[j];
-      for (int i = 0; i < 2; ++i) h.second[i][j] = (g * g1) * h.second[i][j];
+    const Scalar S = half0.cosine * half1.sine - half0.sine * half1.cosine;
+    const Scalar q_slope = 0.5 * S * (1.0 / (1.0 + C) + 1.0 / C) - turn.slope / turn.value;  // over q
+    // By tau at the end, with which kappa changes there, and by v at the end.
+    Scalar with_tau[3];
+    Vec2<Scalar> with_v[3];
+    for (int i = 0; i < 3; ++i) {
+      with_tau[i] = h.second[i][2] + 0.5 * (h.second[i][0] * end.y - h.second[i][1] * end.x);
+      with_v[i] = half1.to_first({h.second[i][0], h.second[i][1]});
     }
+    const Vec2<Scalar> turned = half1.to_halfway(v), across = mean.to_first({-moment.y, moment.x});
+    h.second[2][2] = with_tau[2] + with_tau[0] * by_tau.x + with_tau[1] * by_tau.y + q_slope * dot(moment, by_tau) -
+                     0.25 * (q * dot(moment, turned));
+    const Vec2<Scalar> along_tau = with_v[2] + by_tau.x * with_v[0] + by_tau.y * with_v[1] + (0.5 * q) * across;
+    const Vec2<Scalar> own = mean.to_first({with_tau[0], with_tau[1]});
+    const Vec2<Scalar> turning = half1.to_first({-0.25 * moment.y, 0.25 * moment.x});
+    const Vec2<Scalar> by1 = mean.to_first({with_v[0].x, with_v[1].x}), by2 = mean.to_first({with_v[0].y, with_v[1].y});
+    h.second[0][0] = by1.x;
+    h.second[1][0] = by1.y;
+    h.second[2][0] = along_tau.x;
+    h.second[0][1] = by2.x;
+    h.second[1][1] = by2.y;
+    h.second[2][1] = along_tau.y;
+    h.second[0][2] = own.x + turning.x;
+    h.second[1][2] = own.y + turning.y;
   }
-  h.by[2] += twist.by_tau * work;
-  for (int i = 0; i < 2; ++i) h.by[i] = g * h.by[i];
+  h.by[2] += dot(moment, by_tau);
+  const Vec2<Scalar> first = mean.to_first(moment);
+  h.by[0] = first.x;
+  h.by[1] = first.y;
 }
 
 /// The moment m [N m] with m . (w_a - w_b) = E1 - E0, and its derivatives by spins of the two frames at the end.
@@ -152,24 +148,24 @@ void discrete_moment(const BendMeasure& measure, const EdgeFrame<Scalar>& a0, co
   const Scalar c0 = dot(a0.d1, b0.d1) + dot(a0.d2, b0.d2), s0 = dot(a0.d2, b0.d1) - dot(a0.d1, b0.d2);
   const Scalar c1 = dot(a1.d1, b1.d1) + dot(a1.d2, b1.d2), s1 = dot(a1.d2, b1.d1) - dot(a1.d1, b1.d2);
   const Scalar c = 0.5 * (c0 + c1), s = 0.5 * (s0 + s1);
-  const Scalar inverse_chi = 1.0 / (X0 * X1), i0 = inverse_chi * X1, i1 = inverse_chi * X0;
+  const Scalar inverse_chi = 1.0 / (X0 * X1), i1 = inverse_chi * X0;
   const Scalar sine = inverse_chi * (c0 * s1 - s0 * c1), cosine = inverse_chi * (c0 * c1 + s0 * s1);
   const TurnOverSine<Scalar> turn = turn_over_sine(end.z - start.z, sine, cosine);
   const Scalar g = turn.value * inverse_chi;
-  const DividedTwist<Scalar> twist(i0 * c0, i0 * s0, i1 * c1, i1 * s1, turn, sine, cosine);
-  const Scalar u[2] = {twist.g1.inverse * end.x, twist.g1.inverse * end.y};
-  const Scalar k[2] = {0.5 * (twist.g0.inverse * start.x + u[0]), 0.5 * (twist.g0.inverse * start.y + u[1])};
-  apply_halfway<with_matrix>(twist, k, u, h);
+  const HalfTwist<Scalar> half0 = half_twist(start.z), half1 = half_twist(end.z);
+  const Vec2<Scalar> u = half1.to_first({end.x, end.y});
+  const Vec2<Scalar> k = Scalar(0.5) * (half0.to_first({start.x, start.y}) + u);
+  apply_half_twist<with_matrix>(half0, half1, turn, end, k, h);
 
   // m = sum of weights times the cross products that belong to x, y1, y2, c and s.
-  const Scalar w[2] = {inverse * h.by[0], inverse * h.by[1]}, wx = -(w[0] * k[0] + w[1] * k[1]);
+  const Scalar w[2] = {inverse * h.by[0], inverse * h.by[1]}, wx = -(w[0] * k.x + w[1] * k.y);
   const Scalar hg = h.by[2] * g, ws = hg * c, wc = -(hg * s);
-  const Vec3<Scalar> P[3] = {wx * tb - w[0] * b[0] - w[1] * b[1], w[0] * tb + wc * b[0] - ws * b[1],
-                             w[1] * tb + ws * b[0] + wc * b[1]};
+  const Vec3<Scalar> P[3] = {wx * tb, (2.0 * w[0]) * tb + wc * b[0] - ws * b[1],
+                             (2.0 * w[1]) * tb + ws * b[0] + wc * b[1]};
   out.moment = cross(ta, P[0]) + cross(a[0], P[1]) + cross(a[1], P[2]);
   if constexpr (with_matrix) {
-    const Vec3<Scalar> Q[3] = {wx * ta + w[0] * a[0] + w[1] * a[1], wc * a[0] + ws * a[1] - w[0] * ta,
-                               wc * a[1] - ws * a[0] - w[1] * ta};
+    const Vec3<Scalar> Q[3] = {wx * ta + 2.0 * (w[0] * a[0] + w[1] * a[1]), wc * a[0] + ws * a[1],
+                               wc * a[1] - ws * a[0]};
     const Vec3<Scalar>*at[3] = {&a1.tangent, &a1.d1, &a1.d2}, *bt[3] = {&b1.tangent, &b1.d1, &b1.d2};
     out.by_a = out.by_b = Mat3<Scalar>{};
     Scalar trace_a{0.0}, trace_b{0.0};
@@ -186,14 +182,11 @@ void discrete_moment(const BendMeasure& measure, const EdgeFrame<Scalar>& a0, co
     const Vec3<Scalar> x = cross(a1.tangent, b1.tangent);
     const Vec3<Scalar> vx = cross(ta, tb), vc = cross(a[0], b[0]) + cross(a[1], b[1]),
                        vs = cross(a[1], b[0]) - cross(a[0], b[1]);
-    Vec3<Scalar> strain[3], y[2];
-    for (int i = 0; i < 2; ++i) {
-      y[i] = cross(a[i], tb) - cross(ta, b[i]);
-      strain[i] =
-          i1 * (cross(i == 0 ? a1.d1 : a1.d2, b1.tangent) - cross(a1.tangent, i == 0 ? b1.d1 : b1.d2) - u[i] * x);
-    }
-    strain[2] = -(i1 * (a1.tangent + b1.tangent));
-    const Vec3<Scalar> my[2] = {inverse * (y[0] - k[0] * vx), inverse * (y[1] - k[1] * vx)};
+    const Vec3<Scalar> strain[3] = {i1 * (2.0 * cross(a1.d1, b1.tangent) - u.x * x),
+                                    i1 * (2.0 * cross(a1.d2, b1.tangent) - u.y * x),
+                                    -(i1 * (a1.tangent + b1.tangent))};
+    const Vec3<Scalar> y[2] = {2.0 * cross(a[0], tb), 2.0 * cross(a[1], tb)};
+    const Vec3<Scalar> my[2] = {inverse * (y[0] - k.x * vx), inverse * (y[1] - k.y * vx)};
     const Vec3<Scalar> twisting = c * vs - s * vc, mt = g * twisting;
     const Vec3<Scalar> bending = w[0] * y[0] + w[1] * y[1] + wx * vx;
     for (int j = 0; j < 3; ++j) {

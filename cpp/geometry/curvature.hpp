@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "geometry/frames.hpp"
+#include "geometry/vec2.hpp"
 
 namespace withe {
 
@@ -14,31 +15,22 @@ struct BendTwistStrain {
   Scalar kappa1, kappa2, tau;
 };
 
-/// The mean of the directors of two frames that are twisted by tau against each other is shorter by cos(tau / 2) than
-/// directors halfway between them, and so were curvatures in it: a rod would bend with cos^2(tau / 2) of its
-/// stiffness. With z = sin^2(tau / 2) the factor
-///   g = (1 - z / 4) / (1 - 3 z / 4)
-/// is the Pade approximant of 1 / cos(tau / 2) = (1 - z)^(-1/2), smaller by .1 % at 60 and 1 % at 90 degrees. It has a
-/// bound where the frames are opposed, and nothing is halfway.
+/// Cosine and sine of half a twist, by which the directors halfway between two frames are turned from those of the
+/// first. The mean of both frames' directors is shorter by this cosine: in it a rod would bend with cos^2(tau / 2) of
+/// its stiffness. Whole turns count; without them curvatures would jump to the opposite as tau passes half a turn.
 template <class Scalar>
-struct HalfwayFactor {
-  Scalar pole, quotient;  ///< 1 / (1 - 3 z / 4) and what else g and its derivatives are made of
-  Scalar value, inverse;  ///< g, 1 / g
+struct HalfTwist {
+  Scalar cosine, sine;
 
-  explicit HalfwayFactor(const Scalar& cosine) {
-    const Scalar z = 0.5 * (1.0 - cosine), numerator = 1.0 - 0.25 * z, denominator = 1.0 - 0.75 * z;
-    quotient = 1.0 / (numerator * denominator);
-    pole = numerator * quotient;
-    value = numerator * pole;
-    inverse = denominator * denominator * quotient;
+  /// Components in (d1, d2) halfway of what has these in the first frame.
+  Vec2<Scalar> to_halfway(const Vec2<Scalar>& a) const {
+    return {cosine * a.x + sine * a.y, cosine * a.y - sine * a.x};
   }
-  /// g' / g by tau.
-  Scalar first(const Scalar& sine) const { return 0.25 * (sine * quotient); }
-  /// g'' / g.
-  Scalar second(const Scalar& cosine, const Scalar& sine) const {
-    return quotient * (0.25 * cosine + 0.1875 * (pole * (sine * sine)));
+  Vec2<Scalar> to_first(const Vec2<Scalar>& a) const {
+    return {cosine * a.x - sine * a.y, cosine * a.y + sine * a.x};
   }
 };
+inline HalfTwist<double> half_twist(double tau) { return {std::cos(0.5 * tau), std::sin(0.5 * tau)}; }
 
 inline double arctangent(double y, double x) { return std::atan2(y, x); }
 inline double round_to_integer(double x) { return std::nearbyint(x); }
@@ -50,11 +42,11 @@ BendTwistStrain<Scalar> bend_twist_strain(const EdgeFrame<Scalar>& f0, const Edg
   const Scalar chi = 1.0 + dot(f0.tangent, f1.tangent);
   const Vec3<Scalar> kb = (2.0 / chi) * cross(f0.tangent, f1.tangent);
   const Vec3<Scalar> carried = parallel_transport(f0.d1, f0.tangent, f1.tangent);
-  const Scalar cosine = dot(carried, f1.d1), angle = arctangent(-dot(carried, f1.d2), cosine);
-  const Scalar half = 0.5 * HalfwayFactor<Scalar>(cosine).value;
+  const Scalar angle = arctangent(-dot(carried, f1.d2), dot(carried, f1.d1));
   constexpr double kTwoPi = 6.283185307179586476925286766559;
-  return {half * dot(kb, f0.d2 + f1.d2), -half * dot(kb, f0.d1 + f1.d1),
-          angle + kTwoPi * round_to_integer((previous_tau - angle) / kTwoPi)};
+  const Scalar tau = angle + kTwoPi * round_to_integer((previous_tau - angle) / kTwoPi);
+  const Vec2<Scalar> kappa = half_twist(tau).to_halfway({dot(kb, f0.d2), -dot(kb, f0.d1)});
+  return {kappa.x, kappa.y, tau};
 }
 
 /// kappa = 2 tan(phi / 2) between unit tangents (x0, y0) and (x1, y1).

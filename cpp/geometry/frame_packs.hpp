@@ -6,6 +6,12 @@
 #include "geometry/frame_kernels.hpp"
 
 namespace withe::WITHE_INSTRUCTION_SET {
+
+inline HalfTwist<Pack> half_twist(Pack tau) {
+  const SineCosine half = sine_cosine(0.5 * tau);
+  return {half.cosine, half.sine};
+}
+
 namespace {
 
 /// The kLanes indices from `first`, the last one repeated; returns how many are real.

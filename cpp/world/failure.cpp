@@ -14,12 +14,8 @@ namespace {
 /// An edge as short as this, over its length at rest, is one that the motion crushes.
 constexpr double kCrushed = 0.5;
 /// An edge that turns by more than 120 degrees against the next, or is twisted so far from its natural twist, is too
-/// long for the motion. So is one that is turned against the next by kTwisted about its tangent, counted or not, and
-/// bent: beyond it directors halfway between both are not what they are taken for (geometry/curvature.hpp). Where it is
-/// straight, as in a shaft whose natural twist turns it like a motor, that says nothing, and whole turns say nothing
-/// anywhere.
-constexpr double kSharp = 2.0 / 3.0 * std::numbers::pi, kTwisted = 0.5 * std::numbers::pi;
-constexpr double kBent = 0.05;  // [rad]
+/// long for the motion.
+constexpr double kSharp = 2.0 / 3.0 * std::numbers::pi;
 /// Stiffnesses of rods that differ by more leave few digits to the soft ones.
 constexpr double kMismatch = 1e6;
 
@@ -73,20 +69,18 @@ std::string World::Implementation::crushed() const {
 /// Says so where an edge turns or twists too much against the next; nothing elsewhere.
 std::string World::Implementation::unresolved() const {
   int node = -1;
-  double greatest = 0.0, most = 1.0;
+  double greatest = kSharp;
   const char* how = "";
-  const auto see = [&](double angle, double limit, int where, const char* does) {
-    if (!(std::abs(angle) > most * limit)) return;
+  const auto see = [&](double angle, int where, const char* does) {
+    if (!(std::abs(angle) > greatest)) return;
     greatest = std::abs(angle);
-    most = greatest / limit;
     node = where;
     how = does;
   };
   const Configuration& c = configuration();
-  const auto see_twist = [&](double tau, const auto& kappa, double natural, double turn, int where) {
+  const auto see_twist = [&](double tau, const auto& kappa, double natural, int where) {
     const double x = kappa(0) * kappa(0) + kappa(1) * kappa(1);
-    see(bend_factor(parameters.measure, x).value * tau - natural, kSharp, where, "twists");
-    if (turn > kBent) see(std::remainder(tau, 2.0 * std::numbers::pi), kTwisted, where, "twists");
+    see(bend_factor(parameters.measure, x).value * tau - natural, where, "twists");
   };
   const auto angle = [](const Vec3d& a, const Vec3d& b) {
     return std::atan2(to_eigen(a).cross(to_eigen(b)).norm(), dot(a, b));
@@ -94,16 +88,16 @@ std::string World::Implementation::unresolved() const {
   for (std::size_t b = 0; b < model.bend.size(); ++b) {
     const BendStencil& s = model.bend[b];
     const auto row = static_cast<Eigen::Index>(b);
-    const double turn = angle(s.sign[0] * c.edge[at(s.edge[0])].tangent, s.sign[1] * c.edge[at(s.edge[1])].tangent);
-    see(turn, kSharp, s.node[1], "turns");
+    see(angle(s.sign[0] * c.edge[at(s.edge[0])].tangent, s.sign[1] * c.edge[at(s.edge[1])].tangent), s.node[1],
+        "turns");
     if (!model.planar())
-      see_twist(state.bend_tau(row), c.bend_strain.row(row), parameters.bend_natural(row, 2), turn, s.node[1]);
+      see_twist(state.bend_tau(row), c.bend_strain.row(row), parameters.bend_natural(row, 2), s.node[1]);
   }
   for (std::size_t h = 0; h < (model.planar() ? 0 : model.half.size()); ++h) {
     const FrameStencil& s = model.half[h];
     const auto row = static_cast<Eigen::Index>(h);
     see_twist(state.half_tau(row), c.half_strain.row(row), parameters.half_natural(row, 2),
-              angle(c.attached[h].tangent, c.edge[at(s.edge)].tangent), model.frame_node[at(s.frame)]);
+              model.frame_node[at(s.frame)]);
   }
   if (node < 0) return "";
   return std::string("an edge ") + how + " by " + text(greatest * 180.0 / std::numbers::pi, 3) +

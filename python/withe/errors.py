@@ -24,8 +24,7 @@ class CoarseMeshWarning(UserWarning):
     """Somewhere an edge turns by more than 120 degrees against the next, or twists so: the rod needs more nodes there.
 
     What folds over is far too stiff. Twist counts beyond the natural twist, so that a rod whose natural twist grows
-    may turn as a motor does; and, from 90 degrees on, where a rod is bent, in whatever way it came, but for whole
-    turns: bending is 2 % too soft there, and 14 at 120 degrees.
+    may turn as a motor does.
     Given once a simulation, at an equilibrium or within 64 steps.
     """
 

@@ -24,6 +24,7 @@ Number arctangent(const Number& y, const Number& x) {
 Number round_to_integer(const Number& x) { return {std::nearbyint(x.value)}; }
 Number cosine(const Number& x) { return chain(x, std::cos(x.value), -std::sin(x.value)); }
 Number sine(const Number& x) { return chain(x, std::sin(x.value), std::cos(x.value)); }
+HalfTwist<Number> half_twist(const Number& tau) { return {cosine(0.5 * tau), sine(0.5 * tau)}; }
 double cosine(double x) { return std::cos(x); }
 double sine(double x) { return std::sin(x); }
 

@@ -179,8 +179,7 @@ def limp_tree(seed, turn):
     return simulation
 
 
-@pytest.mark.filterwarnings("error::withe.CoarseMeshWarning")  # what twists by half a turn falls to either side
-@pytest.mark.parametrize("seed", [3, 5, 10, 35, 70, 79, 85, 95])
+@pytest.mark.parametrize("seed", [3, 5, 10, 20, 35, 70, 79, 85, 95])
 def test_what_falls_far_to_its_equilibrium_comes_to_the_same_one_when_turned(seed):
     """Nothing on the way knows the axes of the room."""
     ends = []

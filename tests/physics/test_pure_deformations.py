@@ -128,12 +128,12 @@ def test_clamp_that_turns_ten_times_winds_ten_turns():
     assert simulation.reaction(grip).moment[0] == pytest.approx(20.0 * np.pi * twist_stiffness / 0.4, rel=1e-6)
 
 
-def bends_of_twisted_cantilever(twist, load=-1e-6):
+def bends_of_twisted_cantilever(twist):
     """Under a load on its end, turns of the first edge and from each edge to the next of a round rod whose edges are
     twisted by so much against each other, the curvatures that are read there, and what was warned of."""
     scene, bar = round_bar()
     scene.clamp(bar.start)
-    scene.add_force(bar.end, (0.0, 0.0, load))
+    scene.add_force(bar.end, (0.0, 0.0, -1e-6))
     simulation = rods.sharp(scene, planar=False)
     edge = np.linalg.norm(np.diff(simulation.positions(bar)[:2], axis=0))
     simulation.set_natural_twist(bar, twist / edge)
@@ -145,27 +145,13 @@ def bends_of_twisted_cantilever(twist, load=-1e-6):
     return np.diff(slopes, prepend=0.0), read, [str(warning.message) for warning in caught]
 
 
-@pytest.mark.parametrize(
-    ("degrees", "error"), [(20, 3e-6), (30, 3e-5), (60, 1.5e-3), (85, 1.4e-2), (120, 0.16), (160, None)]
-)
-def test_a_round_rod_that_is_twisted_bends_no_more(degrees, error):
-    """Errors are those of (1 - z / 4) / (1 - 3 z / 4) against (1 - z)^(-1/2) at z = sin^2(tau / 2), squared."""
+@pytest.mark.parametrize("degrees", [20, 85, 120, 180, 400])
+def test_a_round_rod_that_is_twisted_bends_no_more(degrees):
     straight, curvatures, _ = bends_of_twisted_cantilever(0.0)
     twisted, read, said = bends_of_twisted_cantilever(np.radians(degrees))
-    if error is not None:
-        off = np.abs(twisted[:-1] / straight[:-1] - 1.0).max()
-        assert 0.5 * error < off < error
-        # What is read follows what turns, less half of that error.
-        np.testing.assert_allclose((read / curvatures)[:-1], np.sqrt(twisted / straight)[1:-1], rtol=1e-5)
-    # The load bends the rod too little to be warned of: see the next test.
+    np.testing.assert_allclose(twisted, straight, rtol=1e-9)
+    np.testing.assert_allclose(read, curvatures, rtol=1e-9)
     assert said == []
-
-
-@pytest.mark.parametrize(("degrees", "warns"), [(80, False), (100, True)])
-def test_twist_by_a_right_angle_between_bent_edges_is_warned_of(degrees, warns):
-    said = bends_of_twisted_cantilever(np.radians(degrees), load=-3e-2)[-1]
-    assert len(said) == warns
-    assert not warns or f"twists by {degrees} degrees" in said[0]
 
 
 @pytest.mark.parametrize(("push", "moment"), [((0, 0, 1), "height"), ((0, 1, 0), "width")])
