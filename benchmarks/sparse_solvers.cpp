@@ -149,7 +149,7 @@ SceneDescription rods_on_a_floor(int rods) {
   contact.friction = 0.3;
   contact.friction_law = FrictionLaw::lagged;
   contact.obstacles.emplace_back();
-  contact.obstacle_friction = VectorX::Constant(1, 0.3);
+  contact.obstacle_friction = MatrixX3::Constant(1, 3, 0.3);
   std::mt19937 random(0);
   std::uniform_real_distribution<double> uniform(0.0, 0.1 * kAcross);
   const int rows = std::max(1, static_cast<int>(std::lround(std::sqrt(rods / kLayers * 0.2 / 1.1))));

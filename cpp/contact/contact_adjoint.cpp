@@ -79,17 +79,17 @@ void add_implicit_friction(const ContactProblem& problem, const Touching& t, Fri
     out.rolling += scalar.value / f.friction;
     return;
   }
-  // Friction is linear in both coefficients.
-  for (const bool along : {true, false}) {
+  // Friction is linear in its coefficients.
+  for (int k = 0; k < 3; ++k) {
     ContactPair pair = t.pair;
-    pair.set_friction(along ? 1.0 : 0.0, along ? 0.0 : 1.0);
+    pair.set_friction(k == 0 ? 1.0 : 0.0, k == 1 ? 1.0 : 0.0, k == 2 ? 1.0 : 0.0);
     FrictionSetting unit = f;
     unit.pair = &pair;
     unit.friction = pair.friction;
     unit.isotropic = pair.isotropic();
     double force[kContactUnknowns] = {};
     friction_gradient(unit, t.now, force);
-    for (int i = 0; i < kContactUnknowns; ++i) (along ? out.along : out.across) += rows[i] * force[i];
+    for (int i = 0; i < kContactUnknowns; ++i) out.friction[k] += rows[i] * force[i];
   }
 }
 
@@ -143,7 +143,7 @@ void add_lagged_friction(const ContactProblem& problem, const Touching& t, const
                 scalar = t.pair.friction * share;
   for (int i = 0; i < kContactUnknowns; ++i) out.start[i] += scalar.slope[i];
   out.slip_tolerance += by_tolerance(scalar.value, square.value, f.rate, problem.parameters->slip_tolerance);
-  out.along += share.value;  // directions count the same
+  out.friction[0] += share.value;  // directions count the same
 }
 
 /// Of `set_mean_pressing` in pressing.cpp.

@@ -11,7 +11,7 @@ struct ContactAdjoint {
   /// By its unknowns at the start of the step, and by their rates; frames are transported from the tangents there.
   double start[kContactUnknowns] = {}, velocity[kContactUnknowns] = {};
   double approach = 0;           ///< by the speed of approach that its record had at the start [s/m]
-  double along = 0, across = 0;  ///< by coefficients of friction
+  double friction[3] = {};  ///< by its coefficients, see `SurfaceParameters::obstacle_friction`
   double rolling = 0;            ///< likewise
   double slip_tolerance = 0;     ///< [s/m]
   double gravity = 0;            ///< by its size [s^2/m]

@@ -14,10 +14,11 @@
 ///   implicit, lagged: F = mu N tanh(K |S| / (2 dt)) S / |S|, K = 15 / nu [Choi, dissertation, (5.7)-(5.14),
 ///                     there between centrelines]
 ///   anchored:         F = k_t (stick + S), of length mu N at most: an elastic stick that slips [Simo and Hughes 1998]
-/// Where an obstacle has one coefficient along a rod and another across it, F is that of the greater coefficient, mu,
-/// times the matrix (mu_t / mu) tt^T + (mu_n / mu) (1 - tt^T), t the rod's tangent along the surface: for a slip in the
+/// Where an obstacle has other coefficients along a rod than across it, F is that of the greatest coefficient, mu, times
+/// the matrix (mu_t / mu) tt^T + (mu_n / mu) (1 - tt^T), t the rod's tangent along the surface, and mu_t one coefficient
+/// where S . t > 0, the rod slides towards its end, and another where it slides towards its start: for a slip in the
 /// direction s, F = N (mu_t (s . t) t + mu_n (s . n) n) [Hu, Nirody, Scott and Shelley 2009, eq. 1]. That matrix is
-/// symmetric and not negative, so F . S is not either.
+/// symmetric and not negative, so F . S is not either; F is continuous, as F . t is nothing where mu_t changes.
 ///
 /// Rolling friction on an obstacle is a couple against the turning of a rod's surface there: the same laws, for the way
 /// R = (phi_a - phi) x r_a by which the slip is more than what the centreline moves, phi the obstacle's turn, with a
@@ -39,7 +40,7 @@ namespace withe {
 struct FrictionSetting {
   const ContactPair* pair = nullptr;
   const Obstacle* obstacle = nullptr;
-  double friction = 0;                           ///< the greater coefficient [-]
+  double friction = 0;                           ///< the greatest coefficient [-]
   bool rolling = false;                          ///< whether it is rolling friction
   ClosestPoints points;                          ///< whose class is kept
   const CurveDistance<double>* curve = nullptr;  ///< at the unknowns themselves, not at others
@@ -56,7 +57,7 @@ struct FrictionSetting {
   Vec3d turn{};                     ///< by which it turns then about its own axis [rad]
   Vec3d stick{};                    ///< at the start of the step [m]
   bool spatial = true, centreline = false;
-  bool isotropic = true;             ///< whether friction is the same along the rod and across it
+  bool isotropic = true;             ///< whether friction is the same in all directions of the rod
   const Vec3d* predicted = nullptr;  ///< friction over its limit, as a step of Newton's method predicts it
 };
 
@@ -217,7 +218,7 @@ struct SlippingSurfaces {
   Scalar w[4];
   Vec3<Scalar> way;      ///< slip, with its part along the normal [m]
   Vec3<Scalar> along{};  ///< the rod's tangent, without its part along the normal, where its direction counts
-  Vec3<Scalar> plain{};  ///< the force of the greater coefficient
+  Vec3<Scalar> plain{};  ///< the force of the greatest coefficient
   FrictionForce<Scalar> friction;
 };
 
@@ -291,7 +292,7 @@ Vec3<Scalar> rod_direction(const FrictionSetting& f, const SlippingSurfaces<Scal
   return w != nullptr && w->edges > 1 ? curve_direction(*w, c.node, c.s) : c.sides[0].edge;
 }
 
-/// Friction of the greater coefficient, as it is along and across the rod.
+/// Friction of the greatest coefficient, as it is along and across the rod.
 template <class Scalar>
 void direct_friction(const FrictionSetting& f, SlippingSurfaces<Scalar>& c) {
   using std::sqrt;
@@ -300,8 +301,9 @@ void direct_friction(const FrictionSetting& f, SlippingSurfaces<Scalar>& c) {
   const Vec3<Scalar> t = (1.0 / sqrt(dot(e, e))) * e;
   c.along = t - dot(t, c.normal) * c.normal;
   c.plain = c.friction.force;
-  c.friction.force =
-      Scalar(pair.across) * c.plain + (Scalar(pair.along - pair.across) * dot(c.along, c.plain)) * c.along;
+  const Scalar share = dot(c.along, c.plain);
+  const double more = pair.along(value_of(share)) - pair.across;
+  c.friction.force = Scalar(pair.across) * c.plain + (Scalar(more) * share) * c.along;
 }
 
 /// What of an edge's direction in the middle of the step lies along the mean of those at its ends.

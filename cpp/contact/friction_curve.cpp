@@ -118,10 +118,10 @@ void add_force_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& 
   });
 }
 
-/// From the force of the greater coefficient to that of `direct_friction`.
+/// From the force of the greatest coefficient to that of `direct_friction`.
 void direct_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, const Curve& curve, const Vec3d (&x)[3],
                    Slopes& d) {
-  const double across = f.pair->across, more = f.pair->along - across, share = dot(c.along, c.plain);
+  const double share = dot(c.along, c.plain), across = f.pair->across, more = f.pair->along(share) - across;
   const Vec3d e = rod_direction(f, c), &n = c.normal;
   const double inverse = 1.0 / std::sqrt(dot(e, e));
   const Vec3d t = inverse * e;

@@ -87,13 +87,12 @@ Vec3d obstacle_arm_slope(const FrictionSetting& f, const SlippingSurfaces<double
   return d.t[j] * c.sides[1].edge + f.pair->radius_b * d.lever[j];
 }
 
-/// From the force of the greater coefficient to that of `direct_friction`; the normal of an obstacle turns by `lever`.
+/// From the force of the greatest coefficient to that of `direct_friction`; the normal of an obstacle turns by `lever`.
 void direct_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, Slopes& d) {
-  const double across = f.pair->across, more = f.pair->along - across;
+  const double share = dot(c.along, c.plain), across = f.pair->across, more = f.pair->along(share) - across;
   const Vec3d &e = c.sides[0].edge, &n = c.normal;
   const double inverse = 1.0 / std::sqrt(dot(e, e));
   const Vec3d t = inverse * e;
-  const double share = dot(c.along, c.plain);
   for (int j = 0; j < kWays; ++j) {
     const int k = j - kEdge[0];
     const Vec3d turned = k >= 0 && k < 3 ? inverse * (kAxis[k] - t[k] * t) : Vec3d{};

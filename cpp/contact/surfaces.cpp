@@ -66,7 +66,7 @@ void Surfaces::note_frictional() {
     rod = pair.rod_a;
     other = pair.key.b;
     const BodyFriction f = friction_of(rod, other);
-    frictional_ = f.along > 0.0 || f.across > 0.0 || p.obstacle_rolling(-1 - other) > 0.0;
+    frictional_ = f.coefficients.maxCoeff() > 0.0 || p.obstacle_rolling(-1 - other) > 0.0;
   }
 }
 
@@ -80,12 +80,12 @@ bool Surfaces::set_parameters(const SurfaceParameters& parameters) {
 
 Surfaces::BodyFriction Surfaces::friction_of(int rod, int other) const {
   const SurfaceParameters& p = parameters_;
-  BodyFriction f{p.friction, p.friction, -1};
-  if (other < 0) f = {p.obstacle_friction(-1 - other, 0), p.obstacle_friction(-1 - other, 1), -1};
+  BodyFriction f{Eigen::RowVector3d::Constant(p.friction), -1};
+  if (other < 0) f.coefficients = p.obstacle_friction.row(-1 - other);
   const auto& pairs = model_.description.contact.pairs;
   for (Eigen::Index i = 0; i < p.pair_friction.rows(); ++i) {
     if (!pairs[static_cast<std::size_t>(i)].is_of(rod, other)) continue;
-    if (p.pair_friction(i, 0) >= 0.0) f = {p.pair_friction(i, 0), p.pair_friction(i, 1), f.given};
+    if (p.pair_friction(i, 0) >= 0.0) f.coefficients = p.pair_friction.row(i);
     if (p.pair_shares[static_cast<std::size_t>(i)].size() > 0) f.given = static_cast<int>(i);
   }
   return f;
@@ -106,7 +106,8 @@ void Surfaces::set_parameters(ContactPair& pair) const {
   const int other = obstacle ? pair.key.b : pair.rod_b;
   const BodyFriction f = friction_of(pair.rod_a, other);
   const double share = f.given < 0 || !obstacle ? 1.0 : p.pair_shares[at(f.given)](place_along(pair));
-  pair.set_friction(share * f.along, share * f.across);
+  const Eigen::RowVector3d friction = share * f.coefficients;
+  pair.set_friction(friction(0), friction(1), friction(2));
   pair.rolling = obstacle ? p.obstacle_rolling(-1 - other) : 0.0;
   pair.restitution = obstacle ? p.obstacle_restitution(-1 - other) : p.restitution;
   pair.stiffness = 0.0;
@@ -130,7 +131,7 @@ FrictionOwner Surfaces::friction_owner(const ContactPair& pair) const {
   FrictionOwner out;
   if (pair.key.b < 0) out.obstacle = -1 - pair.key.b;
   const int other = pair.key.b < 0 ? pair.key.b : pair.rod_b;
-  const MatrixX2& own = parameters_.pair_friction;
+  const MatrixX3& own = parameters_.pair_friction;
   const auto& pairs = model_.description.contact.pairs;
   for (Eigen::Index i = 0; i < own.rows(); ++i)
     if (pairs[static_cast<std::size_t>(i)].is_of(pair.rod_a, other) && own(i, 0) >= 0.0) out.pair = i;

@@ -1,6 +1,7 @@
 #pragma once
 /// What may touch what: radii, obstacles in the model's own axes, and pairs that are left out. Built once.
 
+#include <algorithm>
 #include <vector>
 
 #include "contact/curve.hpp"
@@ -27,8 +28,9 @@ struct ContactPair {
   double tolerance = 0;               ///< delta [m]
   double weight_a = 0, weight_b = 0;  ///< of closest_points [m^2]
   double share = 1;                   ///< of a contact's stiffness
-  double friction = 0;                ///< [-]; the greater one, where it is not the same along and across a rod
-  double along = 1, across = 1;       ///< that in these directions of a, over it
+  double friction = 0;                ///< [-]; the greatest one, where it is not the same in all directions
+  double forward = 1, backward = 1;   ///< that of a rod a that slides towards its end, and its start, over it
+  double across = 1;                  ///< that of one that slides across itself, over it
   double rolling = 0;                 ///< coefficient of rolling friction, over a's radius [-]
   double stiffness = 0;               ///< of its own [N/m]; 0: none
   double restitution = 1;             ///< [-]
@@ -38,11 +40,15 @@ struct ContactPair {
   double nearest() const { return kNearest * radii(); }
   double small_radius() const { return rod_b < 0 || radius_a < radius_b ? radius_a : radius_b; }
   bool curve() const { return piece.weights != nullptr; }
-  bool isotropic() const { return along == across; }
+  bool isotropic() const { return forward == across && backward == across; }
+  /// That along a rod that slides by so much towards its end, over `friction`.
+  double along(double slip) const { return slip >= 0.0 ? forward : backward; }
   bool rubs() const { return friction > 0.0 || rolling > 0.0; }
-  void set_friction(double mu_along, double mu_across) {
-    friction = mu_along > mu_across ? mu_along : mu_across;
-    along = friction > 0.0 ? mu_along / friction : 1.0;
+  /// Coefficients as in `SurfaceParameters::obstacle_friction`.
+  void set_friction(double mu_forward, double mu_backward, double mu_across) {
+    friction = std::max({mu_forward, mu_backward, mu_across});
+    forward = friction > 0.0 ? mu_forward / friction : 1.0;
+    backward = friction > 0.0 ? mu_backward / friction : 1.0;
     across = friction > 0.0 ? mu_across / friction : 1.0;
   }
 };
@@ -102,10 +108,9 @@ class Surfaces {
   void add_pieces(const ContactPair& prototype, const Obstacle& obstacle, int rod);
   /// Whether an obstacle is large enough to be touched by a curve.
   bool smooth(const Obstacle& obstacle, int edge) const;
-  /// Coefficients of two bodies along and across a, wherever they touch; and the place of their pair among those given,
-  /// or -1.
+  /// Coefficients of two bodies wherever they touch; and the place of their pair among those given, or -1.
   struct BodyFriction {
-    double along, across;
+    Eigen::RowVector3d coefficients;
     int given;
   };
   BodyFriction friction_of(int rod, int other) const;

@@ -17,7 +17,7 @@ struct ParameterGradient {
   MatrixX3 loads;
   VectorX spring_stiffness, spring_rest_length, spring_damping;
   double fluid_viscosity = 0, friction = 0, slip_tolerance = 0;
-  MatrixX2 obstacle_friction, pair_friction;
+  MatrixX3 obstacle_friction, pair_friction;
   VectorX obstacle_rolling;
   MatrixX6 hand_stiffness;  ///< per support, see `HandDescription`
   VectorX hand_limit;

@@ -176,8 +176,7 @@ struct ObstacleDescription {
 struct ContactPairDescription {
   int first = 0, second = 0;
   bool ignored = false;
-  double friction = -1;  ///< coefficient [-], of a rod and an obstacle that along the rod; negative: that of the scene
-  double across = -1;    ///< of a rod and an obstacle, across the rod [-]; negative: as `friction` says
+  Vector3 friction = -Vector3::Ones();  ///< as in `ContactDescription::obstacle_friction`; negative: that of the scene
   double stiffness = 0;  ///< [N/m]; 0: that of the scene
   double restitution = -1;  ///< coefficient [-]; negative: that of the scene
   VectorX shares;  ///< of a rod and an obstacle: what its nodes, then its edges, rub with, over these coefficients [-];
@@ -189,8 +188,7 @@ struct ContactPairDescription {
 struct ContactDescription {
   bool rods = false;             ///< whether rods touch each other and themselves
   double friction = 0;           ///< coefficient between rods [-]
-  VectorX obstacle_friction;     ///< per obstacle, along rods [-]
-  VectorX obstacle_across;       ///< per obstacle, across rods [-]; empty: as along them
+  MatrixX3 obstacle_friction;    ///< per obstacle, of rods that slide towards their end, their start, across [-]
   VectorX obstacle_rolling;      ///< per obstacle, of rolling friction over a rod's radius [-]; empty: none
   double restitution = 1;        ///< coefficient between rods [-]
   VectorX obstacle_restitution;  ///< per obstacle [-]; empty: 1

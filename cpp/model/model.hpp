@@ -110,10 +110,10 @@ struct SurfaceParameters {
   double slip_tolerance = 1e-3;      ///< nu [m/s]
   double restitution = 1;            ///< between rods [-]
   double contact_stiffness = 0;      ///< [N/m]; 0: found by the rule
-  MatrixX2 obstacle_friction;        ///< per obstacle, along and across rods [-]
+  MatrixX3 obstacle_friction;        ///< per obstacle, of rods that slide towards their end, their start, across [-]
   VectorX obstacle_rolling;          ///< per obstacle, of rolling friction over a rod's radius [-]
   VectorX obstacle_restitution;      ///< per obstacle [-]
-  MatrixX2 pair_friction;            ///< per pair, along and across; negative: that of its bodies [-]
+  MatrixX3 pair_friction;            ///< per pair, the same; negative: that of its bodies [-]
   std::vector<VectorX> pair_shares;  ///< per pair, see `ContactPairDescription::shares`
   VectorX pair_restitution;          ///< per pair; negative: that of its bodies [-]
   VectorX pair_contact_stiffness;    ///< per pair; 0: that of the scene [N/m]

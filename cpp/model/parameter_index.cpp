@@ -38,10 +38,10 @@ constexpr std::array<ParameterInfo, 28> kIndex{{
     {slip_tolerance, "slip_tolerance", Extent::scene, 1, "m/s", Range::positive, Derived::nothing},
     {restitution, "restitution", Extent::scene, 1, "-", Range::non_negative, Derived::nothing},
     {contact_stiffness, "contact_stiffness", Extent::scene, 1, "N/m", Range::non_negative, Derived::nothing},
-    {obstacle_friction, "obstacle_friction", Extent::obstacle, 2, "-", Range::non_negative, Derived::nothing},
+    {obstacle_friction, "obstacle_friction", Extent::obstacle, 3, "-", Range::non_negative, Derived::nothing},
     {obstacle_rolling, "obstacle_rolling", Extent::obstacle, 1, "-", Range::non_negative, Derived::nothing},
     {obstacle_restitution, "obstacle_restitution", Extent::obstacle, 1, "-", Range::non_negative, Derived::nothing},
-    {pair_friction, "pair_friction", Extent::pair, 2, "-", Range::any, Derived::nothing},
+    {pair_friction, "pair_friction", Extent::pair, 3, "-", Range::any, Derived::nothing},
     {pair_restitution, "pair_restitution", Extent::pair, 1, "-", Range::any, Derived::nothing},
     {pair_contact_stiffness, "pair_contact_stiffness", Extent::pair, 1, "N/m", Range::non_negative, Derived::nothing},
 }};

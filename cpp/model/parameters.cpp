@@ -107,22 +107,20 @@ void set_contact(const ContactDescription& contact, Parameters& parameters) {
   p.slip_tolerance = contact.slip_tolerance;
   p.restitution = contact.restitution;
   p.contact_stiffness = contact.stiffness;
-  p.obstacle_friction.resize(contact.obstacle_friction.size(), 2);
-  p.obstacle_friction.col(0) = contact.obstacle_friction;
-  p.obstacle_friction.col(1) = contact.obstacle_across.size() > 0 ? contact.obstacle_across : contact.obstacle_friction;
+  p.obstacle_friction = contact.obstacle_friction;
   p.obstacle_rolling = contact.obstacle_rolling;
   if (p.obstacle_rolling.size() == 0) p.obstacle_rolling.setZero(static_cast<Eigen::Index>(contact.obstacles.size()));
   p.obstacle_restitution = contact.obstacle_restitution;
   if (p.obstacle_restitution.size() == 0)
     p.obstacle_restitution.setOnes(static_cast<Eigen::Index>(contact.obstacles.size()));
   const auto pairs = static_cast<Eigen::Index>(contact.pairs.size());
-  p.pair_friction.resize(pairs, 2);
+  p.pair_friction.resize(pairs, 3);
   p.pair_shares.resize(contact.pairs.size());
   p.pair_restitution.resize(pairs);
   p.pair_contact_stiffness.resize(pairs);
   for (Eigen::Index i = 0; i < pairs; ++i) {
     const ContactPairDescription& pair = contact.pairs[static_cast<std::size_t>(i)];
-    p.pair_friction.row(i) << pair.friction, pair.across >= 0.0 ? pair.across : pair.friction;
+    p.pair_friction.row(i) = pair.friction;
     p.pair_shares[static_cast<std::size_t>(i)] = pair.shares;
     p.pair_restitution(i) = pair.restitution;
     p.pair_contact_stiffness(i) = pair.stiffness;

@@ -11,16 +11,17 @@ namespace {
 void add_coefficients(const ContactProblem& problem, const ContactPair& pair, const ContactAdjoint& by,
                       CoefficientAdjoint& out) {
   const FrictionOwner owner = problem.surfaces->friction_owner(pair);
+  const Eigen::RowVector3d by_friction(by.friction[0], by.friction[1], by.friction[2]);
   out.slip_tolerance += by.slip_tolerance;
   out.gravity_size += by.gravity;
   problem.add_mass_slopes(pair, by.mass, out.edge_mass);
   if (pair.key.b < 0) out.obstacle_rolling(-1 - pair.key.b) += by.rolling;
   if (owner.pair >= 0)
-    out.pair_friction.row(owner.pair) += Eigen::RowVector2d(by.along, by.across);
+    out.pair_friction.row(owner.pair) += by_friction;
   else if (owner.obstacle >= 0)
-    out.obstacle_friction.row(owner.obstacle) += Eigen::RowVector2d(by.along, by.across);
+    out.obstacle_friction.row(owner.obstacle) += by_friction;
   else
-    out.friction += by.along + by.across;
+    out.friction += by_friction.sum();
 }
 
 /// Contact is as it is where rods and an obstacle are elsewhere by the same: derivatives by the obstacle's place are

@@ -25,7 +25,7 @@ struct CoefficientAdjoint {
   double gravity_size = 0;                                       ///< of contacts, by that of gravity [s^2/m]
   double fluid_viscosity = 0;                                    ///< [1/(Pa s)]
   double friction = 0, slip_tolerance = 0;                       ///< of the scene [-], [s/m]
-  MatrixX2 obstacle_friction, pair_friction;                     ///< per obstacle, per pair of bodies [-]
+  MatrixX3 obstacle_friction, pair_friction;                     ///< per obstacle, per pair of bodies [-]
   VectorX obstacle_rolling;                                      ///< per obstacle [-]
   MatrixX6 hand_stiffness;                  ///< per support, see `HandDescription` [m/N], [rad/(N m)]
   VectorX hand_limit;                       ///< per support [1/N]
@@ -56,8 +56,8 @@ struct CoefficientAdjoint {
         spring_rest_length(spring_stiffness),
         spring_damping(spring_stiffness),
         edge_mass(stretch_stiffness),
-        obstacle_friction(rows_of_two(model.description.contact.obstacles.size())),
-        pair_friction(rows_of_two(model.description.contact.pairs.size())),
+        obstacle_friction(rows_of_three(model.description.contact.obstacles.size())),
+        pair_friction(rows_of_three(model.description.contact.pairs.size())),
         obstacle_rolling(VectorX::Zero(obstacle_friction.rows())),
         hand_stiffness(MatrixX6::Zero(static_cast<Eigen::Index>(model.supports.size()), 6)),
         hand_limit(VectorX::Zero(static_cast<Eigen::Index>(model.supports.size()))),
@@ -70,6 +70,7 @@ struct CoefficientAdjoint {
 
  private:
   static MatrixX2 rows_of_two(std::size_t count) { return MatrixX2::Zero(static_cast<Eigen::Index>(count), 2); }
+  static MatrixX3 rows_of_three(std::size_t count) { return MatrixX3::Zero(static_cast<Eigen::Index>(count), 3); }
 };
 
 /// Derivatives of a scalar by where hands are, and by how far what yielding ones hold has slipped in them.

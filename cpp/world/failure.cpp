@@ -117,29 +117,12 @@ Warnings World::take_warnings() {
   return {take(self.mesh_warning), take(self.step_warning), take(self.branch_warning), take(self.plane_warning)};
 }
 
-/// What to try where something has turned by nearly half a turn in a hand that yields, whose moment has no bound there.
-std::string World::Implementation::overturned() const {
-  constexpr double kNearlyHalf = 170.0;  // [degrees]
-  if (!equations->hands()) return "";
-  const Configuration& c = configuration();
-  for (std::size_t s = 0; s < model.supports.size(); ++s) {
-    if (!model.supports[s].active || !model.supports[s].yields()) continue;
-    const double turn = hand_deflection(model, state, c, static_cast<int>(s)).turn.norm() * 180.0 / std::numbers::pi;
-    if (turn > kNearlyHalf)
-      return "Try a hand of more stiffness about its axes: what it holds" +
-             place_of_node(model.edge_tail[at(model.supports[s].touched.front().edge)]).words + " has turned by " +
-             text(turn, 3) + " degrees in it, and it yields by less than half a turn";
-  }
-  return "";
-}
-
 /// What may help where steps do not converge, by what is the matter; one sentence.
 std::string World::Implementation::what_to_try() const {
   if (options.integrator == Integrator::verlet)
     return "Try a smaller time_step, or an implicit integrator, which takes longer ones";
   if (!unresolved().empty()) return "Try more nodes there, or a gentler load or motion";
   if (!crushed().empty()) return "Try a smaller load, a slower motion, or a rod that stretches less easily";
-  if (std::string found = overturned(); !found.empty()) return found;
   if (!options.adaptive && !options.tolerance) return "Try adaptive=True, or a smaller time_step";
   const VectorX& stretch = parameters.edge_stretch;
   Eigen::Index soft = 0, stiff = 0;

@@ -250,7 +250,6 @@ struct World::Implementation : Running {
   std::string crushed() const;
   std::string unresolved() const;
   void check_resolution();
-  std::string overturned() const;
   std::string what_to_try() const;
   /// `hint`: what to try, where the caller knows better than `what_to_try`.
   [[noreturn]] void fail(const NewtonResult& newton, double dt, const std::string& what,

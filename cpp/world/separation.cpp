@@ -67,9 +67,11 @@ class Separation {
     ContactDescription& contact = scene.contact;
     contact.friction = 0.0;
     contact.obstacle_friction.setZero();
-    contact.obstacle_across.setZero();
     contact.obstacle_rolling.setZero();
-    for (ContactPairDescription& pair : contact.pairs) pair.friction = pair.across = pair.stiffness = 0.0;
+    for (ContactPairDescription& pair : contact.pairs) {
+      pair.friction.setZero();
+      pair.stiffness = 0.0;
+    }
     contact.law = ContactLaw::imcv2;  // finite where surfaces overlap
     contact.stiffness = 1.0;          // given: each step sets it
     return model;

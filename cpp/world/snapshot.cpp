@@ -9,7 +9,7 @@
 namespace withe {
 namespace {
 
-constexpr std::uint64_t kMagic = 0x4253454854495757ull;
+constexpr std::uint64_t kMagic = 0x4353454854495757ull;
 
 /// FNV-1a.
 std::uint64_t hash_of(std::string_view bytes) {
@@ -84,14 +84,13 @@ void write_contact(Writer& w, const ContactDescription& contact) {
   for (double x : {contact.friction, contact.slip_tolerance, contact.restitution, contact.stiffness}) w(x);
   w(contact.obstacle_restitution);
   w(contact.obstacle_friction);
-  for (const VectorX* each : {&contact.obstacle_across, &contact.obstacle_rolling}) {
-    w(static_cast<std::int64_t>(each->size()));
-    w(*each);
-  }
+  w(static_cast<std::int64_t>(contact.obstacle_rolling.size()));
+  w(contact.obstacle_rolling);
   w(static_cast<std::int64_t>(contact.pairs.size()));
   for (const ContactPairDescription& p : contact.pairs) {
     w(p.first), w(p.second), w(p.ignored);
-    for (double x : {p.friction, p.across, p.stiffness, p.restitution}) w(x);
+    w(p.friction);
+    for (double x : {p.stiffness, p.restitution}) w(x);
     w(static_cast<std::int64_t>(p.shares.size()));
     w(p.shares);
   }
@@ -103,18 +102,17 @@ ContactDescription read_contact(Reader& r, ContactDescription contact) {
   r(contact.obstacle_restitution);
   r(contact.obstacle_friction);
   std::int64_t count = 0;
-  for (VectorX* each : {&contact.obstacle_across, &contact.obstacle_rolling}) {
-    r(count);
-    require(count == 0 || count == contact.obstacle_friction.size(), "snapshot is damaged: impossible friction");
-    each->resize(count);
-    r(*each);
-  }
+  r(count);
+  require(count == 0 || count == contact.obstacle_friction.rows(), "snapshot is damaged: impossible friction");
+  contact.obstacle_rolling.resize(count);
+  r(contact.obstacle_rolling);
   r(count);
   require(count >= 0 && count < 1 << 20, "snapshot is damaged: impossible number of pairs");
   contact.pairs.assign(static_cast<std::size_t>(count), {});
   for (ContactPairDescription& p : contact.pairs) {
     r(p.first), r(p.second), r(p.ignored);
-    for (double* x : {&p.friction, &p.across, &p.stiffness, &p.restitution}) r(*x);
+    r(p.friction);
+    for (double* x : {&p.stiffness, &p.restitution}) r(*x);
     r(count);
     require(count >= 0 && count < 1 << 28, "snapshot is damaged: impossible friction");
     p.shares.resize(count);

@@ -192,14 +192,13 @@ std::pair<Eigen::Index, Eigen::Index> World::Implementation::load_rows(int load)
 namespace {
 
 void check_contact(const ContactDescription& contact, const ContactDescription& own) {
-  const auto valid = [](const VectorX& v) { return v.size() == 0 || (v.allFinite() && v.minCoeff() >= 0.0); };
+  const auto valid = [](const auto& v) { return v.size() == 0 || (v.allFinite() && v.minCoeff() >= 0.0); };
   const auto share = [](double x) { return x >= 0.0 && x <= 1.0; };
-  require(contact.obstacle_friction.size() == own.obstacle_friction.size() &&
-              (contact.obstacle_across.size() == 0 || contact.obstacle_across.size() == own.obstacle_friction.size()) &&
-              (contact.obstacle_rolling.size() == 0 || contact.obstacle_rolling.size() == own.obstacle_friction.size()),
-          "friction needs one coefficient an obstacle");
+  require(contact.obstacle_friction.rows() == own.obstacle_friction.rows() &&
+              (contact.obstacle_rolling.size() == 0 || contact.obstacle_rolling.size() == own.obstacle_friction.rows()),
+          "friction needs three coefficients an obstacle, and rolling friction one");
   require(std::isfinite(contact.friction) && contact.friction >= 0.0 && valid(contact.obstacle_friction) &&
-              valid(contact.obstacle_across) && valid(contact.obstacle_rolling),
+              valid(contact.obstacle_rolling),
           "friction must not be negative");
   require(std::isfinite(contact.slip_tolerance) && contact.slip_tolerance > 0.0, "slip_tolerance must be positive");
   require(contact.obstacle_restitution.size() == own.obstacle_restitution.size(),
@@ -221,7 +220,6 @@ void World::set_contact(const ContactDescription& contact) {
   wanted.friction = contact.friction;
   wanted.slip_tolerance = contact.slip_tolerance;
   wanted.obstacle_friction = contact.obstacle_friction;
-  wanted.obstacle_across = contact.obstacle_across;
   wanted.obstacle_rolling = contact.obstacle_rolling;
   wanted.restitution = contact.restitution;
   wanted.obstacle_restitution = contact.obstacle_restitution;

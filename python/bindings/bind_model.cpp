@@ -72,7 +72,6 @@ void register_contact(py::module_& module) {
       .def_readwrite("second", &ContactPairDescription::second)
       .def_readwrite("ignored", &ContactPairDescription::ignored)
       .def_readwrite("friction", &ContactPairDescription::friction)
-      .def_readwrite("across", &ContactPairDescription::across)
       .def_readwrite("stiffness", &ContactPairDescription::stiffness)
       .def_readwrite("restitution", &ContactPairDescription::restitution)
       .def_readwrite("shares", &ContactPairDescription::shares);
@@ -81,7 +80,6 @@ void register_contact(py::module_& module) {
       .def_readwrite("rods", &ContactDescription::rods)
       .def_readwrite("friction", &ContactDescription::friction)
       .def_readwrite("obstacle_friction", &ContactDescription::obstacle_friction)
-      .def_readwrite("obstacle_across", &ContactDescription::obstacle_across)
       .def_readwrite("obstacle_rolling", &ContactDescription::obstacle_rolling)
       .def_readwrite("restitution", &ContactDescription::restitution)
       .def_readwrite("obstacle_restitution", &ContactDescription::obstacle_restitution)

@@ -182,7 +182,7 @@ SceneDescription tangle(RandomNumbers& random) {
   ball.point = ball.other = Vector3(0.5, -0.4, 0.1);
   ball.radius = 0.2;
   builder.scene.contact.obstacles.push_back(ball);
-  builder.scene.contact.obstacle_friction = VectorX::Zero(1);
+  builder.scene.contact.obstacle_friction = MatrixX3::Zero(1, 3);
   builder.scene.contact.obstacle_restitution = VectorX::Ones(1);
   return builder.scene;
 }
@@ -332,7 +332,7 @@ TEST(Contact, ReadOutsChangeNoBitOfWhatFollows) {
       scene.contact.friction = 0.4;
       scene.contact.restitution = 0.5;
       scene.contact.friction_law = law;
-      scene.contact.obstacle_friction = VectorX::Constant(1, 0.3);
+      scene.contact.obstacle_friction = MatrixX3::Constant(1, 3, 0.3);
       const Model model = build_model(scene, std::nullopt);
       const Parameters parameters = initial_parameters(model);
       State state = initial_state(model), other = state;

@@ -71,7 +71,10 @@ void slip(RandomNumbers& random, const Vec3d (&x)[4], Touch& c) {
   }
   if (!rods) f.drift = 0.05 * random_point(random, planar);
   if (!rods) f.turn = planar ? Vec3d{0.0, 0.0, 0.2 * random.normal()} : 0.2 * random_point(random, planar);
-  if (!rods) c.pair.set_friction(0.4, random.normal() > 0.0 ? 0.4 : 0.15);
+  if (!rods) {
+    const auto drawn = [&random] { return random.normal() > 0.0 ? 0.4 : 0.15; };
+    c.pair.set_friction(drawn(), drawn(), 0.4);
+  }
   f.stick = 0.03 * random_point(random, planar);
   if (planar) return;
   for (int b : {0, 1}) {

@@ -71,7 +71,7 @@ std::vector<Named> touching_scenes() {
     add_rod(b, Vector3(-0.5, 0, 0.25), Vector3(0.5, 0, 0.35), 3);
     if (planar) b.scene.gravity = Vector3(0.5, 0, -3);
     b.scene.contact.obstacles.push_back(o);
-    b.scene.contact.obstacle_friction = VectorX::Constant(1, 0.6);
+    b.scene.contact.obstacle_friction = MatrixX3::Constant(1, 3, 0.6);
     scenes.push_back({name, b.scene});
   };
   obstacle("plane", {ObstacleKind::plane, Vector3::Zero(), Vector3(0.1, 0.2, 1).normalized(), 0, ""}, false);

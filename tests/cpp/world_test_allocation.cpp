@@ -135,7 +135,7 @@ World rubbing_world(SceneBuilder builder, const Rubbing& rubbing, Integrator int
   ContactDescription& contact = builder.scene.contact;
   contact.friction = rubbing.friction;
   contact.friction_law = rubbing.law;
-  contact.obstacle_friction = VectorX::Constant(1, rubbing.friction);
+  contact.obstacle_friction = MatrixX3::Constant(1, 3, rubbing.friction);
   contact.obstacle_restitution = VectorX::Ones(1);
   return World(builder.scene, testing::options(integrator, integrator == Integrator::verlet ? 2e-5 : 2e-3));
 }
@@ -192,7 +192,7 @@ TEST(Step, ThatIsRepeatedWithStifferContactDoesNotAllocateAfterWarmUp) {
   for (StiffnessRule rule : {StiffnessRule::forces, StiffnessRule::source}) {
     SceneBuilder builder = lying(floor_at(0.0), false);
     builder.scene.contact.stiffness_rule = rule;
-    builder.scene.contact.obstacle_friction = VectorX::Zero(1);
+    builder.scene.contact.obstacle_friction = MatrixX3::Zero(1, 3);
     builder.scene.contact.obstacle_restitution = VectorX::Ones(1);
     const int push = builder.load(LoadKind::force, {0, 8}, Vector3::Zero());
     World world(builder.scene, testing::options(Integrator::backward_euler, 2e-3));

@@ -71,7 +71,7 @@ SceneDescription landing(double friction) {
   contact.rods = true;
   contact.friction = friction;
   contact.obstacles.emplace_back();
-  contact.obstacle_friction = VectorX::Constant(1, friction);
+  contact.obstacle_friction = MatrixX3::Constant(1, 3, friction);
   contact.obstacle_restitution = VectorX::Ones(1);
   return builder.scene;
 }

@@ -1,4 +1,4 @@
-"""Friction along and across a rod: the force of the model, that it only takes, and the gait of a snake."""
+"""Friction along a rod, either way, and across it: the force of the model, that it only takes, and gaits."""
 
 import numpy as np
 import pytest
@@ -9,6 +9,7 @@ import withe
 
 GRAVITY, RADIUS, DENSITY = 9.81, 5e-3, 1000.0
 ALONG, ACROSS = 0.1, 0.35
+FORWARD, BACKWARD = 0.1, 0.5
 WEIGHT = DENSITY * np.pi * RADIUS**2 * GRAVITY  # [N/m]
 
 
@@ -73,7 +74,7 @@ def test_it_only_takes(friction_model):
     """From rods that are thrown onto a floor, turning: what is left and lost never grows."""
     random = np.random.default_rng(3)
     for _ in range(3):
-        rod, scene = lying(0.2, 8, (ACROSS, ALONG) if random.random() < 0.5 else (ALONG, ACROSS), 1e6, friction_model)
+        rod, scene = lying(0.2, 8, tuple(random.permutation((ALONG, ACROSS, 0.7))), 1e6, friction_model)
         simulation = scene.build(time_step=1e-3, integrator="backward_euler")
         x = simulation.positions(rod)
         turn = random.normal(0, 3)
@@ -88,7 +89,58 @@ def test_it_only_takes(friction_model):
         assert simulation.energy().kinetic < kinetic
 
 
-def snake_speed(length, amplitude, waves, period, along, across, points=200):
+@pytest.mark.parametrize("friction_model", ["anchored", "implicit"])
+@pytest.mark.parametrize(("way", "friction"), [(1.0, FORWARD), (-1.0, BACKWARD)])
+def test_a_rod_slides_towards_its_end_and_its_start_by_a_friction_each(way, friction, friction_model):
+    rod, scene = lying(0.1, 6, (FORWARD, BACKWARD, ACROSS), friction_model=friction_model)
+    simulation = scene.build(time_step=1e-3)
+    simulation.run(0.1, progress=False)
+    start, speed = simulation.positions(rod).mean(axis=0), 0.4
+    simulation.set_velocities(rod, (way * speed, 0, 0))
+    simulation.run(1.2 * speed / (FORWARD * GRAVITY), progress=False)
+    slid = (simulation.positions(rod).mean(axis=0) - start)[0]
+    assert slid == pytest.approx(way * speed**2 / (2.0 * friction * GRAVITY), rel=5e-3)
+
+
+@pytest.mark.parametrize(("way", "holds"), [(1.0, False), (-1.0, True)])
+def test_a_slope_holds_a_rod_the_one_way_only(way, holds):
+    slope = 0.25
+    scene = withe.Scene()
+    down = np.array((np.cos(slope), 0.0, -np.sin(slope)))
+    normal = np.array((np.sin(slope), 0.0, np.cos(slope)))
+    ends = 0.1 * np.outer((-0.5, 0.5), way * down) + RADIUS * normal
+    rod = scene.add_rod(
+        start=ends[0],
+        end=ends[1],
+        nodes=6,
+        radius=RADIUS,
+        material=withe.Material(youngs_modulus=1e7, density=DENSITY),
+    )
+    scene.add_plane((0, 0, 0), normal, friction=(FORWARD, BACKWARD, 1.0))
+    simulation = scene.build(time_step=1e-3)
+    simulation.run(0.3, progress=False)
+    slid = (simulation.positions(rod).mean(axis=0) - ends.mean(axis=0)) @ down
+    expected = 0.0 if holds else 0.5 * GRAVITY * (np.sin(slope) - FORWARD * np.cos(slope)) * 0.3**2
+    assert slid == pytest.approx(expected, rel=0.01, abs=2e-5)
+
+
+def test_a_worm_that_stretches_and_shortens_crawls_by_what_friction_differs():
+    """All of a body that stretches evenly and slowly slides, mu_b / (mu_f + mu_b) of it forward in either half of a
+    cycle: the middle goes by strain length (mu_b - mu_f) / (mu_b + mu_f) a cycle."""
+    length, strain, period = 0.2, 0.2, 1.0
+    rod, scene = lying(length, 41, (FORWARD, BACKWARD, 1.0), modulus=1e6, viscosity=1e3)
+    simulation = scene.build(time_step=5e-3, integrator="backward_euler")
+    middles = []
+    for _ in range(4):
+        middles.append(simulation.positions(rod)[:, 0].mean())
+        for stretch in (1.0 + strain, 1.0):
+            simulation.set_natural_stretch(rod, stretch, over=0.5 * period)
+            simulation.run(0.5 * period, progress=False)
+    step = strain * length * (BACKWARD - FORWARD) / (BACKWARD + FORWARD)
+    np.testing.assert_allclose(np.diff(middles)[1:], step, rtol=0.03)
+
+
+def snake_speed(length, amplitude, waves, period, forward, backward, across, points=200):
     """Mean velocity of the middle of a body of given curvature without inertia, for Coulomb friction along and across
     it [Hu et al. 2009, PNAS 106, eq. 1-3; Guo and Mahadevan 2008, PNAS 105]: forces and moment add up to nothing."""
     s = (np.arange(points) + 0.5) / points
@@ -107,7 +159,7 @@ def snake_speed(length, amplitude, waves, period, along, across, points=200):
         v = v + motion[:2, None] + motion[2] * np.stack([-x[1], x[0]]) / length
         v = v / np.sqrt((v**2).sum(axis=0) + (1e-4 * length / period) ** 2)
         part = (v * tangent).sum(axis=0)
-        f = along * part * tangent + across * (v - part * tangent)
+        f = np.where(part > 0.0, forward, backward) * part * tangent + across * (v - part * tangent)
         return (*f.mean(axis=1), (x[0] * f[1] - x[1] * f[0]).mean() / length)
 
     steps, motion, way, angle = 60, np.zeros(3), np.zeros(2), 0.0
@@ -120,7 +172,7 @@ def snake_speed(length, amplitude, waves, period, along, across, points=200):
     return way / period
 
 
-def crawl(friction):
+def crawl(*friction):
     length, nodes, period, waves, amplitude = 0.3, 31, 2.0, 1.0, 14.0
     rod, scene = lying(length, nodes, friction, modulus=3e6, viscosity=2e4)
     simulation = scene.build(time_step=1e-2, integrator="backward_euler")
@@ -139,13 +191,15 @@ def crawl(friction):
     return np.linalg.norm(ways[1] - ways[0]) / period, snake_speed(length, amplitude, waves, period, *friction)
 
 
-def test_a_snake_crawls_by_friction_that_is_greater_across():
-    speed, expected = crawl((0.1, 0.4))
+@pytest.mark.parametrize("friction", [(0.1, 0.1, 0.4), (0.1, 0.15, 0.2), (0.15, 0.1, 0.5)])
+def test_a_snake_crawls_by_friction_that_differs(friction):
+    """Scales resist one way more than the other; 1 : 1.5 : 2 are those of a snake of PyElastica's."""
+    speed, expected = crawl(*friction)
     assert np.linalg.norm(expected) > 0.01
     assert speed == pytest.approx(np.linalg.norm(expected), rel=0.05)
 
 
 def test_a_snake_stays_where_it_is_without():
-    speed, expected = crawl((0.2, 0.2))
+    speed, expected = crawl(0.2, 0.2, 0.2)
     assert np.linalg.norm(expected) < 2e-3
     assert speed < 3e-3

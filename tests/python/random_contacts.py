@@ -16,7 +16,7 @@ from gradient_scenes import TIGHT, move_with_directors
 
 MODULUS, DENSITY = 1e6, 1200.0
 ROUNDING = 1e-13  # of what is differentiated, in steps solved to 1e-13
-LAWS = ("none", "implicit", "lagged", "directed")
+LAWS = ("none", "implicit", "lagged", "directed", "scaly")
 INTEGRATORS = ("backward_euler", "implicit_midpoint", "energy_momentum")
 OBSTACLES = ("plane", "sphere", "capsule", "post", "rod")
 SUPPORTS = ("none", "none", "none", "frame", "edge", "pin", "hand", "yielding hand")
@@ -34,7 +34,8 @@ class Drawn:
         self.nodes, self.radius = int(random.integers(6, 13)), float(random.choice([5e-3, 1e-2]))
         self.tolerance = self.radius * float(random.choice([0.2, 0.4]))
         friction = 0.0 if self.law == "none" else float(random.uniform(0.1, 0.8))
-        self.friction = (friction, 1.7 * friction) if self.law == "directed" else friction
+        directions = {"directed": (1.0, 1.7), "scaly": (1.0, 1.4, 1.7)}.get(self.law)
+        self.friction = friction if directions is None else tuple(friction * share for share in directions)
         self.scene = withe.Scene()
         viscosity = float(random.choice([0.0, 100.0]))
         self.material = withe.Material(youngs_modulus=MODULUS, poisson_ratio=0.4, density=DENSITY, viscosity=viscosity)
@@ -110,7 +111,7 @@ class Drawn:
         self.scene.enable_contact(
             stiffness=float(random.choice([3e4, 2e5])),
             distance_tolerance=self.tolerance,
-            friction=0.0 if self.law == "directed" else self.friction,
+            friction=0.0 if self.law in ("directed", "scaly") else self.friction,
             slip_tolerance=self.slip_tolerance,
             friction_model="lagged" if self.law == "lagged" else "implicit",
         )
@@ -166,7 +167,7 @@ class Drawn:
             if self.support is None:
                 yield "initial_positions", places, lambda h: move_with_directors(sim, arm, h * way), 4e-8
         if len(found) > 6:
-            along = np.array((1.0, 0.7))[: np.size(self.friction)].reshape(np.shape(self.friction))
+            along = np.array((1.0, 0.7, -0.4))[: np.size(self.friction)].reshape(np.shape(self.friction))
             now, first = np.asarray(self.friction), self.obstacles[0]
             yield "friction", np.sum(found[6] * along), lambda h: sim.set(first, friction=now + h * along), 1e-5
 

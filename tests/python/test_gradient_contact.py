@@ -7,7 +7,7 @@ import withe
 from gradient_scenes import NODES, TIGHT, difference, move_with_directors
 
 CONTACTS = ("floor", "slope in a plane", "sphere", "capsule", "post", "crossing", "floor lying", "floor slowly")
-FRICTIONS = ("none", "implicit", "lagged", "directed", "rolling")
+FRICTIONS = ("none", "implicit", "lagged", "directed", "scaly", "rolling")
 INTEGRATORS = ("backward_euler", "implicit_midpoint", "energy_momentum")
 
 
@@ -29,7 +29,7 @@ class Touching:
         points = np.stack([0.3 * s, 0.0 * s if self.planar else 0.02 * np.sin(3.0 * s), low + 0.03 * s * (1 - s)], 1)
         self.arm = scene.add_rod(points=points, radius=1e-2, material=material, name="arm")
         scene.add_drag(0.1)
-        rubs = {"none": 0.0, "directed": (0.3, 0.5)}.get(friction, 0.4)
+        rubs = {"none": 0.0, "directed": (0.3, 0.5), "scaly": (0.3, 0.4, 0.5)}.get(friction, 0.4)
         self.other = None
         self.rolling = 0.5 if friction == "rolling" else 0.0
         kept = {"friction": rubs, "rolling_friction": self.rolling}
@@ -83,7 +83,7 @@ class Touching:
         yield "slip_tolerance", self.tolerance, lambda h: sim.set(None, slip_tolerance=self.tolerance * (1.0 + h)), 1e-4
         if self.rubs == 0.0:
             return
-        rubs, way = np.asarray(self.rubs), np.array([1.0, 0.7])[: np.size(self.rubs)].reshape(np.shape(self.rubs))
+        rubs, way = np.asarray(self.rubs), np.array([1.0, 0.7, -0.4])[: np.size(self.rubs)].reshape(np.shape(self.rubs))
         if self.other is None:
             yield "friction", 1.0, lambda h: sim.set(None, friction=rubs + h), 1e-5
         else:
@@ -120,7 +120,7 @@ def check(touching, *, seed=8, rel=1e-5, **kept):
 @pytest.mark.parametrize("kind", CONTACTS)
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_gradient_of_a_run_through_contact_is_that_of_differences(integrator, kind, friction):
-    if friction in ("directed", "rolling") and kind == "crossing":
+    if friction in ("directed", "scaly", "rolling") and kind == "crossing":
         pytest.skip("friction of two rods has no directions, and they roll freely on each other")
     check(Touching(kind, friction, integrator))
 

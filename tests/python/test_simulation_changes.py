@@ -133,7 +133,7 @@ def test_friction_of_a_pair_and_of_rods_is_set_while_running():
     simulation.set_friction("block", "block", 0.2)
 
 
-@pytest.mark.parametrize("friction", [0.1, (0.3, 0.1), np.linspace(0.1, 0.3, 5)])
+@pytest.mark.parametrize("friction", [0.1, (0.3, 0.1), (0.1, 0.3, 0.2), np.linspace(0.1, 0.3, 5)])
 def test_friction_of_a_pair_is_read_as_it_acts_from_copies_pickles_files_and_batches(friction, tmp_path):
     _, _, scene = sliding(0.4, rods=0.2)
     simulation = scene.build(time_step=1e-3)
@@ -153,6 +153,16 @@ def test_friction_of_a_pair_is_read_as_it_acts_from_copies_pickles_files_and_bat
         twin.restore(before)
         assert twin.get(("block", "floor"), "friction") == 0.4
         assert twin.get(("block", "block"), "friction") == 0.2
+
+
+def test_three_coefficients_of_a_rod_of_three_edges_are_directions_as_a_tuple_and_edges_as_an_array():
+    scene = withe.Scene()
+    block = scene.add_rod(start=(0, 0, 5e-3), end=(0.1, 0, 5e-3), nodes=4, radius=5e-3, material=RUBBER, name="block")
+    floor = scene.add_floor()
+    simulation = scene.build()
+    for friction in ((0.1, 0.2, 0.3), np.array((0.1, 0.2, 0.3))):
+        simulation.set_friction(block, floor, friction)
+        assert type(simulation.get((block, floor), "friction")) is type(friction)
 
 
 def test_friction_along_a_rod_stays_its_own_where_the_floor_has_a_field(tmp_path):
@@ -186,7 +196,8 @@ def test_a_file_of_a_field_of_friction_needs_the_field(tmp_path):
     ("call", "message"),
     [
         (lambda s: s.set("floor", friction=-1), "friction of 'floor' must"),
-        (lambda s: s.set("floor", friction=(1, 2, 3)), "friction of 'floor' must"),
+        (lambda s: s.set("floor", friction=(1, 2, 3, 4)), "friction of 'floor' must"),
+        (lambda s: s.set("floor", friction=(0.1, -2, 0.1)), "friction of 'floor' towards its start must"),
         (lambda s: s.set("floor", friction=(0.1, -2)), "friction of 'floor' across must"),
         (lambda s: s.set("floor", radius=1), "obstacle 'floor' has no 'radius' to set; it has friction"),
         (lambda s: s.set_friction("floor", "floor", 0.1), "both obstacles"),

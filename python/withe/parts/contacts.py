@@ -162,16 +162,15 @@ def describe_contact(directory: Directory) -> _core.ContactDescription:
             )
     contact.obstacles = [_describe_obstacle(part) for part in obstacles]
     for part in obstacles:
-        check_law(part.friction.pair, settings.friction_model, f"friction of {part.name!r}")
+        check_law(part.friction.directions, settings.friction_model, f"friction of {part.name!r}")
         check_rolling(part.rolling_friction, settings.friction_model, part.name)
-    contact.obstacle_friction = np.array([part.friction.pair[0] for part in obstacles], dtype=float)
-    contact.obstacle_across = np.array([part.friction.pair[1] for part in obstacles], dtype=float)
+    contact.obstacle_friction = np.array([part.friction.directions for part in obstacles], dtype=float).reshape(-1, 3)
     contact.obstacle_rolling = np.array([part.rolling_friction for part in obstacles], dtype=float)
     contact.obstacle_restitution = np.array([part.restitution for part in obstacles], dtype=float)
     bodies = {rod.name: rod.index for rod in rods} | {part.name: -1 - i for i, part in enumerate(obstacles)}
     for (a, b), own in settings.pairs.items():
         if own.friction is not None:
-            check_law(own.friction.pair, settings.friction_model, f"friction of {a!r} and {b!r}")
+            check_law(own.friction.directions, settings.friction_model, f"friction of {a!r} and {b!r}")
     owned = {(bodies[a], bodies[b]): own for (a, b), own in settings.pairs.items()}
     pairs = [_pair(first, second, own) for (first, second), own in owned.items()]
     _vary_friction(pairs, owned, rods, obstacles)
@@ -196,7 +195,8 @@ def _pair(first: int, second: int, own: PairSettings) -> _core.ContactPairDescri
     pair = _core.ContactPairDescription()
     pair.first, pair.second = first, second
     pair.ignored = own.ignored
-    pair.friction, pair.across = (-1.0, -1.0) if own.friction is None else own.friction.pair
+    if own.friction is not None:
+        pair.friction = np.array(own.friction.directions)
     pair.stiffness = own.stiffness or 0.0
     pair.restitution = -1.0 if own.restitution is None else own.restitution
     return pair

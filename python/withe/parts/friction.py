@@ -1,4 +1,4 @@
-"""Friction coefficients: one for all directions, or one along a rod and one across it."""
+"""Friction coefficients: one for all directions, or others along a rod, either way, than across it."""
 
 from __future__ import annotations
 
@@ -14,20 +14,24 @@ from withe.parts.friction_fields import FrictionField, edge_shares, field_shares
 
 __all__ = [
     "Coefficients",
+    "Directions",
     "Friction",
     "as_given",
+    "by_given",
     "check_law",
     "check_rolling",
     "coefficients",
-    "friction_pair",
     "obstacle_friction",
+    "own_friction",
     "pair_between",
     "pair_in",
     "with_obstacle",
     "with_pair",
 ]
 
-Friction = float | tuple[float, float] | npt.NDArray[np.float64] | FrictionField
+Friction = float | tuple[float, float] | tuple[float, float, float] | npt.NDArray[np.float64] | FrictionField
+Directions = tuple[float, float, float]
+"""Coefficients of a rod that slides towards its end, towards its start, and across itself."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,15 +40,15 @@ class Coefficients:
 
     Attributes
     ----------
-    pair : (float, float)
-        Along and across a rod; 1 where they vary.
+    directions : (float, float, float)
+        See `Directions`; 1 where they vary.
     edges : ndarray of shape (edges,), or None
         Along the rod.
     field : callable, or None
         Over the obstacle.
     """
 
-    pair: tuple[float, float]
+    directions: Directions
     edges: npt.NDArray[np.float64] | None = None
     field: FrictionField | None = None
 
@@ -59,7 +63,7 @@ class Coefficients:
         """What a user gave."""
         if self.field is not None:
             return self.field
-        return as_given(self.pair) if self.edges is None else self.edges.copy()
+        return as_given(self.directions) if self.edges is None else self.edges.copy()
 
 
 def coefficients(
@@ -69,7 +73,7 @@ def coefficients(
 
     Parameters
     ----------
-    value : float, pair of float, array_like of shape (edges,), or callable
+    value : float, pair or tuple of three of float, array_like of shape (edges,), or callable
     what : str
         Named in errors.
     directed : bool
@@ -83,50 +87,61 @@ def coefficients(
         Negative, not finite, or more than a number where two rods meet.
     """
     if callable(value) and directed:
-        return Coefficients((1.0, 1.0), field=value)
-    if edges is not None and edges != 2 and np.ndim(value) == 1 and np.size(value) != 2:  # type: ignore[arg-type]
+        return Coefficients((1.0, 1.0, 1.0), field=value)
+    if edges is not None and _is_of_edges(value, edges):
         rows = validation.number_array(value, what, (edges,))
         if rows.min() < 0.0:
             raise ValueError(f"{what} must not be negative, got {rows.min():g} at edge {int(rows.argmin())}")
-        return Coefficients((1.0, 1.0), edges=rows)
-    return Coefficients(friction_pair(value, what, directed=directed))
+        return Coefficients((1.0, 1.0, 1.0), edges=rows)
+    return Coefficients(_directions(value, what, directed=directed))
 
 
-def friction_pair(value: Friction | npt.ArrayLike, what: str, *, directed: bool = True) -> tuple[float, float]:
-    """Coefficients along and across a rod.
+def _is_of_edges(value: object, edges: int) -> bool:
+    """Whether it is a coefficient for each edge, and none for each direction."""
+    size = np.size(value) if np.ndim(value) == 1 else 0  # type: ignore[arg-type]
+    if size == 3:
+        return edges == 3 and not isinstance(value, tuple)
+    return size > 0 and size != 2 and edges != 2
 
-    Parameters
-    ----------
-    value : float or pair of float
-    what : str
-        Named in errors.
-    directed : bool
-        Whether there is one rod whose directions are meant.
 
-    Raises
-    ------
-    ValueError
-        Negative, not a number, or a pair where two rods meet.
-    """
+def _directions(value: Friction | npt.ArrayLike, what: str, *, directed: bool) -> Directions:
+    """Coefficients of each direction: of a number, of two along and across a rod, or of three."""
     if validation.is_scalar(value) or value is None or isinstance(value, str):
-        both = validation.non_negative(value, what)
-        return both, both
+        same = validation.non_negative(value, what)
+        return same, same, same
     if not directed:
         raise ValueError(
             f"{what} must be one number: along and across are directions of a rod on an obstacle, got {value!r:.80}"
         )
+    if np.size(value) == 3:  # type: ignore[arg-type]
+        words = "towards the end of a rod", "towards its start", "across it"
+        numbers = validation.number_array(value, what, (3,))
+        forward, backward, across = map(validation.non_negative, numbers, (f"{what} {word}" for word in words))
+        return forward, backward, across
     along, across = validation.number_array(value, what, (2,))
-    return validation.non_negative(along, f"{what} along"), validation.non_negative(across, f"{what} across")
+    along = validation.non_negative(along, f"{what} along")
+    return along, along, validation.non_negative(across, f"{what} across")
 
 
-def as_given(pair: tuple[float, float]) -> float | tuple[float, float]:
-    """One number where both are the same."""
-    return pair[0] if pair[0] == pair[1] else pair
+def as_given(directions: Directions) -> float | tuple[float, float] | Directions:
+    """One number where all are the same, two where both ways along a rod are."""
+    forward, backward, across = directions
+    if forward != backward:
+        return directions
+    return across if forward == across else (forward, across)
 
 
-def check_law(pair: tuple[float, float], friction_model: str, what: str) -> None:
+def by_given(by_directions: npt.NDArray[np.float64], shape: tuple[int, ...]) -> npt.NDArray[np.float64]:
+    """Derivatives by coefficients as they were given, from those by each direction."""
+    forward, backward, across = by_directions
+    if shape == (3,):
+        return by_directions
+    return np.array((forward + backward, across)) if shape == (2,) else by_directions.sum()
+
+
+def check_law(directions: Directions, friction_model: str, what: str) -> None:
     """Refuse directions where friction is that of the step's start."""
-    if pair[0] != pair[1] and friction_model in ("lagged", "semi_explicit"):
+    if len(set(directions)) > 1 and friction_model in ("lagged", "semi_explicit"):
         raise ValueError(
             f"{what} along and across a rod must be the same with friction_model={friction_model!r}: take 'anchored' "
             "or 'implicit'"
@@ -141,34 +156,40 @@ def check_rolling(rolling_friction: float, friction_model: str, name: str) -> No
         )
 
 
-def obstacle_friction(contact: _core.ContactDescription, index: int) -> tuple[float, float]:
+def obstacle_friction(contact: _core.ContactDescription, index: int) -> Directions:
     """Present coefficients of an obstacle."""
-    across = contact.obstacle_across if len(contact.obstacle_across) else contact.obstacle_friction
-    return float(contact.obstacle_friction[index]), float(across[index])
+    forward, backward, across = map(float, contact.obstacle_friction[index])
+    return forward, backward, across
 
 
-def with_obstacle(contact: _core.ContactDescription, index: int, pair: tuple[float, float]) -> _core.ContactDescription:
+def own_friction(pair: _core.ContactPairDescription) -> Directions | None:
+    """What two bodies have of their own, if anything."""
+    forward, backward, across = map(float, pair.friction)
+    return (forward, backward, across) if forward >= 0.0 else None
+
+
+def with_obstacle(contact: _core.ContactDescription, index: int, directions: Directions) -> _core.ContactDescription:
     """The same with other coefficients of an obstacle."""
-    both = np.array([obstacle_friction(contact, i) for i in range(len(contact.obstacles))])
-    both[index] = pair
-    contact.obstacle_friction, contact.obstacle_across = both[:, 0], both[:, 1]
+    rows = np.array(contact.obstacle_friction)
+    rows[index] = directions
+    contact.obstacle_friction = rows
     return contact
 
 
 def with_pair(
     contact: _core.ContactDescription,
     bodies: tuple[int, int],
-    pair: tuple[float, float],
+    directions: Directions | None,
     shares: npt.NDArray[np.float64] | None = None,
 ) -> _core.ContactDescription:
     """The same with other coefficients of two bodies.
 
-    Bodies are rods by their index and obstacles by -1 - index; `shares` are what nodes and edges have of the
-    coefficients.
+    Bodies are rods by their index and obstacles by -1 - index; without directions they have those of the obstacle;
+    `shares` are what nodes and edges have of the coefficients.
     """
     pairs = list(contact.pairs)
     found = pair_in(pairs, bodies)
-    found.friction, found.across = pair
+    found.friction = np.full(3, -1.0) if directions is None else np.array(directions)
     found.shares = np.zeros(0) if shares is None else shares
     contact.pairs = pairs
     return contact

@@ -44,11 +44,12 @@ class Contacts:
         Parameters
         ----------
         height : float [m]
-        friction : float, pair of float, or callable
+        friction : float, pair or tuple of three of float, or callable
             Coefficient between the floor and every rod; see `set_friction` for single rods. Two coefficients are those
             along and across a rod, as of snakes and of bristles: for a slip in the direction s on rods with the tangent
             t, friction is the normal force times mu_along (s . t) t + mu_across (s - (s . t) t)
-            [Hu et al. 2009, PNAS 106]. A callable has friction vary over the floor: `f(points)`, points of shape (n, 3)
+            [Hu et al. 2009, PNAS 106]. Three are those of a rod that slides towards its end, towards its start, and
+            across itself: mu_along is the first or the second. A callable has friction vary over the floor: `f(points)`, points of shape (n, 3)
             [m], answers n coefficients, or an image of it does, a `FrictionMap`. It is asked before each step, where
             nodes and edges are then, and moves and turns with its obstacle.
         restitution : float
@@ -98,7 +99,7 @@ class Contacts:
         point : array_like of shape (3,) [m]
         normal : array_like of shape (3,)
             Of any length.
-        friction : float, pair of float, or callable
+        friction : float, pair or tuple of three of float, or callable
         restitution, rolling_friction : float
         name : str
 
@@ -135,7 +136,7 @@ class Contacts:
         ----------
         center : array_like of shape (3,) [m]
         radius : float [m]
-        friction : float, pair of float, or callable
+        friction : float, pair or tuple of three of float, or callable
         restitution, rolling_friction : float
         name : str
 
@@ -174,7 +175,7 @@ class Contacts:
         start, end : array_like of shape (3,) [m]
             Of its axis.
         radius : float [m]
-        friction : float, pair of float, or callable
+        friction : float, pair or tuple of three of float, or callable
         restitution, rolling_friction : float
         name : str
 
@@ -309,9 +310,10 @@ class Contacts:
         Parameters
         ----------
         a, b : Rod, Obstacle or str
-        friction : float, pair of float, array_like of shape (edges,), or callable
-            One coefficient; of a rod and an obstacle also two, along and across the rod; one for each edge of the rod;
-            or a function of position on the obstacle. See `add_floor`.
+        friction : float, pair or tuple of three of float, array_like of shape (edges,), or callable
+            One coefficient; of a rod and an obstacle also two, along and across the rod, or three, of a rod that slides
+            towards its end, towards its start, and across itself; one for each edge of the rod (as an array, where it
+            has three edges); or a function of position on the obstacle. See `add_floor`.
 
         Raises
         ------

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from withe import _core
 from withe.parts.contacts import BodyPair
+from withe.parts.friction import by_given
 from withe.parts.kinds import (
     DragPart,
     FluidPart,
@@ -355,7 +356,8 @@ class Ledger:
         ):
             self._add(index, word, reader_of(call.session, call.part, word)(OfRun(found)))
         elif isinstance(call.part, ObstaclePart | BodyPair):
-            self._add(index, word, friction_reader(call.session, call.part)(OfRun(found)))
+            by_directions = friction_reader(call.session, call.part)(OfRun(found))
+            self._add(index, word, by_given(by_directions, np.shape(call.values[word])))
         elif isinstance(call.part, FluidPart) and word == "viscosity":
             self._add(index, word, found.fluid_viscosity)
         elif call.part is None:

@@ -128,7 +128,7 @@ class Control:
             natural_twist, natural_stretch (natural over drawn length; see `set_natural_stretch`). Of a load: force,
             moment, load or pressure, constant or a function of time. Of a mass: mass. Of a spring: stiffness,
             rest_length, damping. Of a drag: drag. Of a fluid: viscosity, and the regularization [m] of Stokeslets. Of
-            an obstacle: friction, one coefficient, a pair, along and across rods, or a function of position,
+            an obstacle: friction, as `Scene.add_floor` takes it,
             rolling_friction and restitution. Of two bodies: friction, as `Scene.set_friction` takes it. Of a support:
             position, rotation, as `move` takes them, and the friction of a ring. Of the scene: gravity, friction and
             restitution between rods, the slip_tolerance of friction, and the contact_stiffness [N/m], or None for one

@@ -18,6 +18,7 @@ from withe.parts.friction import (
     check_rolling,
     coefficients,
     obstacle_friction,
+    own_friction,
     pair_between,
     pair_in,
     with_obstacle,
@@ -103,16 +104,16 @@ def _with_obstacle_friction(
     session: Session, part: ObstaclePart, given: Coefficients, contact: _core.ContactDescription
 ) -> _core.ContactDescription:
     """The same with other friction of an obstacle, and of rods that have none of their own with it."""
-    check_law(given.pair, contact.friction_law, f"friction of {part.name!r}")
+    check_law(given.directions, contact.friction_law, f"friction of {part.name!r}")
     index = session.directory.all(ObstaclePart).index(part)
-    contact = with_obstacle(contact, index, given.pair)
+    contact = with_obstacle(contact, index, given.directions)
     for rod in session.directory.all(RodPart):
         bodies = rod.index, -1 - index
         own = pair_between(contact.pairs, bodies)
         shares = _shares_now(session, rod, part, given)
-        if (own is None and shares is None) or (own is not None and own.friction >= 0.0):
+        if (own is None and shares is None) or (own is not None and own_friction(own) is not None):
             continue
-        contact = with_pair(contact, bodies, (-1.0, -1.0), shares)
+        contact = with_pair(contact, bodies, None, shares)
     return contact
 
 
@@ -134,13 +135,13 @@ def set_pair_friction(session: Session, a: Body, b: Body, friction: Friction) ->
     """Give two bodies another friction coefficient of their own; see `Simulation.set_friction`."""
     first, second, contact = _pair(session, a, b, "friction")
     given = pair_friction(session.directory, a, b, friction)
-    check_law(given.pair, contact.friction_law, f"friction of {first.name!r} and {second.name!r}")
+    check_law(given.directions, contact.friction_law, f"friction of {first.name!r} and {second.name!r}")
     rod, obstacle = (first, second) if isinstance(first, RodPart) else (second, first)
     shares = None
     if isinstance(rod, RodPart) and isinstance(obstacle, ObstaclePart):
         shares = _shares_now(session, rod, obstacle, given)
     bodies = body_of(session.directory, first), body_of(session.directory, second)
-    session.world.set_contact(with_pair(contact, bodies, given.pair, shares))
+    session.world.set_contact(with_pair(contact, bodies, given.directions, shares))
     _note_field(session, pair_of(session.directory, a, b), given)
     session.note("set_friction", BodyPair(first, second), {"friction": friction})
 
@@ -151,10 +152,11 @@ def pair_value(session: Session, a: Body, b: Body) -> Friction | None:
     parts = [touching(session.directory, name) for name in names]
     first, second = (body_of(session.directory, part) for part in parts)
     own = pair_between(session.contact.pairs, (first, second))
-    if own is None or own.friction < 0.0:
+    directions = None if own is None else own_friction(own)
+    if own is None or directions is None:
         return None
     if not len(own.shares):
-        return as_given((own.friction, own.across if own.across >= 0.0 else own.friction))
+        return as_given(directions)
     if names in session.settings.frictions:
         return session.settings.frictions[names].given
     edges = next(len(part.lengths) for part in parts if isinstance(part, RodPart))
@@ -228,7 +230,7 @@ def find_friction_fields(session: Session) -> None:
         if not len(pair.shares):
             continue
         rod, obstacle = rods[max(pair.first, pair.second)], obstacles[-1 - min(pair.first, pair.second)]
-        names = pair_of(session.directory, rod.name, obstacle.name) if pair.friction >= 0.0 else (obstacle.name,)
+        names = (obstacle.name,) if own_friction(pair) is None else pair_of(session.directory, rod.name, obstacle.name)
         if names in frictions:
             fields[number] = rod.index, obstacle.name, frictions[names]
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from withe import _core
 from withe.parts.contacts import Body, BodyPair, touching
-from withe.parts.friction import as_given, obstacle_friction
+from withe.parts.friction import as_given, by_given, obstacle_friction, own_friction
 from withe.parts.handles import Drag, Fluid, Load, Mass, NodeHandle, Obstacle, Rod, Spring, Support
 from withe.parts.kinds import (
     DragPart,
@@ -132,7 +132,7 @@ def reader_of(session: Session, part: Part | BodyPair, word: str) -> Reader:
     if isinstance(part, ObstaclePart | BodyPair) and word == "friction":
         given = _friction_given(session, part)
         read = friction_reader(session, part)
-        return lambda g: read(g) if np.ndim(given) else float(read(g).sum())
+        return lambda g: by_given(read(g), np.shape(given)) if np.ndim(given) else float(read(g).sum())
     if isinstance(part, ObstaclePart) and word == "rolling_friction":
         index = session.directory.all(ObstaclePart).index(part)
         _check_rubs(float(session.contact.obstacle_rolling[index]), f"{part.name}, of rods that roll,")
@@ -215,7 +215,7 @@ def _hand_reader(session: Session, part: SupportPart, word: str) -> Reader:
 
 
 def friction_reader(session: Session, part: ObstaclePart | BodyPair) -> Reader:
-    """What reads the derivative by the coefficients along and across rods, shape (2,)."""
+    """What reads the derivative by the coefficients of each direction, shape (3,)."""
     if isinstance(part, ObstaclePart):
         obstacle = session.directory.all(ObstaclePart).index(part)
         return lambda g: np.array(g.parameters.obstacle_friction[obstacle])
@@ -224,17 +224,16 @@ def friction_reader(session: Session, part: ObstaclePart | BodyPair) -> Reader:
     return lambda g: np.array(g.parameters.pair_friction[pair])
 
 
-def _friction_given(session: Session, part: ObstaclePart | BodyPair) -> float | tuple[float, float]:
+def _friction_given(session: Session, part: ObstaclePart | BodyPair) -> float | tuple[float, ...]:
     contact = session.contact
     if isinstance(part, ObstaclePart):
         given = as_given(obstacle_friction(contact, session.directory.all(ObstaclePart).index(part)))
     else:
         bodies = part.bodies(session.directory)
-        found = [own for own in contact.pairs if {own.first, own.second} == bodies and own.friction >= 0.0]
-        if not found:
+        found = [own_friction(own) for own in contact.pairs if {own.first, own.second} == bodies]
+        if not found or found[0] is None:
             raise ValueError(f"{part.name} have no friction of their own: give them one by set_friction")
-        own = found[0]
-        given = as_given((own.friction, own.across if own.across >= 0.0 else own.friction))
+        given = as_given(found[0])
     _check_rubs(np.max(given), part.name)
     return given
 
