@@ -272,11 +272,17 @@ void Contact::predict_friction(const VectorX& change, ContactLinearisation& line
   predict(FrictionKind::rolling, linearisation.rolling);
 }
 
-double Contact::accept(State& state, Keep keep, double spare) {
-  const double put_in = ContactStiffness(problem_).accept(set_, keep, spare, scratch_, state.contact_stiffness);
+double Contact::accept(State& state, double spare) {
+  const double put_in = ContactStiffness(problem_).accept(set_, spare, scratch_, state.contact_stiffness);
   state.contacts.swap(scratch_.records);
   leave_obstacles(state);
   return put_in;
+}
+
+void Contact::accept_at_rest(State& state) {
+  ContactStiffness(problem_).accept_at_rest(set_, scratch_, state.contact_stiffness);
+  state.contacts.swap(scratch_.records);
+  leave_obstacles(state);
 }
 
 void Contact::remember(State& state) {
@@ -285,10 +291,10 @@ void Contact::remember(State& state) {
   leave_obstacles(state);
 }
 
-double Contact::stiffen(State& state, Keep keep) {
+double Contact::stiffen(State& state, bool at_rest) {
   std::swap(set_, deep_);
   restart(state, problem_.duration);
-  return ContactStiffness(problem_).stiffen(deep_, set_, keep, state.contacts, state.contact_stiffness);
+  return ContactStiffness(problem_).stiffen(deep_, set_, at_rest, state.contacts, state.contact_stiffness);
 }
 
 void Contact::initialise(State& state, const Parameters& parameters) const {

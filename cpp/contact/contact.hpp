@@ -125,13 +125,15 @@ class Contact {
   void hold_sticking(const State& state, VectorX& change) const;
 
   /// Keeps in `state`, still where the step began, what contacts at q1 must remember: see `ContactStiffness::accept`.
-  double accept(State& state, Keep keep, double spare);
-  /// Whether what was accepted last presses as it did, but for rounding; where depths are kept.
+  double accept(State& state, double spare);
+  /// The same in an equilibrium.
+  void accept_at_rest(State& state);
+  /// Whether what was accepted last there presses as it did, but for rounding.
   bool presses_alike() const { return scratch_.change <= 1e-9 * scratch_.pressing; }
   /// The same for a step so short that stiffness stays as it is.
   void remember(State& state);
   /// Makes contacts of bodies that are too deep in each other stiffer; returns the energy put in [J].
-  double stiffen(State& state, Keep keep);
+  double stiffen(State& state, bool at_rest);
   /// Gives a state that has none yet the stiffness that no rod falls below.
   void initialise(State& state, const Parameters& parameters) const;
   /// Contacts of a state at rest, for read-outs; and their energy.

@@ -10,12 +10,12 @@ namespace withe {
 struct ContactAdjoint {
   /// By its unknowns at the start of the step, and by their rates; frames are transported from the tangents there.
   double start[kContactUnknowns] = {}, velocity[kContactUnknowns] = {};
-  double approach = 0;           ///< by the speed of approach that its record had at the start [s/m]
-  double friction[3] = {};  ///< by its coefficients, see `SurfaceParameters::obstacle_friction`
-  double rolling = 0;            ///< likewise
-  double slip_tolerance = 0;     ///< [s/m]
-  double gravity = 0;            ///< by its size [s^2/m]
-  double mass = 0;               ///< by what the contact holds up, `ContactProblem::mass_of` [1/kg]
+  double approach = 0;        ///< by the speed of approach that its record had at the start [s/m]
+  double friction[3] = {};    ///< by its coefficients, see `SurfaceParameters::obstacle_friction`
+  double rolling = 0;         ///< likewise
+  double slip_tolerance = 0;  ///< [s/m]
+  double gravity = 0;         ///< by its size [s^2/m]
+  double mass = 0;            ///< by what the contact holds up, `ContactProblem::mass_of` [1/kg]
 };
 
 /// `rows`: in the contact's unknowns, zero where there is none. `by_approach`: what the speed of approach does that its

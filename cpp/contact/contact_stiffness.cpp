@@ -88,33 +88,22 @@ class SharedWeight {
   std::ptrdiff_t contacts_ = 0;
 };
 
-/// Distances of centrelines, with what has yielded, between which a contact's force, or energy, falls to what is
-/// `wanted` for unit stiffness.
-struct Bracket {
-  double low, high;
-};
-Bracket distance_at(const Touching& t, bool force, double wanted) {
-  Bracket b{t.proximity.distance + t.yielded, t.pair.reach()};
+/// Distance of centrelines, with what has yielded, at which a contact's force, or energy, is what is `wanted` for unit
+/// stiffness, or less by rounding.
+double distance_at(const Touching& t, bool force, double wanted) {
+  double low = t.proximity.distance + t.yielded, high = t.pair.reach();
   for (int k = 0; k < 60; ++k) {
-    const double middle = 0.5 * (b.low + b.high);
+    const double middle = 0.5 * (low + high);
     const ContactEnergy e = contact_energy(t.law.law, middle, t.pair.radii(), t.pair.tolerance);
-    ((force ? -e.first : e.value) > wanted ? b.low : b.high) = middle;
+    ((force ? -e.first : e.value) > wanted ? low : high) = middle;
   }
-  return b;
+  return high;
 }
 
 /// With which a contact presses where it stands, so many times as stiff, with a depth that presses no more [N].
 double force_at(const Touching& t, double ratio, double yielded) {
   const double distance = t.proximity.distance + yielded;
   return -ratio * t.stiffness * contact_energy(t.law.law, distance, t.pair.radii(), t.pair.tolerance).first;
-}
-
-/// How much stiffer a contact in balance may become to stay there, where no more than `most` of its depth is to yield;
-/// not where surfaces are so deep in each other that balance is sought anew.
-double balanced_ratio(const Touching& t, double wanted, double most) {
-  if (t.depth() > kDeepest) return wanted;
-  const double pressing = -t.energy.first, left = force_at(t, 1.0, std::max(t.yielded, most));
-  return wanted * left > pressing ? std::max(pressing / left, 1.0) : wanted;
 }
 
 /// What stops an edge's mass at the speed at which the ends meet (along the normal of a plane, which is known before
@@ -166,19 +155,16 @@ double start_stiffness(const ContactProblem& problem, const ContactPair& pair, c
 
 double first_stiffness(const ContactProblem& problem, const ContactPair& pair) {
   const double start = start_stiffness(problem, pair, problem.start->contact_stiffness);
-  return meets(problem, pair) ? std::max(start, impact_stiffness(problem, pair)) : start;
+  if (problem.pressing == Pressing::still || !meets(problem, pair)) return start;
+  return std::max(start, impact_stiffness(problem, pair));
 }
 
-/// The depth that must press no more for a contact that becomes stiffer to press as hard as before, which takes energy;
-/// to store as much as before, in an impact; or the former, but not so much that surfaces could sink into each other
-/// for good.
-double ContactStiffness::yielded_at(const Touching& t, double ratio, Keep keep) const {
-  const ContactPair& pair = t.pair;
-  const bool force = keep != Keep::energy || t.approach == 0.0;
-  const auto [low, high] = distance_at(t, force, (force ? -t.energy.first : t.energy.value) / (t.stiffness * ratio));
-  if (keep == Keep::energy) return high - t.proximity.distance;
-  const double yielded = low - t.proximity.distance;
-  return keep == Keep::force ? yielded : std::min(yielded, kMostYield * pair.small_radius());
+/// The depth that must press no more for a contact that becomes stiffer to press as hard as before, which takes energy,
+/// or to store as much as before, in an impact.
+double ContactStiffness::yielded_at(const Touching& t, double ratio) const {
+  const bool force = t.approach == 0.0;
+  const double wanted = (force ? -t.energy.first : t.energy.value) / (t.stiffness * ratio);
+  return distance_at(t, force, wanted) - t.proximity.distance;
 }
 
 /// Gives a contact another stiffness, and another depth that presses no more. Anchors that become stiffer keep their
@@ -210,11 +196,13 @@ double ContactStiffness::wanted_ratio(const Touching& t, const ContactRecord& re
 }
 
 /// The greatest force that contact has to hold at a node, times 1e5 / m [Choi, dissertation, (5.16), (5.17)]: what all
-/// other forces there add up to, inertia among them, is what contact and friction are.
+/// other forces there add up to, inertia among them, is what contact and friction are. 0 under another rule.
 double ContactStiffness::source_stiffness(const ContactSet& set, VectorX& force) const {
   constexpr double kSource = 1e5;  // [1/m]
+  if (problem_.description().stiffness_rule != StiffnessRule::source) return 0.0;
+  if (problem_.surfaces->parameters().contact_stiffness > 0.0) return 0.0;
   contact_force(problem_, set, force);
-  return kSource * farthest(problem_.model(), force);
+  return std::max(kSource * farthest(problem_.model(), force), problem_.parameters->least_stiffness.minCoeff());
 }
 
 ContactRecord ContactStiffness::record(const Touching& t) const {
@@ -255,43 +243,29 @@ void ContactStiffness::remember(const ContactSet& set, const VectorX& stiffness,
   finish(set, records);
 }
 
-double ContactStiffness::accept(const ContactSet& set, Keep keep, double spare, StiffnessScratch& scratch,
+double ContactStiffness::accept(const ContactSet& set, double spare, StiffnessScratch& scratch,
                                 VectorX& stiffness) const {
   auto& [records, fading, greatest, force, pressing, change] = scratch;
   records.clear();
   fading.clear();
-  pressing = change = 0.0;
   const bool given = problem_.surfaces->parameters().contact_stiffness > 0.0;
-  const bool still = problem_.pressing == Pressing::still;
-  const VectorX& least = problem_.parameters->least_stiffness;
-  const bool source = problem_.description().stiffness_rule == StiffnessRule::source && !given;
-  const double common = source ? std::max(source_stiffness(set, force), least.minCoeff()) : 0.0;
-  greatest = least;
+  const double common = source_stiffness(set, force);
+  const bool source = common > 0.0;
+  greatest = problem_.parameters->least_stiffness;
   double put_in = 0.0, wanted = 0.0;
   for (const Touching& t : set) {
     const ContactPair& pair = t.pair;
     if (t.lagged >= 0 || !problem_.touch(pair, t.proximity.distance, t.yielded)) continue;
     ContactRecord record = this->record(t);
     double ratio = source && !problem_.fixed(pair) ? common / record.stiffness : wanted_ratio(t, record);
-    // An equilibrium that has been found stays one, unless surfaces are too deep in each other.
-    if (still && !source) ratio = std::max(ratio, 1.0);
-    const double most_yield = keep == Keep::depth ? kMostYield * pair.small_radius() : INFINITY;
-    if (keep == Keep::depth) ratio = balanced_ratio(t, ratio, most_yield);
     if (ratio > 1.0) {
-      put_in += change_stiffness(t, ratio, yielded_at(t, ratio, keep), record);
+      put_in += change_stiffness(t, ratio, yielded_at(t, ratio), record);
     } else if (ratio < 1.0 || record.approach > 0.0) {
       put_in += change_stiffness(t, ratio, worn(problem_, t), record);
-    } else if (still) {
-      record.yielded = std::min(worn(problem_, t), most_yield);  // what has yielded in motion by more may press again
     } else if (t.yielded > 0.0) {
       ContactRecord unused;
       wanted += change_stiffness(t, 1.0, faded(problem_, t), unused);
       fading.push_back({&t, records.size()});
-    }
-    pressing = std::max(pressing, record.force);
-    if (keep == Keep::depth) {
-      const double now = force_at(t, record.stiffness * pair.share / t.stiffness, record.yielded);
-      change = std::max(change, std::abs(now - record.force));
     }
     for (int rod : {pair.rod_a, pair.rod_b})
       if (rod >= 0) greatest(rod) = std::max(greatest(rod), source ? common : wanted_stiffness(pair, -t.energy.first));
@@ -309,13 +283,44 @@ double ContactStiffness::accept(const ContactSet& set, Keep keep, double spare, 
   return put_in;
 }
 
-double ContactStiffness::stiffen(const ContactSet& set, const ContactSet& start, Keep keep,
+void ContactStiffness::accept_at_rest(const ContactSet& set, StiffnessScratch& scratch, VectorX& stiffness) const {
+  const double source = source_stiffness(set, scratch.force);
+  const auto presses = [&](const Touching& t) {
+    return t.lagged < 0 && problem_.touch(t.pair, t.proximity.distance, t.yielded);
+  };
+  for (const Touching& t : set) {
+    if (source > 0.0 || !presses(t) || problem_.fixed(t.pair) || !(t.depth() > kDeepest)) continue;
+    for (int rod : {t.pair.rod_a, t.pair.rod_b})
+      if (rod >= 0) stiffness(rod) = std::max(stiffness(rod), kAhead * wanted_stiffness(t.pair, -t.energy.first));
+  }
+  scratch.records.clear();
+  scratch.pressing = scratch.change = 0.0;
+  for (const Touching& t : set) {
+    if (!presses(t)) continue;
+    ContactRecord record = this->record(t);
+    record.approach = record.age = 0.0;
+    if (problem_.fixed(t.pair)) {
+      record.yielded = worn(problem_, t);
+    } else {
+      const double wanted = source > 0.0 ? source : start_stiffness(problem_, t.pair, stiffness);
+      change_stiffness(t, wanted / record.stiffness, 0.0, record);
+    }
+    const double now = force_at(t, record.stiffness * t.pair.share / t.stiffness, record.yielded);
+    scratch.pressing = std::max(scratch.pressing, record.force);
+    scratch.change = std::max(scratch.change, std::abs(now - record.force));
+    scratch.records.push_back(record);
+  }
+  finish(set, scratch.records);
+}
+
+double ContactStiffness::stiffen(const ContactSet& set, const ContactSet& start, bool at_rest,
                                  std::vector<ContactRecord>& records, VectorX& stiffness) const {
   double put_in = 0.0;
   for (const Touching& deep : set) {
     const ContactPair& pair = deep.pair;
     const double depth = deep.depth();
     if (deep.lagged >= 0 || !(depth > 2.0 * kDepth)) continue;
+    if (at_rest && !problem_.fixed(pair)) continue;  // see `accept_at_rest`
     const double factor = std::min(100.0, depth / kDepth);
     ContactRecord* record = find_record(records, pair.key);
     if (const ContactRecord* renewed = find_record(problem_.renewed, pair.key)) {
@@ -326,7 +331,7 @@ double ContactStiffness::stiffen(const ContactSet& set, const ContactSet& start,
     }
     const Touching* pressed = start.pressing(pair.key);
     if (record && pressed) {
-      put_in += change_stiffness(*pressed, factor, yielded_at(*pressed, factor, keep), *record);
+      put_in += change_stiffness(*pressed, factor, yielded_at(*pressed, factor), *record);
       continue;
     }
     if (pair.stiffness > 0.0) {
@@ -377,7 +382,7 @@ bool ContactStiffness::begins_at_rest(const Touching& t, ContactRecord& record) 
   if (problem_.fixed(t.pair)) return false;
   const double most = record.force + kDrawnForce * 2.0 * kDepth * t.pair.small_radius() * t.stiffness;
   if (!(-t.energy.first > most)) return false;
-  record.yielded = distance_at(t, true, most / t.stiffness).high - t.proximity.distance;
+  record.yielded = distance_at(t, true, most / t.stiffness) - t.proximity.distance;
   return true;
 }
 
@@ -404,7 +409,7 @@ bool ContactStiffness::begins_anew(const Touching& t, bool struck, ContactRecord
   if (!t.apart() || !(ratio > 1.0)) return true;
   Touching renewed = t;
   renewed.approach = speed;
-  record.yielded = yielded_at(renewed, ratio, Keep::energy);
+  record.yielded = yielded_at(renewed, ratio);
   record.stiffness *= ratio;
   record.stick = (1.0 / std::sqrt(ratio)) * record.stick;
   record.roll = (1.0 / std::sqrt(ratio)) * record.roll;

@@ -3,17 +3,14 @@
 /// that it leaves.
 ///
 /// Stiffness k follows each contact's force so that surfaces are about `kDepth` of the smaller radius deep in each
-/// other. What becomes stiffer under load yields, so that it goes on pressing as hard as before, and stores less, or in
-/// an impact stores as much; the depth that presses no more wears off as surfaces part, and fades where they rest.
+/// other. In steps, what becomes stiffer under load yields, so that it goes on pressing as hard as before, and stores
+/// less, or in an impact stores as much; the depth that presses no more wears off as surfaces part, and fades where
+/// they rest. In equilibria nothing yields, and contacts are as stiff as those which are yet to begin: what slides on
+/// from one to the next would otherwise be held, as by friction.
 
 #include "contact/contact_set.hpp"
 
 namespace withe {
-
-/// What is never more where a contact becomes stiffer under load: its force; the depth that presses no more either, for
-/// which it becomes less stiff or, where surfaces are too deep in each other, presses harder; or, in an impact, its
-/// energy.
-enum class Keep { force, depth, energy };
 
 /// Of a contact that begins, for a whole node [N/m]. `stiffness`: of contacts that begin, per rod.
 double start_stiffness(const ContactProblem& problem, const ContactPair& pair, const VectorX& stiffness);
@@ -31,7 +28,7 @@ struct StiffnessScratch {
   std::vector<Fading> fading;
   VectorX greatest;                 ///< stiffness wanted, per rod [N/m]
   VectorX force;                    ///< per unknown [N]
-  double pressing = 0, change = 0;  ///< the greatest force, and by how much one has changed [N]
+  double pressing = 0, change = 0;  ///< the greatest force, and by how much one has changed, of an equilibrium [N]
 };
 
 class ContactStiffness {
@@ -39,14 +36,18 @@ class ContactStiffness {
   explicit ContactStiffness(const ContactProblem& problem) : problem_(problem) {}
 
   /// Makes `scratch.records` those of what touches at the end of a step, whose stiffness follows the forces, and so
-  /// does that of contacts that begin, per rod. Returns the energy that this put in, below zero where it took some; if
-  /// that is what to keep, no more than `spare` [J].
-  double accept(const ContactSet& set, Keep keep, double spare, StiffnessScratch& scratch, VectorX& stiffness) const;
+  /// does that of contacts that begin, per rod. Returns the energy that this put in, no more than `spare`, and below
+  /// zero where it took some [J].
+  double accept(const ContactSet& set, double spare, StiffnessScratch& scratch, VectorX& stiffness) const;
+  /// The same in an equilibrium. Where surfaces are too deep in each other, all contacts of their rods become stiffer,
+  /// and press harder.
+  void accept_at_rest(const ContactSet& set, StiffnessScratch& scratch, VectorX& stiffness) const;
   /// The same for a step so short that stiffness stays as it is.
   void remember(const ContactSet& set, const VectorX& stiffness, std::vector<ContactRecord>& records) const;
   /// Makes contacts stiffer that are too deep in `set`, records of the step's start and stiffness of contacts that
-  /// begin; `start`: what touches there. Returns the energy put in [J].
-  double stiffen(const ContactSet& set, const ContactSet& start, Keep keep, std::vector<ContactRecord>& records,
+  /// begin; `start`: what touches there. In an equilibrium those alone that `accept_at_rest` leaves as they are.
+  /// Returns the energy put in [J].
+  double stiffen(const ContactSet& set, const ContactSet& start, bool at_rest, std::vector<ContactRecord>& records,
                  VectorX& stiffness) const;
   /// Which contacts begin with the scene, of those that touch as the step begins, and which surfaces near each other
   /// anew by then; gives them to `start`.
@@ -58,7 +59,7 @@ class ContactStiffness {
   bool is_struck(const ContactPair& pair) const;
   ContactRecord record(const Touching& t) const;
   void finish(const ContactSet& set, std::vector<ContactRecord>& records) const;
-  double yielded_at(const Touching& t, double ratio, Keep keep) const;
+  double yielded_at(const Touching& t, double ratio) const;
   double change_stiffness(const Touching& t, double ratio, double yielded, ContactRecord& record) const;
   /// By how much a contact's stiffness is to change, by the force that it carries.
   double wanted_ratio(const Touching& t, const ContactRecord& record) const;

@@ -14,11 +14,12 @@
 ///   implicit, lagged: F = mu N tanh(K |S| / (2 dt)) S / |S|, K = 15 / nu [Choi, dissertation, (5.7)-(5.14),
 ///                     there between centrelines]
 ///   anchored:         F = k_t (stick + S), of length mu N at most: an elastic stick that slips [Simo and Hughes 1998]
-/// Where an obstacle has other coefficients along a rod than across it, F is that of the greatest coefficient, mu, times
-/// the matrix (mu_t / mu) tt^T + (mu_n / mu) (1 - tt^T), t the rod's tangent along the surface, and mu_t one coefficient
-/// where S . t > 0, the rod slides towards its end, and another where it slides towards its start: for a slip in the
-/// direction s, F = N (mu_t (s . t) t + mu_n (s . n) n) [Hu, Nirody, Scott and Shelley 2009, eq. 1]. That matrix is
-/// symmetric and not negative, so F . S is not either; F is continuous, as F . t is nothing where mu_t changes.
+/// Where an obstacle has other coefficients along a rod than across it, F is that of the greatest coefficient, mu,
+/// times the matrix (mu_t / mu) tt^T + (mu_n / mu) (1 - tt^T), t the rod's tangent along the surface, and mu_t one
+/// coefficient where S . t > 0, the rod slides towards its end, and another where it slides towards its start: for a
+/// slip in the direction s, F = N (mu_t (s . t) t + mu_n (s . n) n) [Hu, Nirody, Scott and Shelley 2009, eq. 1]. That
+/// matrix is symmetric and not negative, so F . S is not either; F is continuous, as F . t is nothing where mu_t
+/// changes.
 ///
 /// Rolling friction on an obstacle is a couple against the turning of a rod's surface there: the same laws, for the way
 /// R = (phi_a - phi) x r_a by which the slip is more than what the centreline moves, phi the obstacle's turn, with a

@@ -89,8 +89,8 @@ void apply_half_twist(const HalfTwist<Scalar>& half, const BendTwistStrain<Scala
     const Scalar by1 = m.second[0][0] * by_tau.x + m.second[0][1] * by_tau.y;
     const Scalar by2 = m.second[1][0] * by_tau.x + m.second[1][1] * by_tau.y;
     const Scalar mixed = m.second[0][2] * by_tau.x + m.second[1][2] * by_tau.y;
-    m.second[2][2] += 2.0 * mixed + by1 * by_tau.x + by2 * by_tau.y -
-                      0.25 * (moment.x * s.kappa1 + moment.y * s.kappa2);
+    m.second[2][2] +=
+        2.0 * mixed + by1 * by_tau.x + by2 * by_tau.y - 0.25 * (moment.x * s.kappa1 + moment.y * s.kappa2);
     const Vec2<Scalar> with_tau =
         half.to_first({m.second[0][2] + by1 - 0.5 * moment.y, m.second[1][2] + by2 + 0.5 * moment.x});
     m.second[0][2] = m.second[2][0] = with_tau.x;

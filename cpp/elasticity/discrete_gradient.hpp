@@ -4,8 +4,8 @@
 ///
 /// In a step a frame F turns from F0 to F1 by a rotation with the Cayley vector w, F1 - F0 = w x (F0 + F1) / 2. So a
 /// product of vectors of two frames changes exactly by a1 . b1 - a0 . b0 = (w_a - w_b) . (mean a x mean b), and is left
-/// alone where both turn alike [Gonzalez 1996: discrete gradients in quadratic invariants]. The twist and the curvatures
-/// v in the directors of the first frame are quotients of such products: with x = t_a . t_b, X = 1 + x,
+/// alone where both turn alike [Gonzalez 1996: discrete gradients in quadratic invariants]. The twist and the
+/// curvatures v in the directors of the first frame are quotients of such products: with x = t_a . t_b, X = 1 + x,
 ///   v_i = y_i / X,  y_i = 2 di_a . t_b,
 ///   X cos(tau) = c = d1_a . d1_b + d2_a . d2_b,  X sin(tau) = s = d2_a . d1_b - d1_a . d2_b,
 /// and change exactly (D for differences) by
@@ -183,8 +183,7 @@ void discrete_moment(const BendMeasure& measure, const EdgeFrame<Scalar>& a0, co
     const Vec3<Scalar> vx = cross(ta, tb), vc = cross(a[0], b[0]) + cross(a[1], b[1]),
                        vs = cross(a[1], b[0]) - cross(a[0], b[1]);
     const Vec3<Scalar> strain[3] = {i1 * (2.0 * cross(a1.d1, b1.tangent) - u.x * x),
-                                    i1 * (2.0 * cross(a1.d2, b1.tangent) - u.y * x),
-                                    -(i1 * (a1.tangent + b1.tangent))};
+                                    i1 * (2.0 * cross(a1.d2, b1.tangent) - u.y * x), -(i1 * (a1.tangent + b1.tangent))};
     const Vec3<Scalar> y[2] = {2.0 * cross(a[0], tb), 2.0 * cross(a[1], tb)};
     const Vec3<Scalar> my[2] = {inverse * (y[0] - k.x * vx), inverse * (y[1] - k.y * vx)};
     const Vec3<Scalar> twisting = c * vs - s * vc, mt = g * twisting;

@@ -26,9 +26,7 @@ struct HalfTwist {
   Vec2<Scalar> to_halfway(const Vec2<Scalar>& a) const {
     return {cosine * a.x + sine * a.y, cosine * a.y - sine * a.x};
   }
-  Vec2<Scalar> to_first(const Vec2<Scalar>& a) const {
-    return {cosine * a.x - sine * a.y, cosine * a.y + sine * a.x};
-  }
+  Vec2<Scalar> to_first(const Vec2<Scalar>& a) const { return {cosine * a.x - sine * a.y, cosine * a.y + sine * a.x}; }
 };
 inline HalfTwist<double> half_twist(double tau) { return {std::cos(0.5 * tau), std::sin(0.5 * tau)}; }
 

@@ -125,6 +125,11 @@ class ArcLength {
       const Balance balance = newton_.balance(work_.data, newton);
       stagnation.note(newton.residual, last);
       if ((balance.floor && stagnation.reached()) || (balance.either && last <= tolerance)) {
+        if (path_.stiffen_deep(z)) {
+          stagnation = {};
+          last = INFINITY;
+          continue;
+        }
         path_.accept(z);
         factor_ = factor;
         find_direction(&start_.tangent, true, start_.rate);
@@ -201,10 +206,12 @@ class ArcLength {
     path_.go_to(arc_.end);
     VectorX z = state_.q;
     if (!path_.hold(arc_.end, z)) return;
-    const NewtonResult r =
-        newton_.solve(equations_, z, {.target = &path_.target(), .max_iterations = kMostIterations}, work_);
-    result_.newton.iterations += r.iterations;
-    if (!r.converged) return;
+    do {
+      const NewtonResult r =
+          newton_.solve(equations_, z, {.target = &path_.target(), .max_iterations = kMostIterations}, work_);
+      result_.newton.iterations += r.iterations;
+      if (!r.converged) return;
+    } while (path_.stiffen_deep(z));
     path_.accept(z);
     factor_ = arc_.end;
     find_direction(&start_.tangent, true, start_.rate);

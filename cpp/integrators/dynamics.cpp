@@ -304,8 +304,7 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   work.difference = rate * work.change;
   predictor.record({state.time + 0.5 * dt, h, dt, plan.slot}, state.v, work.difference, acceleration,
                    equations.mass().rows);
-  if (Contact* contact = equations.contact())
-    result.dissipated -= contact->accept(state, Keep::energy, std::max(contact_loss, 0.0));
+  if (Contact* contact = equations.contact()) result.dissipated -= contact->accept(state, std::max(contact_loss, 0.0));
   advance(equations, plan, q1, work, state);
   if (const HandForces* hands = equations.hands()) result.support_work -= hands->accept(work.after, state);
   result.accepted = true;

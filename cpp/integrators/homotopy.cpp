@@ -80,11 +80,22 @@ void Homotopy::evaluate(const VectorX& z, bool with_matrix, const double* axial_
   work_.data.potential -= target_.dot(z);
 }
 
+bool Homotopy::stiffen_deep(const VectorX& q) {
+  Contact* contact = equations_.contact();
+  if (contact == nullptr) return false;
+  contact->update(q);
+  if (!(contact->contacts().depth() > kDeepest)) return false;
+  contact->accept_at_rest(state_);
+  if (contact->presses_alike()) return false;
+  go_to(factor_);
+  return true;
+}
+
 void Homotopy::accept(const VectorX& q) {
   const Model& model = equations_.model();
   if (Contact* contact = equations_.contact()) {
     contact->update(q);
-    contact->accept(state_, keep_, INFINITY);
+    contact->accept_at_rest(state_);
   }
   compute_configuration(model, state_, q, scratch_);
   accept_configuration(model, q, scratch_, state_);

@@ -45,8 +45,6 @@ class Homotopy {
   /// Loads and what is left out of balance at a factor; the frames count from the present state.
   void go_to(double factor);
   bool hold(double factor, VectorX& q) const { return boundary_.hold(factor, q); }
-  /// From here on contacts that become stiffer yield by as much as it takes to stay in balance.
-  void keep_balance() { keep_ = Keep::force; }
   /// From here on tangents leave alone what is neutral.
   void hold_neutral() { hold_neutral_ = true; }
   /// Whether supports did so where a tangent was last found.
@@ -65,6 +63,8 @@ class Homotopy {
   void find_tangent(Tangent& out);
   /// -dF/ds at z, projected, at the factor last gone to; `held`: how the held unknowns change with it.
   void find_pull(const VectorX& z, VectorX& pull, VectorX& held);
+  /// Makes contact stiffer where surfaces at q are too deep in each other; whether q is out of balance by that.
+  bool stiffen_deep(const VectorX& q);
   /// Goes on from q: contacts, frames and hands remember it.
   void accept(const VectorX& q);
   /// Residual F(z, s), and the matrix when asked for.
@@ -85,7 +85,6 @@ class Homotopy {
   Configuration scratch_;
   double factor_ = 0.0;
   bool moves_ = false, hold_neutral_ = false;
-  Keep keep_ = Keep::depth;
 };
 
 }  // namespace withe

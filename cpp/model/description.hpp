@@ -177,8 +177,8 @@ struct ContactPairDescription {
   int first = 0, second = 0;
   bool ignored = false;
   Vector3 friction = -Vector3::Ones();  ///< as in `ContactDescription::obstacle_friction`; negative: that of the scene
-  double stiffness = 0;  ///< [N/m]; 0: that of the scene
-  double restitution = -1;  ///< coefficient [-]; negative: that of the scene
+  double stiffness = 0;                 ///< [N/m]; 0: that of the scene
+  double restitution = -1;              ///< coefficient [-]; negative: that of the scene
   VectorX shares;  ///< of a rod and an obstacle: what its nodes, then its edges, rub with, over these coefficients [-];
                    ///< empty: 1
 

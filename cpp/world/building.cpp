@@ -77,6 +77,7 @@ World::Implementation::Implementation(const Implementation& other, Unbuilt /*unu
       spatial(other.spatial),
       mesh_warning(other.mesh_warning),
       step_warning(other.step_warning),
+      impact_warning(other.impact_warning),
       branch_warning(other.branch_warning),
       plane_warning(other.plane_warning) {
   work.newton.counters = other.work.newton.counters;

@@ -113,6 +113,14 @@ bool World::Implementation::drifts(Equations& system) {
   return false;
 }
 
+/// Has what touches press as what is yet to touch will; see `ContactStiffness`.
+void World::Implementation::even_contact(Equations& system) {
+  if (!system.contact()) return;
+  system.begin(state, parameters, StepRule::statics, 0.0);
+  system.contact()->update(state.q);
+  system.contact()->accept_at_rest(state);
+}
+
 /// Equilibrium after `dt` (0: at the present time, with supports and actuation as they are).
 EquilibriumResult World::Implementation::equilibrium(double dt) {
   account_for_settings();
@@ -148,6 +156,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   StaticResult r;
   try {
     solve_for_custom_at_rest(system, time);
+    even_contact(system);
     aim_obstacles(system, time);
     aim_hands(system);
     VectorX reached = state.q;
@@ -161,7 +170,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
     from = target;
     for (int tries = 0; r.converged && system.contact() && tries < kMostStiffenings; ++tries) {
       if (system.contact()->contacts().depth() > kDeepest)
-        system.contact()->stiffen(state, Keep::depth);
+        system.contact()->stiffen(state, true);
       else if (system.contact()->presses_alike())
         break;
       const StaticResult before_it = r;
@@ -336,12 +345,12 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
     const std::vector<SupportMotion> target = self.motions;
     Equations& system = self.statics();
     self.solve_for_custom_at_rest(system, self.state.time);
+    self.even_contact(system);
     const Boundary boundary = self.boundary_between(system, from, target);
     self.rest();
     const ActingPath acting =
         by_loads ? scaled : growing(system, self.parameters, self.state, self.work.newton, nullptr);
     Homotopy path(system, *self.newton, self.parameters, boundary, acting, self.state, self.work.newton);
-    path.keep_balance();
     if (!by_loads) path.start_out_of_balance();
     const ArcVisitor visit = [&](const ArcPoint& point) {
       self.note_reactions();

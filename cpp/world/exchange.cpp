@@ -166,8 +166,7 @@ void exchange(Archive& io, StepControl& control) {
   auto& [greatest, gained, put_in] = contact_guard;
   io(greatest), io(gained), io(put_in);
   auto& [change, motion, most, pull, moved, acceleration] = step_watch;
-  io(change), io(motion), io(most), io(pull), io(moved);
-  exchange(io, acceleration);
+  for (VectorX* v : {&change, &motion, &most, &pull, &moved, &acceleration}) exchange(io, *v);
   exchange(io, alarm);
 }
 

@@ -114,7 +114,8 @@ void World::Implementation::check_resolution() {
 Warnings World::take_warnings() {
   const auto take = [](std::optional<std::string>& warning) { return warning ? std::exchange(*warning, {}) : ""; };
   Implementation& self = *implementation_;
-  return {take(self.mesh_warning), take(self.step_warning), take(self.branch_warning), take(self.plane_warning)};
+  return {take(self.mesh_warning), take(self.step_warning), take(self.impact_warning), take(self.branch_warning),
+          take(self.plane_warning)};
 }
 
 /// What may help where steps do not converge, by what is the matter; one sentence.

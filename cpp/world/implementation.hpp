@@ -90,6 +90,7 @@ struct World::Implementation : Running {
   /// Of a mesh too coarse for the motion, and empty once it was heard; none yet where there was no reason.
   std::optional<std::string> mesh_warning;
   std::optional<std::string> step_warning;    ///< likewise, of steps too long for the motion
+  std::optional<std::string> impact_warning;  ///< likewise, of steps too long for an impact
   std::optional<std::string> branch_warning;  ///< likewise, of a static step that left its branch
   std::optional<std::string> plane_warning;   ///< likewise, of an equilibrium that is unstable out of its plane
   std::vector<LeftRing> left_rings;           ///< not heard of yet
@@ -261,7 +262,10 @@ struct World::Implementation : Running {
 
   // step_length.cpp
   void watch_step(double dt, const Equations& system);
-  std::string unresolved_in_time(double dt) const;
+  void forget_component(int component);
+  std::string unresolved_in_time(double dt, int component) const;
+  std::string unresolved_impact(double dt, const Equations& system) const;
+  double bending_time(int edge) const;
   void add_step_notes();
 
   // gradients.cpp
@@ -294,6 +298,7 @@ struct World::Implementation : Running {
   /// stay in its plane, nor where what acts has no potential.
   bool buckles_out_of_plane();
   bool drifts(Equations& system);
+  void even_contact(Equations& system);
   void rest();
   Equations& statics();
   Equations& fallback();

@@ -85,14 +85,15 @@ struct ContactGuard {
   double put_in = 0;  ///< in the last step, by surfaces that press [J]
 };
 
-/// Sums over a few steps in a row, of squares of velocities weighed by mass; see step_length.cpp.
+/// Sums over a few steps in a row, of squares of velocities weighed by mass, per connected component; see
+/// step_length.cpp.
 struct StepWatch {
-  double change = 0;    ///< by how much they change within a step [J]
-  double motion = 0;    ///< what that is compared with [J]
-  double greatest = 0;  ///< of such sums so far [J]
+  VectorX change;    ///< by how much they change within a step [J]
+  VectorX motion;    ///< what that is compared with [J]
+  VectorX greatest;  ///< of such sums so far [J]
   // Under backward Euler:
-  double pull = 0, moved = 0;  ///< by how much forces change with the motion, over the step; the motion [J]
-  VectorX acceleration;        ///< in the step before
+  VectorX pull, moved;   ///< by how much forces change with the motion, over the step; the motion [J]
+  VectorX acceleration;  ///< in the step before
 };
 
 /// Easy steps before longer ones are tried, at least.

@@ -30,67 +30,138 @@ constexpr int kPeriod = 24, kLooked = 16;
 constexpr double kResolved = 0.2;
 /// |v1 - v0|^2 / |v1|^2 of backward Euler, see above.
 constexpr double kChanging = 0.5;
-/// Of the scene's length, below which motion is a trembling that nobody sees.
+/// Of a component's length, below which motion is a trembling that nobody sees.
 constexpr double kSeen = 1e-5;
-/// w dt of the step that would do.
+/// w dt of the step that would do; and the part of the time in which bending goes over an edge.
 constexpr double kEnough = 0.5;
+/// Over the step that an impact would bear, the one that is said: later ones may be faster.
+constexpr double kMargin = 0.8;
+/// Of a component's kinetic energy, what an impact turns round in a step so that its bounce is seen.
+constexpr double kMuch = 0.1;
 
 }  // namespace
 
 /// Takes in a step of dt before it counts, whose end the state is. Surfaces that touch have times of their own, which
-/// steps need not resolve.
+/// steps need not resolve, so that components that do are not looked at.
 void World::Implementation::watch_step(double dt, const Equations& system) {
   const Integrator integrator = options.integrator;
-  if (step_warning || options.tolerance || integrator == Integrator::statics || integrator == Integrator::verlet)
-    return;
+  if (options.tolerance || integrator == Integrator::statics || integrator == Integrator::verlet) return;
+  const double of_part = integrator == Integrator::fourth_order ? kFourthOrderParts.back() * dt : dt;
+  if (!impact_warning && integrator != Integrator::backward_euler)
+    if (std::string found = unresolved_impact(of_part, system); !found.empty()) impact_warning = std::move(found);
   const std::int64_t place = steps_taken % kPeriod;
-  if (place >= kLooked) return;
+  if (step_warning || place >= kLooked) return;
   auto& [change, motion, greatest, pull, moved, before] = step_watch;
-  if (place == 0) change = motion = pull = moved = 0.0;
-  if (const Contact* contact = system.contact(); contact && contact->count() > 0) {
-    change = motion = pull = moved = 0.0;
-    before.resize(0);
-    return;
-  }
-  if (integrator == Integrator::fourth_order) dt *= kFourthOrderParts.back();
-  const auto mass = system.mass().rows.array();
-  const auto after = state.v.array();
-  const auto within = dt * state.acceleration.array();
-  change += (mass * within.square()).sum();
-  if (integrator == Integrator::backward_euler) {
-    const double square = (mass * after.square()).sum();
-    motion += square;
-    if (place > 0 && before.size() == state.v.size()) {
-      pull -= dt * (mass * after * (state.acceleration - before).array()).sum();
-      moved += square;
+  if (place == 0 || change.size() != model.component_count)
+    for (VectorX* sum : {&change, &motion, &pull, &moved}) sum->setZero(model.component_count);
+  if (greatest.size() != change.size()) greatest.setZero(change.size());
+  const bool euler = integrator == Integrator::backward_euler,
+             follows = euler && place > 0 && before.size() == state.v.size();
+  const VectorX& mass = system.mass().rows;
+  for (Eigen::Index i = 0; i < state.v.size(); ++i) {
+    const int component = model.dof_component[at(static_cast<int>(i))];
+    const double after = state.v(i), within = of_part * state.acceleration(i), own = mass(i) * after * after;
+    change(component) += mass(i) * within * within;
+    if (!euler) {
+      motion(component) += 2.0 * (mass(i) * (after - within) * (after - within) + own);
+      continue;
     }
-    before = state.acceleration;
-  } else {
-    motion += 2.0 * (mass * ((after - within).square() + after.square())).sum();
+    motion(component) += own;
+    if (!follows || std::isnan(before(i))) continue;
+    pull(component) -= of_part * mass(i) * after * (state.acceleration(i) - before(i));
+    moved(component) += own;
+  }
+  if (euler) before = state.acceleration;
+  if (const Contact* contact = system.contact()) {
+    for (const Touching& t : contact->contacts()) {
+      forget_component(model.component_of_edge(t.pair.key.a));
+      if (t.pair.key.b >= 0) forget_component(model.component_of_edge(t.pair.key.b));
+    }
   }
   if (place + 1 < kLooked) return;
-  greatest = std::max(greatest, motion);
-  if (std::string found = unresolved_in_time(dt); !found.empty()) step_warning = std::move(found);
+  greatest = greatest.cwiseMax(motion);
+  for (int c = 0; c < model.component_count && !step_warning; ++c)
+    if (std::string found = unresolved_in_time(of_part, c); !found.empty()) step_warning = std::move(found);
 }
 
-/// Says so where steps of dt are too long; nothing elsewhere.
-std::string World::Implementation::unresolved_in_time(double dt) const {
-  const auto& [change, motion, greatest, pull, moved, before] = step_watch;
+void World::Implementation::forget_component(int component) {
+  auto& [change, motion, greatest, pull, moved, before] = step_watch;
+  if (motion(component) == 0.0) return;
+  change(component) = motion(component) = pull(component) = moved(component) = 0.0;
+  for (Eigen::Index i = 0; i < before.size(); ++i)
+    if (model.dof_component[at(static_cast<int>(i))] == component) before(i) = NAN;
+}
+
+/// Says so where steps of dt are too long for a component; nothing elsewhere.
+std::string World::Implementation::unresolved_in_time(double dt, int component) const {
   const bool euler = options.integrator == Integrator::backward_euler;
+  const double change = step_watch.change(component), motion = step_watch.motion(component);
+  const double greatest = step_watch.greatest(component);
   // What is left of a motion that is over is a share of that.
   const double ratio = greatest > 0.0 ? change / greatest : 0.0;
   if (!(ratio > (euler ? kChanging : kResolved))) return "";
-  const double square = euler ? pull / moved : 4.0 * ratio / std::max(1.0 - ratio, 1e-12);  // (w dt)^2
+  // (w dt)^2
+  const double square =
+      euler ? step_watch.pull(component) / step_watch.moved(component) : 4.0 * ratio / std::max(1.0 - ratio, 1e-12);
   if (!(square > 1.0)) return "";
-  const double frequency = std::sqrt(square) / dt, mass = parameters.node_mass.sum();
+  double mass = 0.0, length = 0.0;
+  for (int edge = 0; edge < model.edge_count; ++edge)
+    if (model.component_of_edge(edge) == component) length += model.edge_length(edge);
+  for (int node = 0; node < model.node_count; ++node)
+    if (model.component_of_node(node) == component) mass += parameters.node_mass(node);
+  const double frequency = std::sqrt(square) / dt;
   const double speed = std::sqrt((euler ? change + motion : 0.25 * motion) / (kLooked * mass));
-  if (speed / frequency < kSeen * model.length_scale) return "";
+  if (speed / frequency < kSeen * length) return "";
   const std::string decay =
       euler ? "backward Euler damps it to half within " + text(dt * 2.0 * std::numbers::ln2 / std::log1p(square)) + " s"
             : std::string("frequencies and phases of that mean nothing");
   return "steps of " + text(dt) + " s are too long for what moves, by about " + text(speed / frequency, 2) + " m at " +
          text(frequency / (2.0 * std::numbers::pi), 3) + " Hz (time " + text(state.time, 6) + " s): " + decay +
          "; a time_step of " + text(kEnough / frequency, 2) + " s would do";
+}
+
+/// Says so where an impact takes up much of a component's motion, and a step of dt is longer than bending takes to go
+/// from a node to the next, and than surfaces take to come through the tolerance of contact: nodes that strike one
+/// after the other, and send waves to each other meanwhile, are all sent off together in such steps.
+std::string World::Implementation::unresolved_impact(double dt, const Equations& system) const {
+  const Contact* contact = system.contact();
+  if (!contact) return "";
+  VectorX struck;
+  double longest = 0.0;  // for an impact [s]
+  int edge = -1;
+  for (const Touching& t : contact->contacts()) {
+    if (!(t.approach > 0.0) || t.pair.restitution < 1.0) continue;
+    const double bending = std::max(bending_time(t.pair.key.a), t.pair.key.b < 0 ? 0.0 : bending_time(t.pair.key.b));
+    const double most = std::max(kEnough * bending, t.pair.tolerance / t.approach);
+    if (dt <= most) continue;
+    if (struck.size() == 0) struck.setZero(model.component_count);
+    const double work = -0.5 * t.pressing.first * dt * t.approach;
+    struck(model.component_of_edge(t.pair.key.a)) += work;
+    if (t.pair.key.b >= 0) struck(model.component_of_edge(t.pair.key.b)) += work;
+    if (edge >= 0 && most >= longest) continue;
+    longest = most;
+    edge = t.pair.key.a;
+  }
+  if (edge < 0) return "";
+  VectorX kinetic = VectorX::Zero(struck.size());
+  const VectorX start = state.v - dt * state.acceleration;
+  for (Eigen::Index i = 0; i < start.size(); ++i)
+    kinetic(model.dof_component[at(static_cast<int>(i))]) += 0.5 * system.mass().rows(i) * start(i) * start(i);
+  // What works harder than motion can is pressed by something else.
+  const bool much = (struck.array() > kMuch * kinetic.array() && struck.array() <= kinetic.sum()).any();
+  if (!much) return "";
+  return "an impact" + place_of_node(model.edge_tail[at(edge)]).words + " (time " + text(state.time, 6) +
+         " s) is over within a step of " + text(dt) +
+         " s, in which what strikes one after the other is sent off together, as if the rod were rigid: how high it "
+         "bounces means nothing; a time_step of " +
+         text(kMargin * longest, 2) +
+         " s would do, restitution= says what impacts lose, and integrator='backward_euler' damps them";
+}
+
+/// In which bending spreads over the length of an edge, h^2 sqrt(m / B) [s].
+double World::Implementation::bending_time(int edge) const {
+  const double length = model.edge_length(edge);
+  return length * length * std::sqrt(parameters.edge_density(edge) / parameters.edge_bend.row(edge).minCoeff());
 }
 
 /// Which vibrations steps resolve: of each rod alone, clamped at one end and free of stress, w = b^2 sqrt(B / m) / L^2,

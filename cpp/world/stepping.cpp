@@ -354,7 +354,7 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
     solve_for_custom(system, dt);
     r = step_by_rule(dt, slot);
     for (int tries = 0; r.too_deep && tries < kMostStiffenings; ++tries) {
-      dissipated -= system.contact()->stiffen(state, Keep::energy);
+      dissipated -= system.contact()->stiffen(state, false);
       work.newton.matrix.owner = nullptr;
       r = step_by_rule(dt, slot);
     }

@@ -79,6 +79,7 @@ struct Momentum {
 struct Warnings {
   std::string mesh;    ///< it is too coarse for the motion
   std::string steps;   ///< they are too long for it
+  std::string impact;  ///< they are too long for one
   std::string branch;  ///< a static step has left it
   std::string plane;   ///< an equilibrium in it is not stable against motions out of it
 };

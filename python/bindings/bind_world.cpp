@@ -435,7 +435,7 @@ void define_readouts(WorldClass& world) {
   world.def("spins", [](const GuardedWorld& self, int rod) { return self.reading().spins(rod); }, py::arg("rod"));
   world.def("take_warnings", [](GuardedWorld& self) {
     const Warnings found = self.changing().take_warnings();
-    return std::make_tuple(found.mesh, found.steps, found.branch, found.plane);
+    return std::make_tuple(found.mesh, found.steps, found.impact, found.branch, found.plane);
   });
   world.def("energy", [](const GuardedWorld& self) { return self.reading().energy(); });
   world.def(

@@ -35,9 +35,12 @@ class CoarseStepWarning(UserWarning):
     Such vibrations are not resolved: midpoint steps give them other frequencies, and backward Euler damps them within a
     step or two. Says which step would do. Resistance that stops motion within a step counts too under the midpoint
     rules, whose velocities then turn round from step to step. Stiff vibrations that carry no energy do not count, nor
-    what touches.
+    what touches. Given once a simulation, within 24 steps.
 
-    Given once a simulation, within 24 steps.
+    Or an impact is over within a step. Nodes that strike one after the other send waves to each other meanwhile, which
+    take up most of their motion and damp out; in a step in which a rod comes down by more than the distance tolerance
+    of contact, and bending goes farther than from a node to the next, all of it is sent off again, as if it were rigid.
+    Given once a simulation too; not under backward Euler, nor where obstacles have a restitution below 1.
     """
 
 

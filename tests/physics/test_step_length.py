@@ -122,3 +122,55 @@ def test_a_plan_says_which_vibrations_steps_resolve(step):
     lost = 100.0 * (1.0 - abs(1.0 / (1.0 - 1j * angle)) ** (2.0 * np.pi / np.arctan(angle)))
     assert float(note.split("these by ")[1].split(" %")[0]) == pytest.approx(lost, rel=0.05)
     assert "resolve" not in str(scene.build(integrator="static").plan)
+
+
+@pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum", "backward_euler"])
+@pytest.mark.parametrize("beside", ["nothing", "an arm that swings", "a rod at rest on a floor"])
+def test_other_parts_of_a_scene_do_not_drown_what_swings_too_fast(beside, integrator):
+    scene = withe.Scene()
+    rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+    whisker = scene.add_rod(start=(0, 0, 0.5), end=(0.03, 0, 0.5), nodes=11, radius=1e-4, material=STEEL)
+    scene.clamp(whisker.start)
+    if beside == "an arm that swings":
+        scene.clamp(scene.add_rod(start=(0, 1, 0), end=(0.3, 1, 0), nodes=21, radius=5e-3, material=rubber).start)
+    elif beside == "a rod at rest on a floor":
+        scene.add_rod(start=(0, 1, 1e-3), end=(0.03, 1, 1e-3), nodes=5, radius=1e-3, material=rubber)
+        scene.add_floor()
+    assert len(heard(scene.build(time_step=4e-3, integrator=integrator))) == 1
+
+
+def dropped(step, slope=0.05, integrator="implicit_midpoint", restitution=1.0):
+    """How high the middle of a soft rod with viscosity comes after a fall of 50 mm, over that, and what was heard."""
+    scene = withe.Scene()
+    rubber = withe.Material(youngs_modulus=2e6, poisson_ratio=0.5, density=1200.0, viscosity=2e3)
+    ends = 0.2 * np.array([(0, 0, 0), (np.cos(slope), 0, np.sin(slope))]) + (0, 0, 0.05)
+    rod = scene.add_rod(start=ends[0], end=ends[1], nodes=21, radius=5e-3, material=rubber)
+    scene.add_floor(friction=0.4, restitution=restitution)
+    simulation = scene.build(time_step=step, integrator=integrator)
+    found = heard(simulation, round(0.13 / step))
+    heights = []
+    for _ in range(round(0.12 / step)):
+        simulation.step()
+        heights.append(simulation.positions(rod)[:, 2].mean())
+    return (max(heights) - 5e-3) / (ends[:, 2].mean() - 5e-3), found
+
+
+def test_an_impact_that_steps_do_not_resolve_is_said_and_the_step_that_does():
+    """Such a rod stays where it falls, by what its vibrations lose; long steps throw it back as if it were rigid."""
+    converged, nothing = dropped(1e-4)
+    assert converged < 0.15
+    assert not nothing
+    high, (found,) = dropped(5e-3)
+    message, step = found
+    assert high > 0.9
+    assert "an impact at node" in message
+    enough, nothing = dropped(step)
+    assert enough < 0.3
+    assert not nothing
+
+
+def test_impacts_that_lose_what_they_are_told_to_are_resolved_as_they_are():
+    for options in ({"integrator": "backward_euler"}, {"restitution": 0.0}):
+        high, found = dropped(5e-3, **options)
+        assert high < 0.15
+        assert not any("an impact" in message for message, _ in found)

@@ -47,9 +47,9 @@ class Contacts:
         friction : float, pair or tuple of three of float, or callable
             Coefficient between the floor and every rod; see `set_friction` for single rods. Two coefficients are those
             along and across a rod, as of snakes and of bristles: for a slip in the direction s on rods with the tangent
-            t, friction is the normal force times mu_along (s . t) t + mu_across (s - (s . t) t)
-            [Hu et al. 2009, PNAS 106]. Three are those of a rod that slides towards its end, towards its start, and
-            across itself: mu_along is the first or the second. A callable has friction vary over the floor: `f(points)`, points of shape (n, 3)
+            t, friction is the normal force times mu_along (s . t) t + mu_across (s - (s . t) t) [Hu et al. 2009, PNAS
+            106]. Three are those of a rod that slides towards its end, towards its start, and across itself: mu_along
+            is the first or the second. A callable has friction vary over the floor: `f(points)`, points of shape (n, 3)
             [m], answers n coefficients, or an image of it does, a `FrictionMap`. It is asked before each step, where
             nodes and edges are then, and moves and turns with its obstacle.
         restitution : float

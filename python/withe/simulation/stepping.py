@@ -188,12 +188,13 @@ def convergence_error(session: Session, numbers: tuple[Any, ...]) -> Convergence
     return ConvergenceError(message, time, step, name, node if node >= 0 else None, residual)
 
 
-def pass_on(sessions: Iterable[Session], mesh: str, steps: str, branch: str, plane: str) -> None:
-    """Give warnings of the engine where there are any: of coarse meshes, coarse steps, branches and planes."""
+def pass_on(sessions: Iterable[Session], mesh: str, steps: str, impact: str, branch: str, plane: str) -> None:
+    """Give warnings of the engine where there are any: of meshes, steps for motion and impacts, branches and planes."""
     if mesh:
         warnings.warn(mesh, CoarseMeshWarning, stacklevel=_levels_to_user())
-    if steps and any(session.options.time_step > session.longest_meant for session in sessions):
-        warnings.warn(steps, CoarseStepWarning, stacklevel=_levels_to_user())
+    for coarse in (steps, impact):
+        if coarse and any(session.options.time_step > session.longest_meant for session in sessions):
+            warnings.warn(coarse, CoarseStepWarning, stacklevel=_levels_to_user())
     if branch:
         warnings.warn(branch, BranchChangedWarning, stacklevel=_levels_to_user())
     if plane:
