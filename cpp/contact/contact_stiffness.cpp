@@ -272,7 +272,7 @@ double ContactStiffness::accept(const ContactSet& set, double spare, StiffnessSc
     records.push_back(record);
   }
   // Energy grows with depth the faster the deeper, so that a part of the way takes less than that part of the work.
-  spare -= put_in;
+  spare = std::max(spare - put_in, 0.0);
   const double part = wanted > spare ? spare / wanted : 1.0;
   for (const auto& [t, number] : fading) {
     const double left = worn(problem_, *t) + part * (faded(problem_, *t) - worn(problem_, *t));
@@ -331,7 +331,8 @@ double ContactStiffness::stiffen(const ContactSet& set, const ContactSet& start,
     }
     const Touching* pressed = start.pressing(pair.key);
     if (record && pressed) {
-      put_in += change_stiffness(*pressed, factor, yielded_at(*pressed, factor), *record);
+      const double yielded = at_rest ? pressed->yielded : yielded_at(*pressed, factor);
+      put_in += change_stiffness(*pressed, factor, yielded, *record);
       continue;
     }
     if (pair.stiffness > 0.0) {

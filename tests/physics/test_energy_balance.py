@@ -346,3 +346,18 @@ def test_a_stressed_rod_of_a_fine_mesh_falls_as_one_of_a_coarse_mesh_does(nodes,
         return before - simulation.positions(rod)[count // 2, 2]
 
     assert fallen(nodes) == pytest.approx(fallen(200), rel=1e-3)
+
+
+@pytest.mark.parametrize("step", [0.02 / 556, 5e-5, 1e-4])
+def test_what_contact_takes_closes_the_balance_however_short_the_steps(step):
+    """Of contacts that rest while others are hit, in steps that leave nothing to take."""
+    scene = withe.Scene()
+    rubber = withe.Material(youngs_modulus=2e6, poisson_ratio=0.5, density=1200.0)
+    scene.add_rod(start=(-0.15, 0, 0.054), end=(0.15, 0, 0.054), nodes=31, radius=4e-3, material=rubber)
+    scene.add_sphere((0, 0, -0.03), 0.03)
+    simulation = scene.build(time_step=step)
+    start = simulation.energy().total
+    simulation.run(0.3, progress=False)
+    energy = simulation.energy()
+    assert energy.total + energy.dissipated == pytest.approx(start, abs=5e-4 * energy.kinetic)
+    assert energy.kinetic > 5e-3
