@@ -16,6 +16,8 @@ constexpr double kCrushed = 0.5;
 /// An edge that turns by more than 120 degrees against the next, or is twisted so far from its natural twist, is too
 /// long for the motion.
 constexpr double kSharp = 2.0 / 3.0 * std::numbers::pi;
+/// Natural turns between edges [rad], and differences of the two stiffnesses over the greater one, that count.
+constexpr double kBent = 0.02, kUneven = 0.01;
 /// Stiffnesses of rods that differ by more leave few digits to the soft ones.
 constexpr double kMismatch = 1e6;
 
@@ -85,13 +87,24 @@ std::string World::Implementation::unresolved() const {
   const auto angle = [](const Vec3d& a, const Vec3d& b) {
     return std::atan2(to_eigen(a).cross(to_eigen(b)).norm(), dot(a, b));
   };
+  // Where natural curvature, or a section that bends more easily one way, turns with the natural twist; a single
+  // stencil may be a motor.
+  const auto winds = [&](std::size_t b) {
+    const auto row = static_cast<Eigen::Index>(b);
+    if (!(std::abs(parameters.bend_natural(row, 2)) > kSharp)) return false;
+    const auto stiffness = parameters.edge_bend.row(model.bend[b].edge[0]);
+    return parameters.bend_natural.row(row).head<2>().norm() > kBent ||
+           std::abs(stiffness(0) - stiffness(1)) > kUneven * stiffness.maxCoeff();
+  };
   for (std::size_t b = 0; b < model.bend.size(); ++b) {
     const BendStencil& s = model.bend[b];
     const auto row = static_cast<Eigen::Index>(b);
     see(angle(s.sign[0] * c.edge[at(s.edge[0])].tangent, s.sign[1] * c.edge[at(s.edge[1])].tangent), s.node[1],
         "turns");
-    if (!model.planar())
-      see_twist(state.bend_tau(row), c.bend_strain.row(row), parameters.bend_natural(row, 2), s.node[1]);
+    if (model.planar()) continue;
+    see_twist(state.bend_tau(row), c.bend_strain.row(row), parameters.bend_natural(row, 2), s.node[1]);
+    if (winds(b) && b > 0 && winds(b - 1) && model.bend_owner[b].first == model.bend_owner[b - 1].first)
+      see(parameters.bend_natural(row, 2), s.node[1], "is twisted by nature");
   }
   for (std::size_t h = 0; h < (model.planar() ? 0 : model.half.size()); ++h) {
     const FrameStencil& s = model.half[h];

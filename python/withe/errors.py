@@ -24,7 +24,7 @@ class CoarseMeshWarning(UserWarning):
     """Somewhere an edge turns by more than 120 degrees against the next, or twists so: the rod needs more nodes there.
 
     What folds over is far too stiff. Twist counts beyond the natural twist, so that a rod whose natural twist grows
-    may turn as a motor does.
+    may turn as a motor does; natural twist itself where it winds natural curvature, or an uneven section, about a rod.
     Given once a simulation, at an equilibrium or within 64 steps.
     """
 

@@ -264,6 +264,34 @@ def test_a_free_shaft_that_its_clamp_turns_many_times_does_not_warn():
 
 
 @pytest.mark.parametrize(
+    ("section", "curvature", "stencils", "warns"),
+    [
+        (withe.Circle(3e-3), 0.0, slice(None), False),
+        (withe.Circle(3e-3), 5.0, slice(None), True),
+        (withe.Rectangle(2e-3, 8e-3), 0.0, slice(None), True),
+        (withe.Rectangle(2e-3, 8e-3), 5.0, slice(4, 5), False),
+    ],
+    ids=["round", "curved", "strip", "motor"],
+)
+def test_natural_twist_warns_where_it_winds_what_bends_unevenly_faster_than_the_mesh(
+    section, curvature, stencils, warns, recwarn
+):
+    scene = withe.Scene(gravity=(0, 0, 0))
+    rubber = withe.Material(youngs_modulus=1e6, poisson_ratio=0.5, density=1000.0)
+    rod = scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=21, section=section, material=rubber)
+    scene.clamp(rod.start)
+    simulation = scene.build()
+    twist = np.zeros(rod.stencils)
+    twist[stencils] = 2.0 * np.pi / 0.01
+    simulation.set_natural_curvature(rod, (curvature, 0.0))
+    simulation.set_natural_twist(rod, twist)
+    simulation.equilibrium()
+    said = [str(w.message) for w in recwarn.list if issubclass(w.category, withe.CoarseMeshWarning)]
+    assert len(said) == warns
+    assert all("is twisted by nature by 360 degrees" in message for message in said)
+
+
+@pytest.mark.parametrize(
     "advance",
     [
         lambda simulation: simulation.step(70),
