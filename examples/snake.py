@@ -101,7 +101,9 @@ def main() -> None:
     _, nowhere = crawl((FRICTION,) * 3, *options)
     draw(shapes, speeds, arguments.out / "snake.png")
     off = speeds[-1] / PEER - 1.0
-    print(f"Crawls at {1e3 * speeds[-1]:.2f} mm/s, {off:+.1%} of PyElastica's; on even friction {1e3 * nowhere[-1]:.2f}.")
+    print(
+        f"Crawls at {1e3 * speeds[-1]:.2f} mm/s, {off:+.1%} of PyElastica's; on even friction {1e3 * nowhere[-1]:.2f}."
+    )
     print(f"Wrote {arguments.out / 'snake.png'}.")
     if abs(off) > 0.03 or nowhere[-1] > 0.1 * speeds[-1]:
         sys.exit("That is not how this snake crawls.")

@@ -279,8 +279,8 @@ double Contact::accept(State& state, double spare) {
   return put_in;
 }
 
-void Contact::accept_at_rest(State& state) {
-  ContactStiffness(problem_).accept_at_rest(set_, scratch_, state.contact_stiffness);
+void Contact::accept_at_rest(State& state, bool arrived) {
+  ContactStiffness(problem_).accept_at_rest(set_, arrived, scratch_, state.contact_stiffness);
   state.contacts.swap(scratch_.records);
   leave_obstacles(state);
 }

@@ -126,8 +126,10 @@ class Contact {
 
   /// Keeps in `state`, still where the step began, what contacts at q1 must remember: see `ContactStiffness::accept`.
   double accept(State& state, double spare);
-  /// The same in an equilibrium.
-  void accept_at_rest(State& state);
+  /// The same in an equilibrium, or on the way to one.
+  void accept_at_rest(State& state, bool arrived);
+  /// The greatest of the stiffnesses that forces want of contacts, over what they have; no less than 1.
+  double wanted_ratio() const { return ContactStiffness(problem_).wanted_ratio(set_); }
   /// Whether what was accepted last there presses as it did, but for rounding.
   bool presses_alike() const { return scratch_.change <= 1e-9 * scratch_.pressing; }
   /// The same for a step so short that stiffness stays as it is.

@@ -283,15 +283,18 @@ double ContactStiffness::accept(const ContactSet& set, double spare, StiffnessSc
   return put_in;
 }
 
-void ContactStiffness::accept_at_rest(const ContactSet& set, StiffnessScratch& scratch, VectorX& stiffness) const {
+void ContactStiffness::accept_at_rest(const ContactSet& set, bool arrived, StiffnessScratch& scratch,
+                                      VectorX& stiffness) const {
   const double source = source_stiffness(set, scratch.force);
   const auto presses = [&](const Touching& t) {
     return t.lagged < 0 && problem_.touch(t.pair, t.proximity.distance, t.yielded);
   };
   for (const Touching& t : set) {
-    if (source > 0.0 || !presses(t) || problem_.fixed(t.pair) || !(t.depth() > kDeepest)) continue;
+    if (source > 0.0 || !presses(t) || problem_.fixed(t.pair)) continue;
+    const double wanted = wanted_stiffness(t.pair, -t.energy.first);
+    if (!(arrived ? wanted > t.stiffness / t.pair.share : t.depth() > kDeepest)) continue;
     for (int rod : {t.pair.rod_a, t.pair.rod_b})
-      if (rod >= 0) stiffness(rod) = std::max(stiffness(rod), kAhead * wanted_stiffness(t.pair, -t.energy.first));
+      if (rod >= 0) stiffness(rod) = std::max(stiffness(rod), kAhead * wanted);
   }
   scratch.records.clear();
   scratch.pressing = scratch.change = 0.0;
@@ -311,6 +314,14 @@ void ContactStiffness::accept_at_rest(const ContactSet& set, StiffnessScratch& s
     scratch.records.push_back(record);
   }
   finish(set, scratch.records);
+}
+
+double ContactStiffness::wanted_ratio(const ContactSet& set) const {
+  double ratio = 1.0;
+  for (const Touching& t : set)
+    if (t.lagged < 0 && !problem_.fixed(t.pair))
+      ratio = std::max(ratio, wanted_stiffness(t.pair, -t.energy.first) * t.pair.share / t.stiffness);
+  return ratio;
 }
 
 double ContactStiffness::stiffen(const ContactSet& set, const ContactSet& start, bool at_rest,

@@ -39,9 +39,11 @@ class ContactStiffness {
   /// does that of contacts that begin, per rod. Returns the energy that this put in, no more than `spare`, and below
   /// zero where it took some [J].
   double accept(const ContactSet& set, double spare, StiffnessScratch& scratch, VectorX& stiffness) const;
-  /// The same in an equilibrium. Where surfaces are too deep in each other, all contacts of their rods become stiffer,
-  /// and press harder.
-  void accept_at_rest(const ContactSet& set, StiffnessScratch& scratch, VectorX& stiffness) const;
+  /// The same in an equilibrium, or on the way to one. Where a force wants a greater stiffness, on the way where
+  /// surfaces are too deep in each other, all contacts of their rods become stiffer, and press harder.
+  void accept_at_rest(const ContactSet& set, bool arrived, StiffnessScratch& scratch, VectorX& stiffness) const;
+  /// The greatest of the stiffnesses that forces want of contacts, over what they have; no less than 1.
+  double wanted_ratio(const ContactSet& set) const;
   /// The same for a step so short that stiffness stays as it is.
   void remember(const ContactSet& set, const VectorX& stiffness, std::vector<ContactRecord>& records) const;
   /// Makes contacts stiffer that are too deep in `set`, records of the step's start and stiffness of contacts that

@@ -85,7 +85,7 @@ bool Homotopy::stiffen_deep(const VectorX& q) {
   if (contact == nullptr) return false;
   contact->update(q);
   if (!(contact->contacts().depth() > kDeepest)) return false;
-  contact->accept_at_rest(state_);
+  contact->accept_at_rest(state_, false);
   if (contact->presses_alike()) return false;
   go_to(factor_);
   return true;
@@ -95,7 +95,7 @@ void Homotopy::accept(const VectorX& q) {
   const Model& model = equations_.model();
   if (Contact* contact = equations_.contact()) {
     contact->update(q);
-    contact->accept_at_rest(state_);
+    contact->accept_at_rest(state_, false);
   }
   compute_configuration(model, state_, q, scratch_);
   accept_configuration(model, q, scratch_, state_);

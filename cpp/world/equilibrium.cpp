@@ -13,6 +13,8 @@ namespace {
 
 // Times that an equilibrium is sought anew as contact becomes stiffer.
 constexpr int kMostStiffenings = 8;
+// Over what forces wanted of stiffness, what they may want where stiffer contact relieves surfaces.
+constexpr double kRelieved = 0.9;
 
 constexpr const char* kSideways =
     "the equilibrium in the plane of the scene is not stable against motions out of it: in space the scene buckles or "
@@ -113,12 +115,46 @@ bool World::Implementation::drifts(Equations& system) {
   return false;
 }
 
-/// Has what touches press as what is yet to touch will; see `ContactStiffness`.
-void World::Implementation::even_contact(Equations& system) {
-  if (!system.contact()) return;
+/// Has what touches press as what is yet to touch will, and, once arrived at an equilibrium, as hard as it has to
+/// without being deep; see `ContactStiffness`. Whether that is as it did.
+bool World::Implementation::even_contact(Equations& system, bool arrived) {
+  if (!system.contact()) return true;
   system.begin(state, parameters, StepRule::statics, 0.0);
   system.contact()->update(state.q);
-  system.contact()->accept_at_rest(state);
+  system.contact()->accept_at_rest(state, arrived);
+  return system.contact()->presses_alike();
+}
+
+/// Where contact turns out too soft in an equilibrium, and is made stiffer, balance is sought anew from where the scene
+/// has settled; and where surfaces are deeper in each other than forces want them, if it makes them less so: not where
+/// what presses them does not yield.
+void World::Implementation::settle_contact(Equations& system, const Boundary& boundary, StaticResult& r) {
+  Contact& contact = *system.contact();
+  const auto again = [&] {
+    const StaticResult before = r;
+    r = find_equilibrium(system, *newton, options, parameters, nullptr, boundary, state, work.newton);
+    r.branch_changed = r.branch_changed || before.branch_changed;
+    r.newton.iterations += before.newton.iterations;
+  };
+  int tries = 0;
+  for (; r.converged && tries < kMostStiffenings; ++tries) {
+    if (contact.contacts().depth() > kDeepest)
+      contact.stiffen(state, true);
+    else if (contact.presses_alike())
+      break;
+    again();
+  }
+  for (; r.converged && tries < kMostStiffenings; ++tries) {
+    const State reached = state;
+    const StaticResult found = r;
+    const double wanted = contact.wanted_ratio();
+    if (even_contact(system, true)) return;
+    again();
+    if (r.converged && contact.wanted_ratio() < kRelieved * wanted) continue;
+    state = reached;
+    r = found;
+    return;
+  }
 }
 
 /// Equilibrium after `dt` (0: at the present time, with supports and actuation as they are).
@@ -156,7 +192,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   StaticResult r;
   try {
     solve_for_custom_at_rest(system, time);
-    even_contact(system);
+    even_contact(system, false);
     aim_obstacles(system, time);
     aim_hands(system);
     VectorX reached = state.q;
@@ -166,18 +202,8 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
     else
       r = find_equilibrium(system, *newton, options, parameters, reshaped ? &shape_before : nullptr, boundary, state,
                            work.newton);
-    // Where contact turns out too soft, and is made stiffer, balance is sought anew from where the scene has settled.
     from = target;
-    for (int tries = 0; r.converged && system.contact() && tries < kMostStiffenings; ++tries) {
-      if (system.contact()->contacts().depth() > kDeepest)
-        system.contact()->stiffen(state, true);
-      else if (system.contact()->presses_alike())
-        break;
-      const StaticResult before_it = r;
-      r = find_equilibrium(system, *newton, options, parameters, nullptr, boundary, state, work.newton);
-      r.branch_changed = r.branch_changed || before_it.branch_changed;
-      r.newton.iterations += before_it.newton.iterations;
-    }
+    if (r.converged && system.contact()) settle_contact(system, boundary, r);
   } catch (...) {
     undo();
     throw;
@@ -345,7 +371,7 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
     const std::vector<SupportMotion> target = self.motions;
     Equations& system = self.statics();
     self.solve_for_custom_at_rest(system, self.state.time);
-    self.even_contact(system);
+    self.even_contact(system, false);
     const Boundary boundary = self.boundary_between(system, from, target);
     self.rest();
     const ActingPath acting =

@@ -264,7 +264,7 @@ struct World::Implementation : Running {
   void watch_step(double dt, const Equations& system);
   void forget_component(int component);
   std::string unresolved_in_time(double dt, int component) const;
-  std::string unresolved_impact(double dt, const Equations& system) const;
+  std::string unresolved_impact(double dt, const Equations& system);
   double bending_time(int edge) const;
   void add_step_notes();
 
@@ -298,7 +298,8 @@ struct World::Implementation : Running {
   /// stay in its plane, nor where what acts has no potential.
   bool buckles_out_of_plane();
   bool drifts(Equations& system);
-  void even_contact(Equations& system);
+  bool even_contact(Equations& system, bool arrived);
+  void settle_contact(Equations& system, const Boundary& boundary, StaticResult& r);
   void rest();
   Equations& statics();
   Equations& fallback();

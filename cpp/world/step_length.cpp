@@ -36,7 +36,7 @@ constexpr double kSeen = 1e-5;
 constexpr double kEnough = 0.5;
 /// Over the step that an impact would bear, the one that is said: later ones may be faster.
 constexpr double kMargin = 0.8;
-/// Of a component's kinetic energy, what an impact turns round in a step so that its bounce is seen.
+/// Of a component's kinetic and elastic energy, what an impact turns round in a step so that its bounce is seen.
 constexpr double kMuch = 0.1;
 
 }  // namespace
@@ -123,7 +123,7 @@ std::string World::Implementation::unresolved_in_time(double dt, int component) 
 /// Says so where an impact takes up much of a component's motion, and a step of dt is longer than bending takes to go
 /// from a node to the next, and than surfaces take to come through the tolerance of contact: nodes that strike one
 /// after the other, and send waves to each other meanwhile, are all sent off together in such steps.
-std::string World::Implementation::unresolved_impact(double dt, const Equations& system) const {
+std::string World::Implementation::unresolved_impact(double dt, const Equations& system) {
   const Contact* contact = system.contact();
   if (!contact) return "";
   VectorX struck;
@@ -148,8 +148,12 @@ std::string World::Implementation::unresolved_impact(double dt, const Equations&
   for (Eigen::Index i = 0; i < start.size(); ++i)
     kinetic(model.dof_component[at(static_cast<int>(i))]) += 0.5 * system.mass().rows(i) * start(i) * start(i);
   // What works harder than motion can is pressed by something else.
-  const bool much = (struck.array() > kMuch * kinetic.array() && struck.array() <= kinetic.sum()).any();
-  if (!much) return "";
+  const auto much = [&](const VectorX& energy) {
+    return (struck.array() > kMuch * energy.array() && struck.array() <= kinetic.sum()).any();
+  };
+  if (!much(kinetic)) return "";
+  find_component_energies(state, energy_scratch.components);
+  if (!much(kinetic + energy_scratch.components.elastic)) return "";
   return "an impact" + place_of_node(model.edge_tail[at(edge)]).words + " (time " + text(state.time, 6) +
          " s) is over within a step of " + text(dt) +
          " s, in which what strikes one after the other is sent off together, as if the rod were rigid: how high it "

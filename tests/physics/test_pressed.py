@@ -255,3 +255,50 @@ def test_what_is_pressed_onto_a_smooth_bar_stays_within_the_edges_next_to_it(pre
         simulation.move(end, position=(at, y, 0.0201 - press))
     simulation.equilibrium()
     assert np.abs(simulation.positions(rod)[:, 0] - at).max() < 0.015
+
+
+def crossing(friction, integrator, stiffness=None):
+    """A soft rod on pins lies across another, and is pressed down at its ends by a load of its own."""
+    scene = withe.Scene()
+    soft = withe.Material(youngs_modulus=2e6, poisson_ratio=0.5, density=1200.0, viscosity=2e3)
+    below = scene.add_rod(start=(-0.1, 0, 0), end=(0.1, 0, 0), nodes=21, radius=4e-3, material=soft)
+    above = scene.add_rod(start=(0, -0.1, 8.16e-3), end=(0, 0.1, 8.16e-3), nodes=21, radius=4e-3, material=soft)
+    for end in (below.start, below.end):
+        scene.clamp(end)
+    for end in (above.start, above.end):
+        scene.pin(end, free=(0, 0, 1))
+        scene.add_force(end, (0, 0, 0))
+    scene.enable_contact(friction=friction, stiffness=stiffness)
+    return scene.build(integrator=integrator, time_step=5e-3)
+
+
+def press(simulation, force):
+    for load in ("force 1", "force 2"):
+        simulation.set(load, force=(0, 0, -0.5 * force))
+    simulation.equilibrium()
+    return simulation.contacts()["gap"].min()
+
+
+@pytest.mark.parametrize("integrator", ["backward_euler", "implicit_midpoint"])
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+@pytest.mark.parametrize("force", [0.01, 0.3])
+def test_an_equilibrium_with_contact_is_one_for_steps_too_and_stays_where_it_is(friction, integrator, force):
+    simulation = crossing(friction, integrator)
+    press(simulation, force)
+    before = simulation.positions()
+    for _ in range(2):
+        simulation.step(40)
+        np.testing.assert_allclose(simulation.positions(), before, atol=1e-12)
+        simulation.equilibrium()
+        np.testing.assert_allclose(simulation.positions(), before, atol=1e-12)
+
+
+@pytest.mark.parametrize("stiffness", [None, 20.0, 50.0, 200.0])
+def test_however_soft_contact_begins_surfaces_are_not_deep_in_each_other_at_rest(stiffness):
+    """A stiffness that is given grows where it is too small; what has been pressed comes back with the load."""
+    simulation = crossing(0.0, "static", stiffness)
+    gaps = [press(simulation, force) for force in (5e-3, 0.02, 0.05, 0.1, 0.2, 0.5, 0.2, 0.05, 5e-3)]
+    assert min(gaps) > -0.045 * 4e-3
+    assert np.all(np.diff(gaps[5:]) > 0.0)
+    at_once = crossing(0.0, "static", stiffness)
+    assert press(at_once, 0.5) == pytest.approx(gaps[5], abs=0.03 * 4e-3)

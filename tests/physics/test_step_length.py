@@ -174,3 +174,21 @@ def test_impacts_that_lose_what_they_are_told_to_are_resolved_as_they_are():
         high, found = dropped(5e-3, **options)
         assert high < 0.15
         assert not any("an impact" in message for message, _ in found)
+
+
+@pytest.mark.parametrize("speed", [0.005, 0.02])
+def test_what_is_pressed_slowly_is_no_impact(speed):
+    """Its first touch takes up much of what little moves, and nothing of what bends."""
+    scene = withe.Scene(gravity=(0, 0, 0))
+    rubber = withe.Material(youngs_modulus=2e6, poisson_ratio=0.5, density=1200.0, viscosity=2e3)
+    below = scene.add_rod(start=(-0.1, 0, 0), end=(0.1, 0, 0), nodes=21, radius=4e-3, material=rubber)
+    above = scene.add_rod(start=(0, -0.1, 0.012), end=(0, 0.1, 0.012), nodes=21, radius=4e-3, material=rubber)
+    for end in (below.start, below.end):
+        scene.clamp(end)
+    hands = [scene.clamp(end) for end in (above.start, above.end)]
+    scene.enable_contact(friction=0.3)
+    simulation = scene.build()
+    for hand, y in zip(hands, (-0.1, 0.1), strict=True):
+        simulation.move(hand, position=(0, y, -0.02), over=0.032 / speed)
+    assert not heard(simulation, round(0.032 / speed / 5e-3))
+    assert simulation.contacts()["normal_force"].sum() > 0.1

@@ -118,6 +118,11 @@ def _directions(value: Friction | npt.ArrayLike, what: str, *, directed: bool) -
         numbers = validation.number_array(value, what, (3,))
         forward, backward, across = map(validation.non_negative, numbers, (f"{what} {word}" for word in words))
         return forward, backward, across
+    if np.size(value) != 2:  # type: ignore[arg-type]
+        raise ValueError(
+            f"{what} must be one number, two (along and across a rod), or three (towards its end, towards its start, "
+            f"across it), got {value!r:.80}"
+        )
     along, across = validation.number_array(value, what, (2,))
     along = validation.non_negative(along, f"{what} along")
     return along, along, validation.non_negative(across, f"{what} across")
