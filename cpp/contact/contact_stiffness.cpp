@@ -289,13 +289,21 @@ void ContactStiffness::accept_at_rest(const ContactSet& set, bool arrived, Stiff
   const auto presses = [&](const Touching& t) {
     return t.lagged < 0 && problem_.touch(t.pair, t.proximity.distance, t.yielded);
   };
+  VectorX& greatest = scratch.greatest;
+  greatest = problem_.parameters->least_stiffness;
   for (const Touching& t : set) {
     if (source > 0.0 || !presses(t) || problem_.fixed(t.pair)) continue;
     const double wanted = wanted_stiffness(t.pair, -t.energy.first);
-    if (!(arrived ? wanted > t.stiffness / t.pair.share : t.depth() > kDeepest)) continue;
-    for (int rod : {t.pair.rod_a, t.pair.rod_b})
-      if (rod >= 0) stiffness(rod) = std::max(stiffness(rod), kAhead * wanted);
+    const bool more = arrived ? wanted > t.stiffness / t.pair.share : t.depth() > kDeepest;
+    for (int rod : {t.pair.rod_a, t.pair.rod_b}) {
+      if (rod < 0) continue;
+      greatest(rod) = std::max(greatest(rod), wanted);
+      if (more) stiffness(rod) = std::max(stiffness(rod), kAhead * wanted);
+    }
   }
+  // What a rod has met on the way is no reason to be stiff for.
+  for (Eigen::Index rod = 0; arrived && source == 0.0 && rod < greatest.size(); ++rod)
+    if (stiffness(rod) > kSlack * greatest(rod)) stiffness(rod) = kAhead * greatest(rod);
   scratch.records.clear();
   scratch.pressing = scratch.change = 0.0;
   for (const Touching& t : set) {

@@ -126,8 +126,8 @@ bool World::Implementation::even_contact(Equations& system, bool arrived) {
 }
 
 /// Where contact turns out too soft in an equilibrium, and is made stiffer, balance is sought anew from where the scene
-/// has settled; and where surfaces are deeper in each other than forces want them, if it makes them less so: not where
-/// what presses them does not yield.
+/// has settled; and where contact is far too stiff for its forces, or surfaces are deeper in each other than forces
+/// want them, if it makes them less so: not where what presses them does not yield.
 void World::Implementation::settle_contact(Equations& system, const Boundary& boundary, StaticResult& r) {
   Contact& contact = *system.contact();
   const auto again = [&] {
@@ -150,7 +150,7 @@ void World::Implementation::settle_contact(Equations& system, const Boundary& bo
     const double wanted = contact.wanted_ratio();
     if (even_contact(system, true)) return;
     again();
-    if (r.converged && contact.wanted_ratio() < kRelieved * wanted) continue;
+    if (r.converged && (wanted == 1.0 || contact.wanted_ratio() < kRelieved * wanted)) continue;
     state = reached;
     r = found;
     return;
