@@ -272,23 +272,25 @@ void Contact::predict_friction(const VectorX& change, ContactLinearisation& line
   predict(FrictionKind::rolling, linearisation.rolling);
 }
 
-double Contact::accept(State& state, double spare) {
-  const double put_in = ContactStiffness(problem_).accept(set_, spare, scratch_, state.contact_stiffness);
+void Contact::leave(State& state) {
   state.contacts.swap(scratch_.records);
   leave_obstacles(state);
+}
+
+double Contact::accept(State& state, double spare) {
+  const double put_in = ContactStiffness(problem_).accept(set_, spare, scratch_, state.contact_stiffness);
+  leave(state);
   return put_in;
 }
 
 void Contact::accept_at_rest(State& state, bool arrived) {
   ContactStiffness(problem_).accept_at_rest(set_, arrived, scratch_, state.contact_stiffness);
-  state.contacts.swap(scratch_.records);
-  leave_obstacles(state);
+  leave(state);
 }
 
 void Contact::remember(State& state) {
   ContactStiffness(problem_).remember(set_, state.contact_stiffness, scratch_.records);
-  state.contacts.swap(scratch_.records);
-  leave_obstacles(state);
+  leave(state);
 }
 
 double Contact::stiffen(State& state, bool at_rest) {

@@ -150,6 +150,8 @@ class Contact {
   void restart(const State& state, double duration);
   void move_obstacles();
   void lag_friction();
+  /// Gives a state the records that were found, with obstacles where they were to go.
+  void leave(State& state);
   /// Notes in a state that obstacles have come to where they were to go.
   void leave_obstacles(State& state) const;
 

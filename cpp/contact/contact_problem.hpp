@@ -14,7 +14,8 @@ inline constexpr double kDepth = 0.01;
 /// No deeper than this where a step, an equilibrium or a drawing is accepted.
 inline constexpr double kDeepest = 0.04;
 
-/// Greatest depth that presses no more, over the smaller radius, where it is not for the sake of energy.
+/// Greatest depth that presses no more with which contacts begin beside others of their bodies, over the smaller
+/// radius.
 inline constexpr double kMostYield = 0.02;
 
 /// How surfaces press in a step (see pressing_law.hpp): in statics and explicit steps, where nothing is known of

@@ -222,6 +222,10 @@ ContactRecord ContactStiffness::record(const Touching& t) const {
   return record;
 }
 
+bool ContactStiffness::presses(const Touching& t) const {
+  return t.lagged < 0 && problem_.touch(t.pair, t.proximity.distance, t.yielded);
+}
+
 /// Sorts records, and adds what lagged friction did.
 void ContactStiffness::finish(const ContactSet& set, std::vector<ContactRecord>& records) const {
   std::sort(records.begin(), records.end(), by_key);
@@ -235,7 +239,7 @@ void ContactStiffness::remember(const ContactSet& set, const VectorX& stiffness,
                                 std::vector<ContactRecord>& records) const {
   records.clear();
   for (const Touching& t : set) {
-    if (t.lagged >= 0 || !problem_.touch(t.pair, t.proximity.distance, t.yielded)) continue;
+    if (!presses(t)) continue;
     records.push_back(record(t));
     if (problem_.record_of(t.pair.key) == nullptr)
       records.back().stiffness = start_stiffness(problem_, t.pair, stiffness);
@@ -255,7 +259,7 @@ double ContactStiffness::accept(const ContactSet& set, double spare, StiffnessSc
   double put_in = 0.0, wanted = 0.0;
   for (const Touching& t : set) {
     const ContactPair& pair = t.pair;
-    if (t.lagged >= 0 || !problem_.touch(pair, t.proximity.distance, t.yielded)) continue;
+    if (!presses(t)) continue;
     ContactRecord record = this->record(t);
     double ratio = source && !problem_.fixed(pair) ? common / record.stiffness : wanted_ratio(t, record);
     if (ratio > 1.0) {
@@ -286,9 +290,6 @@ double ContactStiffness::accept(const ContactSet& set, double spare, StiffnessSc
 void ContactStiffness::accept_at_rest(const ContactSet& set, bool arrived, StiffnessScratch& scratch,
                                       VectorX& stiffness) const {
   const double source = source_stiffness(set, scratch.force);
-  const auto presses = [&](const Touching& t) {
-    return t.lagged < 0 && problem_.touch(t.pair, t.proximity.distance, t.yielded);
-  };
   VectorX& greatest = scratch.greatest;
   greatest = problem_.parameters->least_stiffness;
   for (const Touching& t : set) {

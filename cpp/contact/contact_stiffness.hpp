@@ -60,6 +60,8 @@ class ContactStiffness {
   bool begins_at_rest(const Touching& t, ContactRecord& record) const;
   bool begins_anew(const Touching& t, bool struck, ContactRecord& record) const;
   bool is_struck(const ContactPair& pair) const;
+  /// Whether it is near enough to press, and not there for its friction of the start alone.
+  bool presses(const Touching& t) const;
   ContactRecord record(const Touching& t) const;
   void finish(const ContactSet& set, std::vector<ContactRecord>& records) const;
   double yielded_at(const Touching& t, double ratio) const;

@@ -89,8 +89,7 @@ void write_contact(Writer& w, const ContactDescription& contact) {
   w(static_cast<std::int64_t>(contact.pairs.size()));
   for (const ContactPairDescription& p : contact.pairs) {
     w(p.first), w(p.second), w(p.ignored);
-    w(p.friction);
-    for (double x : {p.stiffness, p.restitution}) w(x);
+    w(p.friction), w(p.stiffness), w(p.restitution);
     w(static_cast<std::int64_t>(p.shares.size()));
     w(p.shares);
   }
@@ -111,8 +110,7 @@ ContactDescription read_contact(Reader& r, ContactDescription contact) {
   contact.pairs.assign(static_cast<std::size_t>(count), {});
   for (ContactPairDescription& p : contact.pairs) {
     r(p.first), r(p.second), r(p.ignored);
-    r(p.friction);
-    for (double* x : {&p.stiffness, &p.restitution}) r(*x);
+    r(p.friction), r(p.stiffness), r(p.restitution);
     r(count);
     require(count >= 0 && count < 1 << 28, "snapshot is damaged: impossible friction");
     p.shares.resize(count);

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -136,12 +136,12 @@ def as_given(directions: Directions) -> float | tuple[float, float] | Directions
     return across if forward == across else (forward, across)
 
 
-def by_given(by_directions: npt.NDArray[np.float64], shape: tuple[int, ...]) -> npt.NDArray[np.float64]:
+def by_given(by_directions: npt.NDArray[np.float64], shape: tuple[int, ...]) -> npt.NDArray[np.float64] | float:
     """Derivatives by coefficients as they were given, from those by each direction."""
     forward, backward, across = by_directions
     if shape == (3,):
         return by_directions
-    return np.array((forward + backward, across)) if shape == (2,) else by_directions.sum()
+    return np.array((forward + backward, across)) if shape == (2,) else float(by_directions.sum())
 
 
 def check_law(directions: Directions, friction_model: str, what: str) -> None:
@@ -161,16 +161,20 @@ def check_rolling(rolling_friction: float, friction_model: str, name: str) -> No
         )
 
 
+def _numbers(row: npt.NDArray[np.float64]) -> Directions:
+    forward, backward, across = map(float, row)
+    return forward, backward, across
+
+
 def obstacle_friction(contact: _core.ContactDescription, index: int) -> Directions:
     """Present coefficients of an obstacle."""
-    forward, backward, across = map(float, contact.obstacle_friction[index])
-    return forward, backward, across
+    return _numbers(contact.obstacle_friction[index])
 
 
 def own_friction(pair: _core.ContactPairDescription) -> Directions | None:
     """What two bodies have of their own, if anything."""
-    forward, backward, across = map(float, pair.friction)
-    return (forward, backward, across) if forward >= 0.0 else None
+    directions = _numbers(pair.friction)
+    return directions if directions[0] >= 0.0 else None
 
 
 def with_obstacle(contact: _core.ContactDescription, index: int, directions: Directions) -> _core.ContactDescription:
@@ -211,7 +215,7 @@ def pair_in(pairs: list[_core.ContactPairDescription], bodies: tuple[int, int]) 
 
 
 def pair_between(
-    pairs: Iterable[_core.ContactPairDescription], bodies: tuple[int, int]
+    pairs: Iterable[_core.ContactPairDescription], bodies: Collection[int]
 ) -> _core.ContactPairDescription | None:
     """What two bodies have of their own, if anything."""
     return next((own for own in pairs if {own.first, own.second} == set(bodies)), None)

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from withe import _core
 from withe.parts.contacts import Body, BodyPair, touching
-from withe.parts.friction import as_given, by_given, obstacle_friction, own_friction
+from withe.parts.friction import as_given, by_given, obstacle_friction, own_friction, pair_between
 from withe.parts.handles import Drag, Fluid, Load, Mass, NodeHandle, Obstacle, Rod, Spring, Support
 from withe.parts.kinds import (
     DragPart,
@@ -132,7 +132,7 @@ def reader_of(session: Session, part: Part | BodyPair, word: str) -> Reader:
     if isinstance(part, ObstaclePart | BodyPair) and word == "friction":
         given = _friction_given(session, part)
         read = friction_reader(session, part)
-        return lambda g: by_given(read(g), np.shape(given)) if np.ndim(given) else float(read(g).sum())
+        return lambda g: by_given(read(g), np.shape(given))
     if isinstance(part, ObstaclePart) and word == "rolling_friction":
         index = session.directory.all(ObstaclePart).index(part)
         _check_rubs(float(session.contact.obstacle_rolling[index]), f"{part.name}, of rods that roll,")
@@ -229,11 +229,11 @@ def _friction_given(session: Session, part: ObstaclePart | BodyPair) -> float | 
     if isinstance(part, ObstaclePart):
         given = as_given(obstacle_friction(contact, session.directory.all(ObstaclePart).index(part)))
     else:
-        bodies = part.bodies(session.directory)
-        found = [own_friction(own) for own in contact.pairs if {own.first, own.second} == bodies]
-        if not found or found[0] is None:
+        own = pair_between(contact.pairs, part.bodies(session.directory))
+        directions = None if own is None else own_friction(own)
+        if directions is None:
             raise ValueError(f"{part.name} have no friction of their own: give them one by set_friction")
-        given = as_given(found[0])
+        given = as_given(directions)
     _check_rubs(np.max(given), part.name)
     return given
 
