@@ -171,10 +171,11 @@ def obstacle_friction(contact: _core.ContactDescription, index: int) -> Directio
     return _numbers(contact.obstacle_friction[index])
 
 
-def own_friction(pair: _core.ContactPairDescription) -> Directions | None:
-    """What two bodies have of their own, if anything."""
-    directions = _numbers(pair.friction)
-    return directions if directions[0] >= 0.0 else None
+def own_friction(pair: _core.ContactPairDescription | None) -> Directions | None:
+    """Coefficients that two bodies have of their own, if any; of what `pair_between` finds."""
+    if pair is None or pair.friction[0] < 0.0:
+        return None
+    return _numbers(pair.friction)
 
 
 def with_obstacle(contact: _core.ContactDescription, index: int, directions: Directions) -> _core.ContactDescription:

@@ -111,7 +111,7 @@ def _with_obstacle_friction(
         bodies = rod.index, -1 - index
         own = pair_between(contact.pairs, bodies)
         shares = _shares_now(session, rod, part, given)
-        if (own is None and shares is None) or (own is not None and own_friction(own) is not None):
+        if (own is None and shares is None) or own_friction(own) is not None:
             continue
         contact = with_pair(contact, bodies, None, shares)
     return contact
@@ -152,7 +152,7 @@ def pair_value(session: Session, a: Body, b: Body) -> Friction | None:
     parts = [touching(session.directory, name) for name in names]
     first, second = (body_of(session.directory, part) for part in parts)
     own = pair_between(session.contact.pairs, (first, second))
-    directions = None if own is None else own_friction(own)
+    directions = own_friction(own)
     if own is None or directions is None:
         return None
     if not len(own.shares):

@@ -229,8 +229,7 @@ def _friction_given(session: Session, part: ObstaclePart | BodyPair) -> float | 
     if isinstance(part, ObstaclePart):
         given = as_given(obstacle_friction(contact, session.directory.all(ObstaclePart).index(part)))
     else:
-        own = pair_between(contact.pairs, part.bodies(session.directory))
-        directions = None if own is None else own_friction(own)
+        directions = own_friction(pair_between(contact.pairs, part.bodies(session.directory)))
         if directions is None:
             raise ValueError(f"{part.name} have no friction of their own: give them one by set_friction")
         given = as_given(directions)
