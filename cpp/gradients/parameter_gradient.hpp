@@ -16,6 +16,7 @@ struct ParameterGradient {
   std::vector<VectorX> natural_twist, natural_stretch;
   MatrixX3 loads;
   VectorX spring_stiffness, spring_rest_length, spring_damping;
+  VectorX joint_stiffness, joint_rest_angle, joint_damping, joint_moment;  ///< per revolute joint
   double fluid_viscosity = 0, friction = 0, slip_tolerance = 0;
   MatrixX3 obstacle_friction, pair_friction;
   VectorX obstacle_rolling;

@@ -26,6 +26,15 @@ struct Cluster {
   JointForm form = JointForm::frame;
   int frame = -1;
   int hinge = -1;
+  int merged_into = -1;  ///< of a plane that lets them turn by nothing: the one that has its passes now
+};
+
+/// Where a revolute link is, before frames have unknowns.
+struct LinkPlace {
+  int parent, child;  ///< clusters, the latter of which turns; in space about the hinge
+  double sign;        ///< of its unknown
+  int hinge = -1;
+  bool turns = true;
 };
 
 VectorX to_vector(const std::vector<double>& v) {
@@ -44,6 +53,7 @@ class Builder {
     resolve_supports();
     share_bending();
     lay_out_unknowns(model_);
+    find_joint_angles();
     add_constraints(model_);
     find_components();
     draw();
@@ -121,32 +131,90 @@ class Builder {
         clusters_.push_back({passes, static_cast<int>(j), joint.form});
         for (const RodPass& pass : passes) cluster_of_[{pass.rod, pass.node}] = static_cast<int>(clusters_.size()) - 1;
       }
-      for (const RevoluteLink& link : joint.links) add_link(base + link.parent, base + link.child, link.axis);
+      add_links(joint, base);
     }
   }
 
-  void add_link(int parent, int child, const Vector3& axis) {
+  void add_links(const JointDescription& joint, int base) {
     if (model_.planar()) {
-      if (axis.cross(model_.plane->normal).norm() < 1e-9) return;  // in its plane a hinge is a pin
-      Cluster& to = clusters_[static_cast<std::size_t>(parent)];
-      for (const RodPass& pass : clusters_[static_cast<std::size_t>(child)].passes) {
-        to.passes.push_back(pass);
-        cluster_of_[{pass.rod, pass.node}] = parent;
-      }
-      clusters_[static_cast<std::size_t>(child)].passes.clear();
+      for (const RevoluteLink& link : joint.links) add_planar_link(base + link.parent, base + link.child, link.axis);
       return;
     }
-    // Every hinge turns against one root, so a chain of hinges at one node starts at its middle.
-    if (clusters_[static_cast<std::size_t>(child)].hinge >= 0) std::swap(parent, child);
-    Cluster& c = clusters_[static_cast<std::size_t>(child)];
-    const Cluster& other = clusters_[static_cast<std::size_t>(parent)];
-    if (c.hinge >= 0 || other.hinge >= 0)
-      throw std::invalid_argument("revolute joints at one node must all turn against the same rod: where '" +
-                                  rod(other.passes.front().rod).name + "' and '" + rod(c.passes.front().rod).name +
-                                  "' are joined, join each of the rods to one of them");
-    c.hinge = static_cast<int>(model_.hinges.size());
-    model_.hinges.push_back({-1, axis.normalized(), -1});
-    hinge_parent_.push_back(parent);
+    if (joint.links.empty()) return;
+    const int root = root_of(joint, base);
+    for (const RevoluteLink& link : joint.links) {
+      const bool swapped = base + link.child == root;
+      const int turning = base + (swapped ? link.parent : link.child);
+      Cluster& cluster = clusters_[at(turning)];
+      cluster.hinge = static_cast<int>(model_.hinges.size());
+      model_.hinges.push_back({-1, link.axis.normalized(), -1});
+      hinge_parent_.push_back(root);
+      links_.push_back({root, turning, swapped ? -1.0 : 1.0, cluster.hinge});
+    }
+  }
+
+  void add_planar_link(int parent, int child, const Vector3& axis) {
+    for (int* cluster : {&parent, &child})
+      while (clusters_[at(*cluster)].merged_into >= 0) *cluster = clusters_[at(*cluster)].merged_into;
+    const double along = axis.dot(model_.plane->normal);
+    const bool turns = std::abs(along) > 0.5;
+    links_.push_back({parent, child, along < 0.0 ? -1.0 : 1.0, -1, turns});
+    if (!turns) merge(parent, child);
+  }
+
+  /// The cluster that all others at a node turn against in space; of two that which is clamped, else the first.
+  int root_of(const JointDescription& joint, int base) const {
+    const auto in_all = [&](int cluster) {
+      return std::all_of(joint.links.begin(), joint.links.end(),
+                         [&](const RevoluteLink& link) { return link.parent == cluster || link.child == cluster; });
+    };
+    const RevoluteLink& first = joint.links.front();
+    if (joint.links.size() == 1 && is_clamped(base + first.child) && !is_clamped(base + first.parent))
+      return base + first.child;
+    for (int cluster : {first.parent, first.child})
+      if (in_all(cluster)) return base + cluster;
+    const auto name = [&](int cluster) {
+      return "'" + rod(clusters_[at(base + cluster)].passes.front().rod).name + "'";
+    };
+    throw std::invalid_argument("revolute joints at one node must all turn against the same rod: where " +
+                                name(first.parent) + " and " + name(first.child) +
+                                " are joined, join each of the rods to one of them");
+  }
+
+  bool is_clamped(int cluster) const {
+    const auto in_cluster = [&](const RodPass& pass) {
+      const auto found = cluster_of_.find({pass.rod, pass.node});
+      return found != cluster_of_.end() && found->second == cluster;
+    };
+    return std::any_of(scene_.supports.begin(), scene_.supports.end(), [&](const SupportDescription& support) {
+      return holds_frame(support.kind) && in_cluster(support.pass);
+    });
+  }
+
+  /// Makes two clusters one.
+  void merge(int to, int from) {
+    if (to == from) return;
+    for (const RodPass& pass : clusters_[at(from)].passes) {
+      clusters_[at(to)].passes.push_back(pass);
+      cluster_of_[{pass.rod, pass.node}] = to;
+    }
+    clusters_[at(from)].passes.clear();
+    clusters_[at(from)].merged_into = to;
+  }
+
+  void find_joint_angles() {
+    for (const auto& [parent, child, sign, hinge, turns] : links_) {
+      JointAngle joint;
+      joint.sign = sign;
+      joint.node = global_node(clusters_[at(parent)].passes.front());
+      if (hinge >= 0) {
+        joint.turning = model_.hinges[at(hinge)].dof;
+      } else if (turns) {
+        joint.turning = model_.frame_dof[at(clusters_[at(child)].frame)];
+        joint.against = model_.frame_dof[at(clusters_[at(parent)].frame)];
+      }
+      model_.joint_angles.push_back(joint);
+    }
   }
 
   Cluster& cluster_at(RodPass pass) {
@@ -193,6 +261,10 @@ class Builder {
       }
     for (std::size_t h = 0; h < model_.hinges.size(); ++h)
       model_.hinges[h].frame = frame_of(clusters_[static_cast<std::size_t>(hinge_parent_[h])]);
+    if (model_.planar())
+      for (const LinkPlace& link : links_)
+        for (int side : {link.parent, link.child})
+          if (link.turns) frame_of(clusters_[at(side)]);
     for (Cluster& cluster : clusters_)
       if (cluster.hinge < 0 && cluster.passes.size() > 1 && cluster.form == JointForm::frame && !continues(cluster))
         frame_of(cluster);
@@ -444,6 +516,7 @@ class Builder {
   std::vector<Cluster> clusters_;
   std::map<Key, int> cluster_of_;
   std::set<int> gripped_frames_;
+  std::vector<LinkPlace> links_;
   std::vector<int> hinge_parent_, frame_node_;
   std::vector<double> bend_voronoi_, half_voronoi_;
   std::vector<bool> offsets_keep_drawn_;

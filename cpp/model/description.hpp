@@ -45,6 +45,11 @@ struct RevoluteLink {
   int parent = 0;  ///< index of a cluster of the joint
   int child = 0;
   Vector3 axis = Vector3::UnitZ();  ///< unit length, in the drawn configuration
+  // Between them, see forces/joint.hpp:
+  double stiffness = 0;   ///< k [N m/rad]
+  double rest_angle = 0;  ///< [rad]
+  double damping = 0;     ///< c [N m s/rad]
+  double moment = 0;      ///< of a motor, on the child [N m]
 };
 
 enum class JointForm {

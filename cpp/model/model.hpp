@@ -48,6 +48,21 @@ struct Hinge {
   int dof;
 };
 
+/// The angle of a revolute joint by the unknowns, 0 as it is drawn: sign (q[turning] - q[against]). In space a hinge
+/// has an unknown of its own, and there is nothing to turn against; in a plane it lies between two frames. A plane lets
+/// nothing turn about an axis that lies in it.
+struct JointAngle {
+  int turning = -1, against = -1;
+  double sign = 1;
+  int node = 0;
+
+  bool turns() const { return turning >= 0; }
+  /// Of unknowns, or of their rates.
+  double angle(const VectorX& q) const {
+    return turns() ? sign * (q[turning] - (against < 0 ? 0.0 : q[against])) : 0.0;
+  }
+};
+
 /// Where the curvature of a rod's stencil is: an ordinary stencil, or one or two halves at a frame.
 struct StencilPlace {
   int bend = -1;
@@ -137,6 +152,8 @@ struct Parameters {
   std::vector<VectorX> natural_twist;       ///< per rod and stencil [rad/m]
   SurfaceParameters surfaces;
   VectorX spring_stiffness, spring_rest_length, spring_damping;  ///< per spring [N/m], [m], [N s/m]
+  /// Per revolute joint [N m/rad], [rad], [N m s/rad], [N m].
+  VectorX joint_stiffness, joint_rest_angle, joint_damping, joint_moment;
   MatrixX3 loads;  ///< rows of each load after those of the one before; see `LoadDescription::values`
   BendMeasure measure;
   bool lumped = false;       ///< whether masses sit at nodes alone; see mass_matrix.hpp
@@ -175,11 +192,12 @@ struct Model {
   std::vector<BendStencil> bend;
   std::vector<int> reversed_bend;  ///< stencils with an edge against its rod
   std::vector<FrameStencil> half;
-  VectorX bend_voronoi, half_voronoi;  ///< [m]
-  std::vector<VectorX> rod_voronoi;    ///< [rod](stencil), of the whole stencil, wherever its curvature is [m]
-  MatrixX2 bend_share;                 ///< per stencil: the part of each of its edges whose bending it carries; 1/2,
-  VectorX half_share;                  ///< but 5/12 at a frame and 7/12 at the edge's other end; see build_model.cpp
-  std::vector<Hinge> hinges;
+  VectorX bend_voronoi, half_voronoi;    ///< [m]
+  std::vector<VectorX> rod_voronoi;      ///< [rod](stencil), of the whole stencil, wherever its curvature is [m]
+  MatrixX2 bend_share;                   ///< per stencil: the part of each of its edges whose bending it carries; 1/2,
+  VectorX half_share;                    ///< but 5/12 at a frame and 7/12 at the edge's other end; see build_model.cpp
+  std::vector<Hinge> hinges;             ///< in space
+  std::vector<JointAngle> joint_angles;  ///< per revolute joint, in the order of the scene's joints and their links
   std::vector<std::vector<StencilPlace>> place;  ///< [rod][stencil]
   std::vector<Vector2> planar_components;        ///< per rod: kappa = p . (kappa1, kappa2)
   std::vector<std::vector<int>> wall_half;       ///< [rod]: halves at its first and last node, or -1

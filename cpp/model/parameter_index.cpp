@@ -15,7 +15,7 @@ namespace {
 
 using enum ParameterKind;
 
-constexpr std::array<ParameterInfo, 28> kIndex{{
+constexpr std::array<ParameterInfo, 32> kIndex{{
     {stretch_stiffness, "stretch_stiffness", Extent::edge, 1, "N", Range::positive, Derived::nothing},
     {bend_stiffness, "bend_stiffness", Extent::edge, 2, "N m^2", Range::positive, Derived::stiffness},
     {twist_stiffness, "twist_stiffness", Extent::edge, 1, "N m^2", Range::positive, Derived::stiffness},
@@ -34,6 +34,10 @@ constexpr std::array<ParameterInfo, 28> kIndex{{
     {spring_stiffness, "spring_stiffness", Extent::spring, 1, "N/m", Range::non_negative, Derived::nothing},
     {spring_rest_length, "spring_rest_length", Extent::spring, 1, "m", Range::non_negative, Derived::nothing},
     {spring_damping, "spring_damping", Extent::spring, 1, "N s/m", Range::non_negative, Derived::nothing},
+    {joint_stiffness, "joint_stiffness", Extent::joint, 1, "N m/rad", Range::non_negative, Derived::nothing},
+    {joint_rest_angle, "joint_rest_angle", Extent::joint, 1, "rad", Range::any, Derived::nothing},
+    {joint_damping, "joint_damping", Extent::joint, 1, "N m s/rad", Range::non_negative, Derived::nothing},
+    {joint_moment, "joint_moment", Extent::joint, 1, "N m", Range::any, Derived::nothing},
     {friction, "friction", Extent::scene, 1, "-", Range::non_negative, Derived::nothing},
     {slip_tolerance, "slip_tolerance", Extent::scene, 1, "m/s", Range::positive, Derived::nothing},
     {restitution, "restitution", Extent::scene, 1, "-", Range::non_negative, Derived::nothing},
@@ -75,6 +79,8 @@ Eigen::Index rows_of(const Model& model, const ParameterInfo& info, int rod) {
       return model.rod_voronoi[at(rod)].size();
     case Extent::spring:
       return static_cast<Eigen::Index>(model.description.springs.size());
+    case Extent::joint:
+      return static_cast<Eigen::Index>(model.joint_angles.size());
     case Extent::load:
       return first_load_row(model.description, model.description.loads.size());
     case Extent::obstacle:
@@ -145,6 +151,14 @@ ParameterView parameter_view(const Model& model, Parameters& p, ParameterKind ki
         return p.spring_rest_length.data();
       case spring_damping:
         return p.spring_damping.data();
+      case joint_stiffness:
+        return p.joint_stiffness.data();
+      case joint_rest_angle:
+        return p.joint_rest_angle.data();
+      case joint_damping:
+        return p.joint_damping.data();
+      case joint_moment:
+        return p.joint_moment.data();
       case friction:
         return &p.surfaces.friction;
       case slip_tolerance:

@@ -27,6 +27,10 @@ enum class ParameterKind {
   spring_stiffness,
   spring_rest_length,
   spring_damping,
+  joint_stiffness,
+  joint_rest_angle,
+  joint_damping,
+  joint_moment,
   friction,
   slip_tolerance,
   restitution,
@@ -40,8 +44,9 @@ enum class ParameterKind {
 };
 
 /// What a parameter has a row of numbers for: the scene; every node; every edge, or stencil, of a rod; every obstacle;
-/// every spring; every load, or each of its edges; every pair of bodies that has something of its own.
-enum class Extent { scene, node, edge, stencil, spring, load, obstacle, pair };
+/// every spring; every revolute joint; every load, or each of its edges; every pair of bodies that has something of its
+/// own.
+enum class Extent { scene, node, edge, stencil, spring, joint, load, obstacle, pair };
 
 enum class Range { any, non_negative, positive };
 

@@ -166,6 +166,17 @@ Parameters initial_parameters(const Model& model) {
   for (VectorX* v : {&p.spring_stiffness, &p.spring_rest_length, &p.spring_damping})
     v->resize(static_cast<Eigen::Index>(scene.springs.size()));
   for (std::size_t s = 0; s < scene.springs.size(); ++s) set_spring(static_cast<int>(s), scene.springs[s], p);
+  for (VectorX* v : {&p.joint_stiffness, &p.joint_rest_angle, &p.joint_damping, &p.joint_moment})
+    v->resize(static_cast<Eigen::Index>(model.joint_angles.size()));
+  Eigen::Index j = 0;
+  for (const JointDescription& joint : scene.joints)
+    for (const RevoluteLink& link : joint.links) {
+      p.joint_stiffness[j] = link.stiffness;
+      p.joint_rest_angle[j] = link.rest_angle;
+      p.joint_damping[j] = link.damping;
+      p.joint_moment[j] = link.moment;
+      ++j;
+    }
   p.added_mass = scene.added_mass;
   p.gravity = scene.gravity;
   p.loads.resize(first_load_row(scene, scene.loads.size()), 3);

@@ -44,6 +44,14 @@ bool fits(const ObstacleDescription& o, const Vector3& corner, const Vector3& no
   return axis.cross(normal).norm() <= size && start * end < 0.0;
 }
 
+/// Across a line, where revolute joints turn what lies along it.
+std::optional<Vector3> turning_across(const SceneDescription& scene, const Vector3& line) {
+  for (const JointDescription& joint : scene.joints)
+    for (const RevoluteLink& link : joint.links)
+      if (const Vector3 across = link.axis.cross(line); across.norm() > 0.5) return across.normalized();
+  return std::nullopt;
+}
+
 /// The normal of the plane that directions span; nothing, with the reason, where they span none.
 std::optional<Vector3> normal_of(const SceneDescription& scene, bool asked, std::vector<Vector3>& directions,
                                  std::string& reason) {
@@ -52,8 +60,8 @@ std::optional<Vector3> normal_of(const SceneDescription& scene, bool asked, std:
   spread /= static_cast<double>(std::max<std::size_t>(directions.size(), 1));
   Eigen::JacobiSVD<Matrix3> svd(spread, Eigen::ComputeFullU);
   if (svd.singularValues()(1) < 1e-20 && asked) {
-    // A straight scene lies in many planes: the one asked for holds the first director.
-    directions.emplace_back(scene.rods.front().directors.row(0));
+    // A straight scene lies in many planes: the one asked for is what its joints turn in, or holds the first director.
+    directions.push_back(turning_across(scene, directions.front()).value_or(scene.rods.front().directors.row(0)));
     spread += directions.back() * directions.back().transpose();
     svd.compute(spread, Eigen::ComputeFullU);
   }
@@ -118,6 +126,11 @@ bool is_mirrored(const Vector3& direction, const Vector3& normal) {
          direction.cross(normal).norm() <= kAngle * direction.norm();
 }
 
+/// Whether something turns a revolute joint about an axis in the plane.
+bool turns_out(const RevoluteLink& link, const Vector3& normal) {
+  return (link.moment != 0.0 || link.rest_angle != 0.0) && std::abs(link.axis.dot(normal)) < 0.5;
+}
+
 /// Axes of a hand that yields, as columns, before it moves. A rod in a plane keeps the angles of its directors to it.
 Matrix3 hand_axes(const SceneDescription& scene, const SupportDescription& support) {
   if (support.hand.posed) return support.hand.rotation;
@@ -144,7 +157,10 @@ std::string why_off_plane(const SceneDescription& scene, const Vector3& normal) 
   const auto across = [&](const Vector3& v) { return v.cross(normal).norm() > kTolerance * 100 * v.norm(); };
   for (const JointDescription& joint : scene.joints)
     for (const RevoluteLink& link : joint.links)
-      if (!is_mirrored(link.axis, normal)) return "the axis of a revolute joint lies at an angle to the plane";
+      if (!is_mirrored(link.axis, normal))
+        return "the axis of a revolute joint lies at an angle to the plane";
+      else if (turns_out(link, normal))
+        return "a revolute joint is driven out of the plane";
   for (const LoadDescription& load : scene.loads)
     for (const auto& value : load.values.rowwise())
       if (!load.added && is_axial(load.kind) && across(value.transpose()))

@@ -98,10 +98,13 @@ class Equations {
   /// What potential energies grow by over a step that ends at `end`, beyond the work of their forces. Spoils the
   /// change and the configuration at the end of `data`.
   void find_gains(const VectorX& end, StepData& data, ComponentGains& gains) const;
-  /// What drag, viscosity, springs and fluids take over `change`, with the forces of the last evaluation [J].
+  /// What drag, viscosity, springs, joints and fluids take over `change`, with the forces of the last evaluation [J].
   double dissipated(const StepData& data, const VectorX& change) const;
-  bool loaded() const { return !loads().pieces.empty() || terms_.custom != nullptr; }
-  /// Of loads and custom forces in the last evaluation, per unknown.
+  bool loaded() const {
+    return !loads().pieces.empty() || terms_.custom != nullptr ||
+           (problem_.parameters->joint_moment.array() != 0.0).any();
+  }
+  /// Of loads, motors of joints and custom forces in the last evaluation, per unknown.
   void load_force(const StepData& data, VectorX& out) const;
 
   /// What solves left for those to come; the matrix where its factorisation may serve again.

@@ -16,20 +16,21 @@ struct CoefficientAdjoint {
   VectorX stretch_natural;                  ///< per edge, by the natural strain
   Columns3 bend_stiffness, bend_natural;    ///< per stencil: by stiffnesses [1/(N m)], by natural strains
   Columns3 half_stiffness, half_natural;
-  VectorX bend_time, half_time;                                  ///< by viscous times [1/s]
-  VectorX mass, mass_coupling, drag, drag_coupling;              ///< by `MassMatrix`
-  VectorX gravity;                                               ///< per unknown, by its force [1/N]
-  MatrixX3 loads;                                                ///< by `Parameters::loads`
-  VectorX spring_stiffness, spring_rest_length, spring_damping;  ///< per spring
-  VectorX edge_mass;                                             ///< of contacts, by line density times length
-  double gravity_size = 0;                                       ///< of contacts, by that of gravity [s^2/m]
-  double fluid_viscosity = 0;                                    ///< [1/(Pa s)]
-  double friction = 0, slip_tolerance = 0;                       ///< of the scene [-], [s/m]
-  MatrixX3 obstacle_friction, pair_friction;                     ///< per obstacle, per pair of bodies [-]
-  VectorX obstacle_rolling;                                      ///< per obstacle [-]
-  MatrixX6 hand_stiffness;                  ///< per support, see `HandDescription` [m/N], [rad/(N m)]
-  VectorX hand_limit;                       ///< per support [1/N]
-  std::vector<MatrixX2> natural_curvature;  ///< per rod and stencil, by the smooth one, where it is read out [m]
+  VectorX bend_time, half_time;                                            ///< by viscous times [1/s]
+  VectorX mass, mass_coupling, drag, drag_coupling;                        ///< by `MassMatrix`
+  VectorX gravity;                                                         ///< per unknown, by its force [1/N]
+  MatrixX3 loads;                                                          ///< by `Parameters::loads`
+  VectorX spring_stiffness, spring_rest_length, spring_damping;            ///< per spring
+  VectorX joint_stiffness, joint_rest_angle, joint_damping, joint_moment;  ///< per revolute joint
+  VectorX edge_mass;                          ///< of contacts, by line density times length
+  double gravity_size = 0;                    ///< of contacts, by that of gravity [s^2/m]
+  double fluid_viscosity = 0;                 ///< [1/(Pa s)]
+  double friction = 0, slip_tolerance = 0;    ///< of the scene [-], [s/m]
+  MatrixX3 obstacle_friction, pair_friction;  ///< per obstacle, per pair of bodies [-]
+  VectorX obstacle_rolling;                   ///< per obstacle [-]
+  MatrixX6 hand_stiffness;                    ///< per support, see `HandDescription` [m/N], [rad/(N m)]
+  VectorX hand_limit;                         ///< per support [1/N]
+  std::vector<MatrixX2> natural_curvature;    ///< per rod and stencil, by the smooth one, where it is read out [m]
   VectorX rest_length;  ///< per edge, by that in the axial strain, in loads along rods, and where it is read out [1/m]
   /// By rotation vectors [1/rad], in the axes of the drawn scene: per half stencil, by how what is attached to its
   /// frame is turned there; per edge, by its frame as it was drawn, as far as nothing above follows from that.
@@ -55,6 +56,10 @@ struct CoefficientAdjoint {
         spring_stiffness(VectorX::Zero(static_cast<Eigen::Index>(model.description.springs.size()))),
         spring_rest_length(spring_stiffness),
         spring_damping(spring_stiffness),
+        joint_stiffness(VectorX::Zero(static_cast<Eigen::Index>(model.joint_angles.size()))),
+        joint_rest_angle(joint_stiffness),
+        joint_damping(joint_stiffness),
+        joint_moment(joint_stiffness),
         edge_mass(stretch_stiffness),
         obstacle_friction(rows_of_three(model.description.contact.obstacles.size())),
         pair_friction(rows_of_three(model.description.contact.pairs.size())),

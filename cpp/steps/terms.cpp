@@ -6,6 +6,7 @@
 #include "steps/body_forces.hpp"
 #include "steps/elastic_forces.hpp"
 #include "steps/inertia.hpp"
+#include "steps/joint_forces.hpp"
 #include "steps/load_forces.hpp"
 #include "steps/spring_forces.hpp"
 
@@ -25,6 +26,7 @@ Terms make_terms(const Model& model, const Loads& loads, StepRule rule, bool exa
   const LoadForces* applied = nullptr;
   if (!loads.pieces.empty()) applied = add(std::make_unique<LoadForces>(model, loads));
   if (!scene.springs.empty()) add(std::make_unique<SpringForces>(model));
+  if (!model.joint_angles.empty()) add(std::make_unique<JointForces>(model));
   if (std::any_of(model.supports.begin(), model.supports.end(),
                   [](const Support& s) { return s.active && s.yields(); }))
     terms.hands = add(std::make_unique<HandForces>(model));

@@ -12,14 +12,21 @@
 namespace withe {
 namespace {
 
-/// Frames are the same when the same end of an edge is attached to both: a node may have several.
+/// Frames are the same when the same end of an edge is attached to both, and not through a hinge: a node may have
+/// several.
 bool same_frame(const Model& a, int frame_a, const Model& b, int frame_b) {
   for (const FrameStencil& s : a.half) {
-    if (s.frame != frame_a) continue;
+    if (s.frame != frame_a || s.hinge >= 0) continue;
     for (const FrameStencil& t : b.half)
-      if (t.frame == frame_b && t.edge == s.edge && t.frame_first == s.frame_first) return true;
+      if (t.frame == frame_b && t.hinge < 0 && t.edge == s.edge && t.frame_first == s.frame_first) return true;
   }
   return false;
+}
+
+/// An angle, but for whole turns, that is near another one.
+double nearest_turn(double angle, double to) {
+  constexpr double kFull = 2.0 * std::numbers::pi;
+  return angle + kFull * std::round((to - angle) / kFull);
 }
 
 }  // namespace
@@ -43,6 +50,14 @@ Matrix3 frame_rotation(const Model& model, const State& state, int frame) {
   return cayley(state.q.segment<3>(model.frame_dof[at(frame)])) * state.frame[at(frame)];
 }
 
+Vector3 angular_velocity(const Model& model, const State& state, const Configuration& c, int edge) {
+  const Vector3 t = edge_directors(model, c, edge).col(2);
+  const Vector3 along =
+      node_vector(model, state.v, model.edge_head[at(edge)]) - node_vector(model, state.v, model.edge_tail[at(edge)]);
+  const double spin = model.planar() ? 0.0 : state.v(model.edge_dof[at(edge)]);
+  return t.cross(along) / c.length(edge) + spin * t;
+}
+
 World::Implementation::Implementation(SceneDescription scene, Options choice)
     : description(std::move(scene)), drawn_contact(description.contact), options(choice) {
   require(options.time_step > 0.0 && std::isfinite(options.time_step), "time_step must be positive and finite");
@@ -53,8 +68,8 @@ World::Implementation::Implementation(SceneDescription scene, Options choice)
   if (options.integrator == Integrator::verlet) {
     plan.stable_step = stable_step(*equations, parameters, state, work);
     require(options.time_step <= plan.stable_step,
-            "time_step must not exceed the stable step of the explicit scheme, " + std::to_string(plan.stable_step) +
-                " s, got " + std::to_string(options.time_step) + " s");
+            "time_step must not exceed the stable step of the explicit scheme, " + text(plan.stable_step) + " s, got " +
+                text(options.time_step) + " s");
   }
 }
 
@@ -299,8 +314,12 @@ State World::Implementation::transferred(const Model& old, const State& from) co
         copy(old.frame_dof[at(g)], dof, model.frame_size());
       }
     }
-  for (std::size_t h = 0; h < model.hinges.size() && h < old.hinges.size(); ++h)
-    if (!lifted) copy(old.hinges[h].dof, model.hinges[h].dof, 1);
+  for (std::size_t j = 0; !model.planar() && j < model.joint_angles.size(); ++j) {
+    const JointAngle &before = old.joint_angles[j], &now = model.joint_angles[j];
+    to.q[now.turning] = now.sign * before.angle(from.q);
+    to.v[now.turning] = now.sign * before.angle(from.v);
+    to.acceleration[now.turning] = now.sign * before.angle(from.acceleration);
+  }
   if (!lifted && !model.planar()) copy_twists(old, from, model, to);
   return to;
 }
@@ -330,7 +349,7 @@ void World::Implementation::orient_frame(int f, const Matrix3& free) {
   if (free.isIdentity() && fixed != model.half.end()) {
     const Matrix3 rotation = turn_of(*fixed);
     if (model.planar())
-      state.q(dof) = rotation_log(rotation).dot(model.plane->normal);
+      state.q(dof) = nearest_turn(rotation_log(rotation).dot(model.plane->normal), state.q(dof));
     else
       state.frame[at(f)] = rotation;
   }
@@ -338,8 +357,7 @@ void World::Implementation::orient_frame(int f, const Matrix3& free) {
     if (half.frame == f && half.hinge >= 0) {
       const Hinge& hinge = model.hinges[at(half.hinge)];
       const Matrix3 relative = frame_rotation(model, state, f).transpose() * turn_of(half);
-      const double angle = rotation_log(relative).dot(hinge.axis), full = 2.0 * std::numbers::pi;
-      state.q(hinge.dof) = angle + full * std::round((state.q(hinge.dof) - angle) / full);
+      state.q(hinge.dof) = nearest_turn(rotation_log(relative).dot(hinge.axis), state.q(hinge.dof));
     }
 }
 

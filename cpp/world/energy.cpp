@@ -6,6 +6,7 @@
 
 #include "common/text.hpp"
 #include "steps/hand_forces.hpp"
+#include "steps/joint_forces.hpp"
 #include "steps/spring_forces.hpp"
 #include "world/implementation.hpp"
 
@@ -60,6 +61,7 @@ Energy mechanical_energy(const Model& model, const EnergyCoefficients& k, const 
   e.twist = turned.twist;
   e.gravity = gravity_energy(model, k, state.q, [](int) { return 1.0; });
   e.spring = spring_energy(model, k.spring_stiffness, k.spring_rest_length, state.q) +
+             joint_energy(model, k.joint_stiffness, k.joint_rest_angle, state.q) +
              hand_energy(model, k.elastic.measure, state, c);
   return e;
 }
@@ -77,6 +79,8 @@ void EnergyCoefficients::set(const Model& model, const Parameters& p) {
   gravity = p.gravity;
   spring_stiffness = p.spring_stiffness;
   spring_rest_length = p.spring_rest_length;
+  joint_stiffness = p.joint_stiffness;
+  joint_rest_angle = p.joint_rest_angle;
 }
 
 /// Takes ramps on to a time at a configuration that stays, and adds what that changes of the elastic energy [J].
@@ -249,6 +253,9 @@ void World::Implementation::find_component_energies(const State& then, Component
   for (std::size_t s = 0; s < model.description.springs.size(); ++s)
     out.elastic[model.component_of_node(model.description.springs[s].nodes[0])] +=
         spring_energy(model, k.spring_stiffness, k.spring_rest_length, then.q, static_cast<int>(s));
+  for (std::size_t j = 0; j < model.joint_angles.size(); ++j)
+    out.elastic[model.component_of_node(model.joint_angles[j].node)] +=
+        joint_energy(model, k.joint_stiffness, k.joint_rest_angle, then.q, static_cast<int>(j));
   // In a frame that goes with the nodes that supports hold, else with the centre of mass.
   MatrixX3& frame = out.frame;
   VectorX& nodes = out.held_nodes;

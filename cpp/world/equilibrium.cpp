@@ -234,8 +234,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
 
 bool World::Implementation::buckles_out_of_plane() {
   if (!model.planar() || options.planar.value_or(false) || !statics().has_potential_here()) return false;
-  // Hinges, which in their plane are pins, have frames and angles in space only: they are found as the model is built.
-  if (spatial_twin && spatial_twin->model.hinges.size() == model.hinges.size()) {
+  if (spatial_twin) {
     static_cast<Running&>(*spatial_twin) = *this;
     spatial_twin->state = spatial_twin->transferred(model, state);
     update_derived(spatial_twin->model, spatial_twin->parameters);
@@ -245,7 +244,7 @@ bool World::Implementation::buckles_out_of_plane() {
     spatial_twin->spatial = true;
     try {
       spatial_twin->rebuild(Rebuild::running);
-    } catch (const std::invalid_argument&) {  // it exists in its plane only, with hinges that are pins there
+    } catch (const std::invalid_argument&) {  // it exists in its plane only: a clamp holds what a hinge turns
       spatial_twin.reset();
       return false;
     }

@@ -1,10 +1,12 @@
 /// What a scene answers: copies, in world coordinates.
 
 #include <Eigen/Geometry>
+#include <algorithm>
 
 #include "common/check.hpp"
 #include "elasticity/stretch.hpp"
 #include "model/edge_vectors.hpp"
+#include "steps/joint_forces.hpp"
 #include "steps/spring_forces.hpp"
 #include "world/implementation.hpp"
 
@@ -98,6 +100,11 @@ VectorX World::twists(int rod) const {
 
 namespace {
 
+const JointAngle& checked_joint(const Model& model, int joint) {
+  require(joint >= 0 && joint < static_cast<int>(model.joint_angles.size()), "no such revolute joint: ", joint);
+  return model.joint_angles[at(joint)];
+}
+
 double tension(const Model& model, const Parameters& parameters, const Configuration& c, int edge) {
   return axial_force(c.length(edge), model.edge_length(edge), parameters.edge_stretch(edge),
                      parameters.edge_natural_stretch(edge) - 1.0);
@@ -133,6 +140,42 @@ double World::spring_tension(int spring) const {
   const Implementation& self = *implementation_;
   require(spring >= 0 && spring < self.parameters.spring_stiffness.size(), "no such spring: ", spring);
   return withe::spring_tension(self.model, self.parameters, self.state.q, self.state.v, spring);
+}
+
+double World::joint_angle(int joint) const {
+  const Implementation& self = *implementation_;
+  return checked_joint(self.model, joint).angle(self.state.q);
+}
+
+/// By the edges at either side. Frames have little inertia of their own: what a step does not resolve of it, and does
+/// not damp, changes their rates from step to step.
+double World::joint_rate(int joint) const {
+  const Implementation& self = *implementation_;
+  const Model& model = self.model;
+  const JointAngle& turning = checked_joint(model, joint);
+  if (!turning.turns()) return 0.0;
+  const auto hinge =
+      std::find_if(model.hinges.begin(), model.hinges.end(), [&](const Hinge& h) { return h.dof == turning.turning; });
+  const auto belongs = [&](const FrameStencil& half, bool turns) {
+    if (model.planar()) return model.frame_dof[at(half.frame)] == (turns ? turning.turning : turning.against);
+    return half.frame == hinge->frame && (turns ? half.hinge == hinge - model.hinges.begin() : half.hinge < 0);
+  };
+  const Configuration& c = self.configuration();
+  const auto rate = [&](bool turns) -> Vector3 {
+    Vector3 sum = Vector3::Zero();
+    int count = 0;
+    for (const FrameStencil& half : model.half)
+      if (belongs(half, turns)) sum += angular_velocity(model, self.state, c, half.edge), ++count;
+    return sum / count;
+  };
+  const Vector3 axis =
+      model.planar() ? model.plane->normal : Vector3(frame_rotation(model, self.state, hinge->frame) * hinge->axis);
+  return turning.sign * axis.dot(rate(true) - rate(false));
+}
+
+double World::joint_torque(int joint) const {
+  const double angle = joint_angle(joint);
+  return torque_of(withe::joint_torque(implementation_->parameters, joint), angle, joint_rate(joint));
 }
 
 VectorX World::spins(int rod) const {

@@ -150,6 +150,7 @@ std::uint64_t fingerprint(const SceneDescription& scene) {
     w(rod.fluid_radius);
   }
   w(static_cast<std::int64_t>(scene.joints.size()));
+  for (const JointDescription& joint : scene.joints) w(static_cast<std::int64_t>(joint.links.size()));
   w(static_cast<std::int64_t>(drawn_loads(scene)));
   w(static_cast<std::int64_t>(scene.springs.size()));
   for (const SpringDescription& spring : scene.springs)
@@ -314,6 +315,10 @@ void check_running(const World::Implementation& self) {
   for (const VectorX* v :
        {&self.parameters.spring_stiffness, &self.parameters.spring_rest_length, &self.parameters.spring_damping})
     require(v->allFinite() && (v->array() >= 0.0).all(), "snapshot is damaged: impossible spring");
+  for (const VectorX* v : {&self.parameters.joint_stiffness, &self.parameters.joint_damping})
+    require(v->allFinite() && (v->array() >= 0.0).all(), "snapshot is damaged: impossible joint");
+  for (const VectorX* v : {&self.parameters.joint_rest_angle, &self.parameters.joint_moment})
+    require(v->allFinite(), "snapshot is damaged: impossible joint");
   for (std::size_t s = 0; s < self.model.supports.size(); ++s) {
     const Support& support = self.model.supports[s];
     if (!support.active || !support.slides()) continue;

@@ -461,6 +461,9 @@ void World::Implementation::check_reversible(const Parameters& p) const {
   require((p.spring_damping.array() == 0.0).all(),
           "integrator 'fourth_order' goes back in time within each step, which damping of springs does not allow" +
               instead);
+  require(
+      (p.joint_damping.array() == 0.0).all(),
+      "integrator 'fourth_order' goes back in time within each step, which damping of joints does not allow" + instead);
   if (!p.dragged) return;
   for (int i = 0; i < model.node_count; ++i)
     require(p.node_drag(i) * options.time_step <= p.node_mass(i),

@@ -333,6 +333,10 @@ void World::Implementation::leave_plane_for(const ParameterSetting& setting) {
     const Vector2 p = model.planar_components[at(rod)];
     const bool isotropic = (values.col(0).array() == values.col(1).array()).all();
     if (!isotropic && p.cwiseAbs().minCoeff() > 1e-9) leave_plane("the section" + name() + ", at an angle to it,");
+  } else if (kind == ParameterKind::joint_moment || kind == ParameterKind::joint_rest_angle) {
+    for (std::size_t j = 0; j < model.joint_angles.size(); ++j)
+      if (!model.joint_angles[j].turns() && values(values.rows() == 1 ? 0 : static_cast<Eigen::Index>(j), 0) != 0.0)
+        return leave_plane("a revolute joint");
   } else if (kind == ParameterKind::gravity) {
     const Vector3 gravity = values.row(0);
     if (std::abs(gravity.dot(model.plane->normal)) > 1e-8 * gravity.norm()) leave_plane("gravity");

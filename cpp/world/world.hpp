@@ -23,7 +23,7 @@ struct Energy {  // [J]
   double kinetic = 0, stretch = 0, bend = 0, twist = 0, gravity = 0;
   double loads = 0;  ///< minus the work done by loads and custom forces since the start
   double contact = 0;
-  double spring = 0;      ///< of springs, and of hands that yield
+  double spring = 0;      ///< of springs, of revolute joints, and of hands that yield
   double total = 0;       ///< sum of the above
   double work = 0;        ///< done by supports and actuation since the start
   double dissipated = 0;  ///< by viscosity, drag, dampers, fluids and contact since the start
@@ -298,6 +298,9 @@ class World {
   VectorX twists(int rod) const;            ///< per stencil [rad/m]
   VectorX tensions(int rod) const;          ///< per edge, in the middle of the last step if by the midpoint rule [N]
   double spring_tension(int spring) const;  ///< positive where it pulls; its damper's part included [N]
+  double joint_angle(int joint) const;      ///< of what turns, from how it is drawn, whole turns counted [rad]
+  double joint_rate(int joint) const;       ///< [rad/s]
+  double joint_torque(int joint) const;     ///< on what turns: of its motor, its stiffness and its damping [N m]
   VectorX spins(int rod) const;             ///< per edge, angular velocity about the tangent [rad/s]
   Energy energy() const;
   /// Of one rod: kinetic, stretch, bend, twist, gravity and their sum; what surrounds a joint belongs to the rods whose

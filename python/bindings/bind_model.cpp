@@ -111,11 +111,21 @@ void register_joints_and_supports(py::module_& module) {
       .def_readwrite("node", &RodPass::node);
 
   py::class_<RevoluteLink>(module, "RevoluteLink", "The child cluster turns about an axis relative to the parent.")
-      .def(py::init([](int parent, int child, const Vector3& axis) { return RevoluteLink{parent, child, axis}; }),
+      .def(py::init([](int parent, int child, const Vector3& axis) {
+             RevoluteLink link;
+             link.parent = parent;
+             link.child = child;
+             link.axis = axis;
+             return link;
+           }),
            py::arg("parent"), py::arg("child"), py::arg("axis"))
       .def_readwrite("parent", &RevoluteLink::parent)
       .def_readwrite("child", &RevoluteLink::child)
-      .def_readwrite("axis", &RevoluteLink::axis);
+      .def_readwrite("axis", &RevoluteLink::axis)
+      .def_readwrite("stiffness", &RevoluteLink::stiffness)
+      .def_readwrite("rest_angle", &RevoluteLink::rest_angle)
+      .def_readwrite("damping", &RevoluteLink::damping)
+      .def_readwrite("moment", &RevoluteLink::moment);
 
   py::class_<JointDescription> joint(module, "JointDescription", "A node that several rods share.");
   joint.def(py::init<>())

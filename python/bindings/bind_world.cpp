@@ -29,6 +29,10 @@ void register_gradients(py::module_& module) {
       .def_readonly("spring_stiffness", &ParameterGradient::spring_stiffness)
       .def_readonly("spring_rest_length", &ParameterGradient::spring_rest_length)
       .def_readonly("spring_damping", &ParameterGradient::spring_damping)
+      .def_readonly("joint_stiffness", &ParameterGradient::joint_stiffness)
+      .def_readonly("joint_rest_angle", &ParameterGradient::joint_rest_angle)
+      .def_readonly("joint_damping", &ParameterGradient::joint_damping)
+      .def_readonly("joint_moment", &ParameterGradient::joint_moment)
       .def_readonly("fluid_viscosity", &ParameterGradient::fluid_viscosity)
       .def_readonly("friction", &ParameterGradient::friction)
       .def_readonly("slip_tolerance", &ParameterGradient::slip_tolerance)
@@ -432,6 +436,15 @@ void define_readouts(WorldClass& world) {
   world.def(
       "spring_tension", [](const GuardedWorld& self, int spring) { return self.reading().spring_tension(spring); },
       py::arg("spring"));
+  world.def(
+      "joint_angle", [](const GuardedWorld& self, int joint) { return self.reading().joint_angle(joint); },
+      py::arg("joint"));
+  world.def(
+      "joint_rate", [](const GuardedWorld& self, int joint) { return self.reading().joint_rate(joint); },
+      py::arg("joint"));
+  world.def(
+      "joint_torque", [](const GuardedWorld& self, int joint) { return self.reading().joint_torque(joint); },
+      py::arg("joint"));
   world.def("spins", [](const GuardedWorld& self, int rod) { return self.reading().spins(rod); }, py::arg("rod"));
   world.def("take_warnings", [](GuardedWorld& self) {
     const Warnings found = self.changing().take_warnings();

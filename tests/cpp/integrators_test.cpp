@@ -147,6 +147,38 @@ TEST(Equations, MatrixIsExactWithSpringsBetweenNodesThatNoRodCouples) {
     }
 }
 
+/// Two rods that a revolute joint drives, in a plane or in space.
+std::vector<Case> driven(bool planar, double damping) {
+  SceneBuilder builder = testing::hinged();
+  if (planar) {
+    RodMaterial material;
+    material.bend2 = material.bend1;
+    builder = SceneBuilder();
+    const Vector3 o(0.1, 0.0, 0.2), y = Vector3::UnitY();
+    builder.add_rod(testing::line(Vector3(-1.8, 0.0, 0.1), o, 3), material, false, y);
+    builder.add_rod(testing::line(o, Vector3(1.0, 0.0, 1.5), 4), material, false, y);
+    builder.join_revolute({{0, 2}}, {1, 0}, y);
+  }
+  for (RevoluteLink& link : builder.scene.joints[0].links) {
+    link.stiffness = 2.0;
+    link.rest_angle = 0.7;
+    link.damping = damping;
+    link.moment = -0.6;
+  }
+  return testing::states_of("driven joint", builder.scene);
+}
+
+TEST(Equations, MatrixIsExactWithMotorsSpringsAndDampersOfRevoluteJoints) {
+  for (Scheme scheme : kSchemes)
+    for (bool planar : {false, true})
+      for (double damping : {0.0, 0.4})
+        for (const Case& c : driven(planar, damping)) {
+          EXPECT_EQ(c.model.planar(), planar);
+          expect_matrix_is_exact(c, scheme, 0.3);
+          expect_matrix_is_exact(c, scheme, 0.3, true);
+        }
+}
+
 void expect_exact_under_loads(bool planar) {
   for (Scheme scheme : kSchemes) {
     SceneBuilder builder;

@@ -244,7 +244,7 @@ TEST(Joints, RevoluteAddOneAngleEach) {
   EXPECT_EQ(model.dof_count, 3 * model.node_count + model.edge_count + 3 + 2);
 }
 
-TEST(Joints, RevoluteAboutTheNormalArePinsInAPlane) {
+TEST(Joints, RevoluteAboutTheNormalLieBetweenTwoFramesInAPlane) {
   SceneBuilder builder;
   const Vector3 o(0, 0, 0), y = Vector3::UnitY();
   builder.add_rod(testing::line(Vector3(-2, 0, 0), o, 3), isotropic(), false, y);
@@ -253,11 +253,72 @@ TEST(Joints, RevoluteAboutTheNormalArePinsInAPlane) {
   const Model model = build_model(builder.scene, true);
   EXPECT_TRUE(model.hinges.empty());
   EXPECT_EQ(model.bend.size(), 2u);
+  EXPECT_EQ(model.half.size(), 2u);
+  EXPECT_EQ(model.frame_count, 2);
+  EXPECT_EQ(model.dof_count, 2 * model.node_count + 2);
+  VectorX q = model.initial_q;
+  EXPECT_EQ(model.joint_angles.at(0).angle(q), 0.0);
+  q[model.joint_angles[0].turning] += model.plane->normal.y() * 0.3;
+  EXPECT_NEAR(model.joint_angles[0].angle(q), 0.3, 1e-15);
   SceneBuilder other;
   other.add_rod(testing::line(Vector3(-2, 0, 0), o, 3), isotropic(), false, y);
   other.add_rod(testing::line(o, Vector3(1, 0, 2), 3), isotropic(), false, y);
   other.join_revolute({{0, 2}}, {1, 0}, Vector3::UnitX());
-  EXPECT_EQ(build_model(other.scene, true).half.size(), 2u);  // about another axis it cannot turn in the plane
+  const Model held = build_model(other.scene, true);
+  EXPECT_EQ(held.half.size(), 2u);  // about another axis it cannot turn in the plane
+  EXPECT_EQ(held.frame_count, 1);
+  EXPECT_FALSE(held.joint_angles.at(0).turns());
+  other.scene.joints[0].links[0].moment = 0.1;
+  EXPECT_FALSE(build_model(other.scene, std::nullopt).planar());
+}
+
+TEST(Joints, RodsThatAPlaneLetsTurnByNothingAreOneWhoeverIsJoinedToWhom) {
+  SceneBuilder builder;
+  const Vector3 o(0, 0, 0), y = Vector3::UnitY();
+  builder.add_rod(testing::line(Vector3(-2, 0, 0), o, 3), isotropic(), false, y);
+  builder.add_rod(testing::line(o, Vector3(1, 0, 2), 3), isotropic(), false, y);
+  builder.add_rod(testing::line(o, Vector3(1, 0, -2), 3), isotropic(), false, y);
+  RevoluteLink first, second;
+  first.parent = 0, first.child = 1, first.axis = Vector3::UnitX();
+  second.parent = 2, second.child = 1, second.axis = Vector3::UnitX();
+  builder.scene.joints.push_back({{{{0, 2}}, {{1, 0}}, {{2, 0}}}, {first, second}, JointForm::frame});
+  const Model model = build_model(builder.scene, true);
+  EXPECT_EQ(model.frame_count, 1);
+  EXPECT_EQ(model.half.size(), 3u);
+}
+
+/// A hub may be the first or the second of each of its joints: what turns is the other.
+TEST(Joints, EveryHingeTurnsAgainstTheHubWhicheverComesFirst) {
+  for (bool first_swapped : {false, true})
+    for (bool second_swapped : {false, true}) {
+      SceneDescription scene = testing::hinged().scene;
+      std::vector<RevoluteLink>& links = scene.joints[0].links;
+      if (first_swapped) std::swap(links[0].parent, links[0].child);
+      if (second_swapped) std::swap(links[1].parent, links[1].child);
+      const Model model = build_model(scene, std::nullopt);
+      EXPECT_EQ(model.frame_count, 1);
+      for (const FrameStencil& half : model.half) {
+        EXPECT_EQ(half.frame, 0);
+        const int rod = model.edge_rod[at(half.edge)];
+        EXPECT_EQ(half.hinge, rod == 2 ? 0 : rod == 3 ? 1 : -1);
+      }
+      EXPECT_EQ(model.joint_angles.at(0).sign, first_swapped ? -1.0 : 1.0);
+      EXPECT_EQ(model.joint_angles.at(1).sign, second_swapped ? -1.0 : 1.0);
+    }
+}
+
+TEST(Joints, OfTwoRodsAtAHingeTheOneThatIsClampedStays) {
+  for (int clamped : {0, 1}) {
+    SceneBuilder builder;
+    builder.add_rod(testing::line(Vector3(-2, 0, 0), Vector3::Zero(), 3), isotropic());
+    builder.add_rod(testing::line(Vector3::Zero(), Vector3(1, 0, 2), 3), isotropic());
+    builder.join_revolute({{0, 2}}, {1, 0}, Vector3::UnitY());
+    builder.support(SupportKind::clamp, {clamped, clamped == 0 ? 2 : 0});
+    const Model model = build_model(builder.scene, false);
+    EXPECT_EQ(model.joint_angles.at(0).sign, clamped == 1 ? -1.0 : 1.0);
+    for (const FrameStencil& half : model.half)
+      EXPECT_EQ(half.hinge, model.edge_rod[at(half.edge)] == clamped ? -1 : 0);
+  }
 }
 
 TEST(Layout, NumbersEveryUnknownOnce) {

@@ -1,5 +1,7 @@
 """Scenes with everything that has a gradient, and central differences of what they do."""
 
+from typing import ClassVar
+
 import numpy as np
 
 import withe
@@ -17,8 +19,10 @@ def extrapolated(of, size):
 class Drawn:
     """A curved arm, alone or with a branch, in a plane or in space, with everything that can be set."""
 
+    HINGE: ClassVar = {"stiffness": 0.03, "rest_angle": 0.4, "moment": 4e-3}
+
     def __init__(self, *, planar, joint, integrator, support="frame", viscosity=0.0, radius=1.5e-2, **options):
-        self.planar, self.support = planar, support
+        self.planar, self.support, self.damping = planar, support, None
         scene = withe.Scene()
         material = withe.Material(youngs_modulus=1e6, poisson_ratio=0.4, density=1200.0, viscosity=viscosity)
         s = np.linspace(0.0, 1.0, NODES)
@@ -33,8 +37,12 @@ class Drawn:
             tip = points[6] + [0.02, 0.0 if planar else 0.1, 0.1]
             branch = scene.add_rod(start=points[6], end=tip, nodes=5, radius=0.7 * radius, material=material)
             kind = joint if isinstance(joint, str) else "rigid"
-            axis = (0.2, 0.9, -0.3) if kind == "revolute" else None
-            scene.join(self.arm.node(6), branch.start, kind, axis=axis)
+            turns = {}
+            if kind == "revolute":
+                axis = (0.0, -1.0, 0.0) if planar else (0.2, 0.9, -0.3)
+                self.damping = 0.0 if integrator in ("fourth_order", "static") else 2e-3
+                turns = {"axis": axis, "damping": self.damping, **self.HINGE}
+            self.hinge = scene.join(self.arm.node(6), branch.start, kind, **turns)
         self.force = scene.add_force(self.arm.end, (0, 0, 0.3 * (radius / 1.5e-2) ** 4), name="force")
         self.mass = scene.add_mass(self.arm.node(7), 0.01)
         self.drag = scene.add_drag(0.2)
@@ -92,6 +100,11 @@ def settings(drawn, random):
     yield (drawn.mass, "mass"), 1.0, lambda h: sim.set(drawn.mass, mass=0.01 + h), 3e-6
     for word, value, size in (("stiffness", 20.0, 1e-2), ("rest_length", 0.1, 1e-4)):
         yield (drawn.spring, word), 1.0, lambda h, w=word, v=value: sim.set(drawn.spring, **{w: v + h}), size
+    if drawn.damping is not None:
+        for word, value in drawn.HINGE.items():
+            yield (drawn.hinge, word), 1.0, lambda h, w=word, v=value: sim.set(drawn.hinge, **{w: v + h}), 2e-2 * value
+    if drawn.damping:
+        yield (drawn.hinge, "damping"), 1.0, lambda h: sim.set(drawn.hinge, damping=drawn.damping + h), 2e-5
     yield "gravity", np.array([0, 0, 1.0]), lambda h: sim.set(None, gravity=(0, 0, -9.81 + h)), 1e-3
 
 

@@ -172,6 +172,8 @@ ON_SCENE = {
         kind=d.draw(st.sampled_from(["rigid", "rigid", "pinned", "revolute", "glued"])),
         axis=d.draw(st.one_of(st.none(), triple)),
         form=d.draw(st.sampled_from(["frame", "frame", "pairs"])),
+        stiffness=d.draw(st.sampled_from([0.0, 0.0, 1e-2, -1.0, float("nan")])),
+        rest_angle=d.draw(st.sampled_from([0.0, 0.0, -7.0, float("inf")])),
     ),
     "clamp": lambda w, d: w.scene.clamp(
         d.draw(node), hold=d.draw(st.sampled_from(["frame", "edge"])), free=d.draw(st.one_of(st.none(), triple))

@@ -96,9 +96,15 @@ def add_rods(scene, r, flat, material, joints):
         points = np.stack([tip + 0.1 * s, 0 * s if flat else 0.05 * s**2, 0.1 - 0.06 * s**2], axis=1)
     b = scene.add_rod(points=points, radius=3e-3, material=material, name="b")
     if kind != "none":
-        axis = {"axis": (0, 1, 0)} if kind == "revolute" else {}
+        turns = {"axis": (0, 1, 0)} if kind == "revolute" else {}
+        if turns and r.random() < 0.7:
+            turns |= {
+                "stiffness": r.uniform(0.0, 0.02),
+                "rest_angle": r.uniform(-1, 1),
+                "moment": r.uniform(-1e-3, 1e-3),
+            }
         form = {"form": "pairs"} if kind == "rigid" and r.random() < 0.2 else {}
-        scene.join(a.end, b.start, kind, **axis, **form)
+        scene.join(a.end, b.start, kind, **turns, **form, name="joint")
     if r.random() < 0.2:
         angle = np.linspace(0.0, 2.0 * np.pi, 9)[:-1]
         ring = np.stack([0.1 + 0.03 * np.cos(angle), 0 * angle, 0.16 + 0.03 * np.sin(angle)], axis=1)

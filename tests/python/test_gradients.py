@@ -215,21 +215,25 @@ def test_gradient_of_a_run_is_that_of_differences(integrator, viscosity, planar,
         assert np.sum(gradient * along) == pytest.approx((4.0 * near - wide) / 3.0, rel=2e-6, abs=1e-11), unknown
 
 
-@pytest.mark.parametrize("kind", ["rigid", "revolute", "pinned"])
+@pytest.mark.parametrize(
+    ("kind", "planar"), [("rigid", False), ("revolute", False), ("revolute", True), ("pinned", False)]
+)
 @pytest.mark.parametrize("viscosity", [0.0, 300.0])
 @pytest.mark.parametrize("integrator", ["backward_euler", "implicit_midpoint", "fourth_order", "energy_momentum"])
-def test_gradient_of_a_run_through_joints_that_turn_is_that_of_differences(integrator, viscosity, kind):
+def test_gradient_of_a_run_through_joints_that_turn_is_that_of_differences(integrator, viscosity, kind, planar):
     if integrator == "fourth_order" and viscosity:
         pytest.skip("refused: fourth order steps go back in time")
     random = np.random.default_rng(20)
-    drawn = Drawn(planar=False, joint=kind, integrator=integrator, viscosity=viscosity, adaptive=False, time_step=4e-3)
+    drawn = Drawn(planar=planar, joint=kind, integrator=integrator, viscosity=viscosity, adaptive=False, time_step=4e-3)
     sim, arm = drawn.simulation, drawn.arm
-    moment = sim.add_moment(arm.node(6), (0.02, -0.01, 0.015))
+    put_on, about = ((0, -0.01, 0), np.array([0, 1.0, 0])) if planar else ((0.02, -0.01, 0.015), np.array([1.0, 0, 0]))
+    moment = sim.add_moment(arm.node(6), put_on)
     nodes = len(sim.positions())
-    velocities, way = random.normal(size=(2, nodes, 3))
+    velocities, way = drawn.vectors(random, nodes), drawn.vectors(random, nodes)
+    seen, fast = (np.stack([drawn.vectors(random, nodes) for _ in range(3)]) for _ in range(2))
     velocities[0] = way[0] = 0.0
     sim.set_velocities(None, 2.0 * velocities)
-    weights = {"positions": random.normal(size=(3, nodes, 3)), "velocities": 0.01 * random.normal(size=(3, nodes, 3))}
+    weights = {"positions": seen, "velocities": 0.01 * fast}
 
     def run(**options):
         return sim.run(24e-3, record_every=12e-3, progress=False, **options)
@@ -239,7 +243,7 @@ def test_gradient_of_a_run_through_joints_that_turn_is_that_of_differences(integ
 
     cases = [
         *settings(drawn, random),
-        ((moment, "moment"), np.array([1.0, 0, 0]), lambda h: sim.set(moment, moment=(0.02 + h, -0.01, 0.015)), 5e-4),
+        ((moment, "moment"), about, lambda h: sim.set(moment, moment=put_on + h * about), 5e-4),
         ("initial_velocities", way, lambda h: sim.set_velocities(None, 2.0 * velocities + h * way), 1e-4),
     ]
     start = sim.snapshot()

@@ -213,7 +213,9 @@ def test_initial_velocities_are_those_of_the_nodes():
 def test_a_joint_that_is_to_be_set_says_how_to_drive_it():
     _, _, simulation = tripod()
     for act in (lambda: simulation.set("joint 1", angle=1.0), lambda: simulation.get("joint 1", "angle")):
-        with pytest.raises(ValueError, match=r"joint 'joint 1' has no motor .* scene.add_moment\(limb 0.start, ...\)"):
+        with pytest.raises(
+            ValueError, match=r"joint 'joint 1' is rigid and has nothing to set.* scene.add_moment\(limb 0.start, ...\)"
+        ):
             act()
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.batch.lanes import Lanes, output
-from withe.parts.handles import Hand, NodeHandle, Obstacle, Rod, Spring, Support
+from withe.parts.handles import Hand, Joint, NodeHandle, Obstacle, Rod, Spring, Support
 from withe.simulation.readouts import Energy, Momentum, Reaction, RodEnergy, Statistics
 
 __all__ = ["Reading"]
@@ -105,6 +105,18 @@ class Reading:
     def spring_tension(self, spring: Spring | str) -> FloatArray:
         """Axial force of a spring and its damper, pulling is positive, shape (n,) [N]."""
         return self._lanes.gathered(lambda s: s.spring_tension(spring))  # type: ignore[no-any-return]
+
+    def joint_angle(self, joint: Joint | str) -> FloatArray:
+        """By how much the second rod of a revolute joint has turned since it was drawn, shape (n,) [rad]."""
+        return self._lanes.gathered(lambda s: s.joint_angle(joint))  # type: ignore[no-any-return]
+
+    def joint_rate(self, joint: Joint | str) -> FloatArray:
+        """The rate of `joint_angle`, shape (n,) [rad/s]."""
+        return self._lanes.gathered(lambda s: s.joint_rate(joint))  # type: ignore[no-any-return]
+
+    def joint_torque(self, joint: Joint | str) -> FloatArray:
+        """By what a revolute joint turns its second rod, shape (n,) [N m]."""
+        return self._lanes.gathered(lambda s: s.joint_torque(joint))  # type: ignore[no-any-return]
 
     def obstacle_position(self, obstacle: Obstacle | str) -> FloatArray:
         """Where an obstacle is, shape (n, 3) [m]."""

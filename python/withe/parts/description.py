@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import cast
 
 import numpy as np
@@ -13,7 +12,7 @@ from withe.parts.contacts import describe_contact
 from withe.parts.directory import Directory
 from withe.parts.fluid import describe_fluid
 from withe.parts.hands import check_free
-from withe.parts.joints import JointGroup, connected, gather
+from withe.parts.joints import describe_joint, groups
 from withe.parts.kinds import (
     CustomForcePart,
     DragPart,
@@ -21,7 +20,6 @@ from withe.parts.kinds import (
     JoinPart,
     LoadPart,
     MassPart,
-    Pass,
     RodPart,
     SupportPart,
 )
@@ -56,7 +54,7 @@ def describe(directory: Directory, gravity: FloatArray, bending: Bending = "angl
     scene.added_mass = added_mass(directory, {mass.name: mass.mass for mass in directory.all(MassPart)})
     coefficients = {part.name: part.coefficient for part in directory.all(DragPart)}
     scene.rods = [_describe_rod(directory, rod, drag(directory, coefficients, rod)) for rod in rods]
-    scene.joints = [_describe_joint(group) for group in _groups(directory.all(JoinPart))]
+    scene.joints = [describe_joint(group) for group in groups(directory.all(JoinPart))]
     scene.supports = _describe_supports(directory)
     scene.loads = [describe_load(load) for load in directory.all(LoadPart)]
     scene.springs = describe_springs(directory)
@@ -147,30 +145,6 @@ def _fill(description: _core.RodDescription, parameters: RodParameters) -> None:
     description.rotary_inertia = parameters.rotary_inertia
     description.viscous_time = parameters.viscous_time
     description.drag = parameters.drag
-
-
-def _groups(joins: Sequence[JoinPart]) -> list[JointGroup]:
-    """One group for every shared node, in the order of its first join."""
-    joins_at: dict[Pass, list[JoinPart]] = {}
-    for join in joins:
-        for node in join.nodes:
-            joins_at.setdefault(node, []).append(join)
-    groups: list[JointGroup] = []
-    done: set[str] = set()
-    for join in joins:
-        if join.name not in done:
-            members = connected(joins_at, join.nodes[0])
-            done.update(member.name for member in members)
-            groups.append(gather(members))
-    return groups
-
-
-def _describe_joint(group: JointGroup) -> _core.JointDescription:
-    joint = _core.JointDescription()
-    joint.clusters = [[_core.RodPass(*node) for node in cluster] for cluster in group.clusters]
-    joint.links = [_core.RevoluteLink(parent, child, axis) for parent, child, axis in group.links]
-    joint.form = group.form
-    return joint
 
 
 def _describe_supports(directory: Directory) -> list[_core.SupportDescription]:

@@ -1,4 +1,4 @@
-"""Joins gathered into joints: who is rigid with whom, and what turns about what."""
+"""Joins gathered into joints: who is rigid with whom, what turns about what, and how the engine is told of it."""
 
 from __future__ import annotations
 
@@ -8,21 +8,40 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from withe import _core
+from withe.common import validation
 from withe.parts.handles import UnionFind
 from withe.parts.kinds import JoinPart, JointForm, Pass
 
-__all__ = ["JointGroup", "connected", "gather"]
+__all__ = [
+    "JOINT_WORDS",
+    "JointGroup",
+    "checked_number",
+    "connected",
+    "describe_joint",
+    "gather",
+    "groups",
+    "revolute_joints",
+]
 
 FloatArray = npt.NDArray[np.float64]
+JOINT_WORDS = ("stiffness", "rest_angle", "damping", "moment")
+"""What revolute joints have; `Simulation.set` changes it."""
 
 
 @dataclass(frozen=True, eq=False)
 class JointGroup:
-    """One shared node: clusters of rigidly joined rods, and revolute links (parent, child, axis) between them."""
+    """One shared node: clusters of rigidly joined rods, and revolute links (parent, child, join) between them."""
 
     clusters: tuple[tuple[Pass, ...], ...]
-    links: tuple[tuple[int, int, FloatArray], ...]
+    links: tuple[tuple[int, int, JoinPart], ...]
     form: JointForm
+
+
+def checked_number(name: str, word: str, value: float) -> float:
+    """A number of a revolute joint, in its range."""
+    what = f"{word} of joint {name!r}"
+    return validation.non_negative(value, what) if word in ("stiffness", "damping") else validation.number(value, what)
 
 
 def connected(joins_at: Mapping[Pass, Sequence[JoinPart]], seed: Pass) -> list[JoinPart]:
@@ -59,7 +78,7 @@ def gather(joins: Sequence[JoinPart]) -> JointGroup:
     order = sorted({roots.find(i) for i in range(len(nodes))})
     clusters = tuple(tuple(node for node in nodes if roots.find(number[node]) == root) for root in order)
 
-    links: dict[tuple[int, int], FloatArray] = {}
+    links: dict[tuple[int, int], JoinPart] = {}
     for join in joins:
         if join.kind == "rigid":
             continue
@@ -70,5 +89,43 @@ def gather(joins: Sequence[JoinPart]) -> JointGroup:
         if join.axis is not None:
             if (a, b) in links or (b, a) in links:
                 raise ValueError(f"{names} already turn against each other about an axis")
-            links[a, b] = join.axis
-    return JointGroup(clusters, tuple((a, b, axis) for (a, b), axis in links.items()), forms[0] if forms else "frame")
+            links[a, b] = join
+    return JointGroup(clusters, tuple((a, b, join) for (a, b), join in links.items()), forms[0] if forms else "frame")
+
+
+def groups(joins: Sequence[JoinPart]) -> list[JointGroup]:
+    """One group for every shared node, in the order of its first join."""
+    joins_at: dict[Pass, list[JoinPart]] = {}
+    for join in joins:
+        for node in join.nodes:
+            joins_at.setdefault(node, []).append(join)
+    found: list[JointGroup] = []
+    done: set[str] = set()
+    for join in joins:
+        if join.name not in done:
+            members = connected(joins_at, join.nodes[0])
+            done.update(member.name for member in members)
+            found.append(gather(members))
+    return found
+
+
+def revolute_joints(joins: Sequence[JoinPart]) -> list[JoinPart]:
+    """Those that turn about an axis, in the order in which the engine numbers them."""
+    return [join for group in groups(joins) for _, _, join in group.links]
+
+
+def describe_joint(group: JointGroup) -> _core.JointDescription:
+    """One joint as the engine takes it."""
+    joint = _core.JointDescription()
+    joint.clusters = [[_core.RodPass(*node) for node in cluster] for cluster in group.clusters]
+    joint.links = [_describe_link(parent, child, join) for parent, child, join in group.links]
+    joint.form = group.form
+    return joint
+
+
+def _describe_link(parent: int, child: int, join: JoinPart) -> _core.RevoluteLink:
+    assert join.axis is not None
+    link = _core.RevoluteLink(parent, child, join.axis)
+    for word in JOINT_WORDS:
+        setattr(link, word, getattr(join, word))
+    return link

@@ -125,6 +125,10 @@ class JoinPart:
     kind: JoinKind
     axis: FloatArray | None
     form: JointForm
+    stiffness: float = 0.0  # of a revolute one [N m/rad]
+    rest_angle: float = 0.0  # [rad]
+    damping: float = 0.0  # [N m s/rad]
+    moment: float = 0.0  # [N m]
 
 
 @dataclass(frozen=True, eq=False)

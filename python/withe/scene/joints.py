@@ -8,7 +8,7 @@ import numpy.typing as npt
 from withe.common import validation
 from withe.parts.directory import Directory
 from withe.parts.handles import NodeHandle
-from withe.parts.joints import connected, gather
+from withe.parts.joints import JOINT_WORDS, checked_number, connected, gather
 from withe.parts.kinds import JoinKind, JoinPart, JointForm, Pass
 
 __all__ = ["JoinedNodes"]
@@ -32,6 +32,7 @@ class JoinedNodes:
         kind: JoinKind,
         axis: npt.ArrayLike | None,
         form: JointForm,
+        numbers: tuple[float, float, float, float],
         name: str | None,
     ) -> JoinPart:
         """A join, checked, and its nodes merged; not yet in the directory. See `Scene.join`."""
@@ -42,6 +43,13 @@ class JoinedNodes:
         validation.choice(form, "form of the joint", ("frame", "pairs"))
         if (kind == "revolute") != (axis is not None):
             raise ValueError(f"axis of the joint must be given when kind='revolute', and only then; kind is {kind!r}")
+        values = {word: checked_number(name, word, value) for word, value in zip(JOINT_WORDS, numbers, strict=True)}
+        given = next((word for word in JOINT_WORDS if values[word] != 0.0), None)
+        if given is not None and kind != "revolute":
+            raise ValueError(
+                f"{given} of joint {name!r} is that of a joint with an axis: take kind='revolute', or leave it out; "
+                f"kind is {kind!r}"
+            )
         if form == "pairs" and kind != "rigid":
             raise ValueError(f"form of the joint must be 'frame' when kind={kind!r}")
         if node_a == node_b:
@@ -52,7 +60,7 @@ class JoinedNodes:
                 f"nodes {name_a!r} and {name_b!r} must coincide to be joined, they are {distance:g} m apart"
             )
         direction = None if axis is None else validation.unit_vector(axis, "axis of the joint")
-        part = JoinPart(name, (node_a, node_b), (name_a, name_b), kind, direction, form)
+        part = JoinPart(name, (node_a, node_b), (name_a, name_b), kind, direction, form, **values)
         joins = {join.name: join for node in part.nodes for join in connected(self._joins_at, node)}
         gather([*joins.values(), part])
         for node in part.nodes:

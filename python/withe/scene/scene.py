@@ -194,12 +194,23 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         *,
         axis: npt.ArrayLike | None = None,
         form: JointForm = "frame",
+        stiffness: float = 0.0,
+        rest_angle: float = 0.0,
+        damping: float = 0.0,
+        moment: float = 0.0,
         name: str | None = None,
     ) -> Joint:
         """Make two nodes that coincide one.
 
         Joins at the same node add up: any number of rods may meet there. Revolute ones there all turn against one rod,
         to which each of the others is joined; a clamp at that node holds that rod.
+
+        A revolute joint has an angle theta, by which b has turned about the axis since it was drawn, seen from a, by
+        the right-hand rule. Its motor, spring and damper turn b, and a the other way, by the torque
+
+            moment - stiffness (theta - rest_angle) - damping dtheta/dt.
+
+        A stiffness whose rest_angle `Simulation.set` moves is a servo; `Simulation.joint_angle` reads theta.
 
         Parameters
         ----------
@@ -212,6 +223,13 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         form : {"frame", "pairs"}
             A rigid joint as a body of its own, bent against every edge, or as one bending element for
             every pair of edges (archival; stiffer).
+        stiffness : float [N m/rad]
+            Of a revolute joint, as are those that follow. What it stores is in `energy().spring`.
+        rest_angle : float [rad]
+            At which the spring is free of stress; whole turns count.
+        damping : float [N m s/rad]
+        moment : float [N m]
+            Of a motor; its work is in `energy().loads`, as that of loads is.
         name : str
 
         Returns
@@ -222,9 +240,22 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         ------
         ValueError
             Nodes that are apart by more than 1e-9 of the scene, one and the same node, joins that
-            contradict each other, or an axis without a revolute joint.
+            contradict each other, or an axis, a stiffness, a rest_angle, a damping or a moment without a revolute
+            joint.
+
+        Examples
+        --------
+        >>> leg = dict(nodes=6, radius=5e-3, material=withe.Material(youngs_modulus=1e8, density=1100))
+        >>> thigh = scene.add_rod(start=(0, 0, 0), end=(0.1, 0, 0), **leg)
+        >>> shank = scene.add_rod(start=(0.1, 0, 0), end=(0.1, 0, -0.1), **leg)
+        >>> knee = scene.join(thigh.end, shank.start, "revolute", axis=(0, 1, 0), stiffness=0.5, damping=2e-3)
+        >>> hold = scene.clamp(thigh.start)
+        >>> simulation = scene.build()
+        >>> simulation.set(knee, rest_angle=0.3)
+        >>> record = simulation.run(1.0)
         """
-        return cast(Joint, self._directory.add(self._joints.join(a, b, kind, axis, form, name)))
+        numbers = (stiffness, rest_angle, damping, moment)
+        return cast(Joint, self._directory.add(self._joints.join(a, b, kind, axis, form, numbers, name)))
 
     # Simulations
 
@@ -271,7 +302,8 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         planar : bool
             Force two or three dimensions; by default a scene that lies in a plane is solved in it, also where it
             could buckle out of it: `equilibrium` warns of that, and steps stay in the plane as exact ones would. A
-            straight scene without gravity lies in many, and ``True`` takes that of its first director.
+            straight scene without gravity lies in many, and ``True`` takes that in which its revolute joints turn, or
+            that of its first director.
             Loads that are functions and custom forces may leave any plane; with ``True`` they must not.
         duration : float [s]
             Over which `tolerance` holds; 1 s by default.

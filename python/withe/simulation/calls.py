@@ -12,9 +12,11 @@ import numpy.typing as npt
 from withe import _core
 from withe.parts.contacts import BodyPair
 from withe.parts.friction import by_given
+from withe.parts.joints import JOINT_WORDS
 from withe.parts.kinds import (
     DragPart,
     FluidPart,
+    JoinPart,
     LoadPart,
     MassPart,
     ObstaclePart,
@@ -352,6 +354,7 @@ class Ledger:
         elif (
             isinstance(call.part, LoadPart | MassPart)
             or (isinstance(call.part, SpringPart) and word in SPRING_WORDS)
+            or (isinstance(call.part, JoinPart) and word in JOINT_WORDS)
             or (isinstance(call.part, ObstaclePart) and word == "rolling_friction")
         ):
             self._add(index, word, reader_of(call.session, call.part, word)(OfRun(found)))
@@ -396,7 +399,7 @@ def _has_gradient(call: _Call, word: str) -> bool:
         return word in SCENE_WORDS
     if isinstance(call.part, FluidPart):
         return word == "viscosity"
-    return isinstance(call.part, RodPart | MassPart | SpringPart | DragPart)
+    return isinstance(call.part, RodPart | MassPart | SpringPart | JoinPart | DragPart)
 
 
 def _by_drag(epoch: _Epoch, part: DragPart, found: Any, *, initial: bool) -> float:

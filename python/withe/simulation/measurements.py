@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from withe.knots import link
 from withe.parts.contacts import contact_table
-from withe.parts.handles import Hand, NodeHandle, Obstacle, Rod, Spring, Support
+from withe.parts.handles import Hand, Joint, NodeHandle, Obstacle, Rod, Spring, Support
 from withe.parts.kinds import ObstaclePart, RodPart, SpringPart
 from withe.simulation.hands import (
     Deflection,
@@ -20,6 +20,7 @@ from withe.simulation.hands import (
     ring_passage,
     support_pose,
 )
+from withe.simulation.joints import find_joint
 from withe.simulation.readouts import Energy, Momentum, Plan, Reaction, RodEnergy, Statistics
 from withe.simulation.session import Session
 from withe.simulation.springs import spring_tension
@@ -109,6 +110,38 @@ class Measurements:
             Not a spring of this scene.
         """
         return spring_tension(self._session, self._session.directory.find(spring, SpringPart, "spring"))
+
+    def joint_angle(self, joint: Joint | str) -> float:
+        """By how much the second rod of a revolute joint has turned about its axis since it was drawn [rad].
+
+        Seen from the first, by the right-hand rule; whole turns are counted.
+
+        Raises
+        ------
+        ValueError
+            Not a revolute joint of this scene.
+        """
+        return self._session.world.joint_angle(find_joint(self._session, joint))
+
+    def joint_rate(self, joint: Joint | str) -> float:
+        """The rate of `joint_angle` [rad/s].
+
+        Raises
+        ------
+        ValueError
+            Not a revolute joint of this scene.
+        """
+        return self._session.world.joint_rate(find_joint(self._session, joint))
+
+    def joint_torque(self, joint: Joint | str) -> float:
+        """By what its motor, spring and damper turn the second rod of a revolute joint, see `Scene.join` [N m].
+
+        Raises
+        ------
+        ValueError
+            Not a revolute joint of this scene.
+        """
+        return self._session.world.joint_torque(find_joint(self._session, joint))
 
     def spins(self, rod: Rod | str) -> FloatArray:
         """Angular velocities of the edges about their tangents, shape (edges,) [rad/s]."""

@@ -9,7 +9,8 @@ import numpy as np
 from withe.common import validation
 from withe.parts.contacts import touching
 from withe.parts.description import added_mass, drag
-from withe.parts.handles import Drag, Fluid, Load, Mass, Obstacle, Rod, Spring, Support
+from withe.parts.handles import Drag, Fluid, Joint, Load, Mass, Obstacle, Rod, Spring, Support
+from withe.parts.joints import JOINT_WORDS
 from withe.parts.kinds import (
     DragPart,
     FluidPart,
@@ -26,6 +27,7 @@ from withe.parts.parameters import NATURAL_WORDS, ROD_WORDS, in_order_of_setting
 from withe.parts.rods import curvature_given, stretch_array, twist_array
 from withe.parts.springs import SPRING_WORDS
 from withe.simulation.hands import ring_friction, set_ring_friction
+from withe.simulation.joints import joint_value, set_joint
 from withe.simulation.loads import load_index, set_load
 from withe.simulation.session import Session
 from withe.simulation.springs import set_spring, spring_value
@@ -44,7 +46,16 @@ from withe.simulation.surfaces import (
 __all__ = ["Settable", "get_value", "set_values"]
 
 Settable = (
-    Rod | Load | Mass | Spring | Drag | Fluid | Obstacle | Support | tuple[Rod | Obstacle | str, Rod | Obstacle | str]
+    Rod
+    | Load
+    | Mass
+    | Spring
+    | Joint
+    | Drag
+    | Fluid
+    | Obstacle
+    | Support
+    | tuple[Rod | Obstacle | str, Rod | Obstacle | str]
 )
 _POSE = ("position", "rotation")  # of supports
 _FLUID = ("viscosity", "regularization")
@@ -120,6 +131,9 @@ def _set_values(session: Session, part: Part | None, values: dict[str, Any]) -> 
     elif isinstance(part, SpringPart):
         _only(values, SPRING_WORDS, f"spring {part.name!r}")
         set_spring(session, part, values)
+    elif isinstance(part, JoinPart) and part.axis is not None:
+        _only(values, JOINT_WORDS, f"joint {part.name!r}")
+        set_joint(session, part, values)
     elif isinstance(part, DragPart):
         _only(values, ("drag",), f"drag {part.name!r}")
         _set_drag(session, part, validation.non_negative(values["drag"], f"drag {part.name!r}"))
@@ -162,6 +176,8 @@ def get_value(session: Session, target: Settable | Support | str, word: str | No
         return session.settings.masses[part.name]
     elif isinstance(part, SpringPart) and word in SPRING_WORDS:
         return spring_value(session, part, word)
+    elif isinstance(part, JoinPart) and part.axis is not None and word in JOINT_WORDS:
+        return joint_value(session, part, word)
     elif isinstance(part, DragPart) and word == "drag":
         return session.settings.drags[part.name]
     elif isinstance(part, FluidPart) and word == "viscosity":
@@ -229,6 +245,8 @@ def _words_of(part: Part) -> tuple[str, ...]:
     if isinstance(part, SupportPart):
         rubs = part.grasp is not None and part.grasp.slides and part.grasp.feed_rate is None
         return (*_POSE, "friction") if rubs else _POSE
+    if isinstance(part, JoinPart):
+        return JOINT_WORDS if part.axis is not None else ()
     words: dict[type[Any], tuple[str, ...]] = {
         MassPart: ("mass",),
         SpringPart: SPRING_WORDS,
@@ -241,8 +259,9 @@ def _words_of(part: Part) -> tuple[str, ...]:
 
 _SETTABLE = (
     "set takes rods (youngs_modulus, natural_curvature, ...), loads (force, moment, load), masses (mass), "
-    "springs (stiffness, rest_length, damping), drags (drag), fluids (viscosity, regularization), obstacles (friction, "
-    "rolling_friction, restitution), supports (position, rotation; of rings friction), and None for the scene "
+    "springs (stiffness, rest_length, damping), revolute joints (stiffness, rest_angle, damping, moment), "
+    "drags (drag), fluids (viscosity, regularization), obstacles (friction, rolling_friction, restitution), supports "
+    "(position, rotation; of rings friction), and None for the scene "
     "(gravity, friction, slip_tolerance, restitution, contact_stiffness)"
 )
 
@@ -252,7 +271,8 @@ def _nothing_to_set(part: Part) -> str:
     if isinstance(part, JoinPart):
         first, second = part.node_names
         return (
-            f"joint {part.name!r} has no motor and nothing to set. To drive it: equal and opposite moments on the rods "
+            f"joint {part.name!r} is {part.kind} and has nothing to set; revolute ones have a motor, a spring and a "
+            "damper. To drive it: equal and opposite moments on the rods "
             f"at both sides, scene.add_moment({first}, ...) and scene.add_moment({second}, ...), which "
             "set(load, moment=...) changes or makes a function of time; set_natural_curvature or set_natural_twist of "
             "a rod beside it; or, to prescribe where it is, clamp or pin its node and move that"

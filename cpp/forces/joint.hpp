@@ -1,0 +1,49 @@
+#pragma once
+/// What drives a revolute joint and resists its turn, by the angle theta from how it is drawn [rad]: the torque
+///   T = m - k (theta - theta0) - c dtheta/dt
+/// on what turns, and its opposite on what it turns against: a motor's moment m [N m], stiffness k [N m/rad] towards
+/// the rest angle theta0 [rad], damping c [N m s/rad]. A servo is a stiffness whose rest angle is moved.
+///
+/// T is linear in theta. Over a step of dt it is taken at its end, or at the middle angle (theta0 + theta1) / 2, where
+/// its work T (theta1 - theta0) is exactly what k (theta - theta0)^2 / 2 loses, less what the damper takes: that of the
+/// midpoint rule is a discrete gradient [Gonzalez 1996, J. Nonlinear Sci. 6]. Where frames that a plane lets turn by x
+/// and y are measured by their Cayley vectors 2 tan(x / 2), T is scaled so that its work is still that:
+///   T (x - y) = T s (2 tan(x / 2) - 2 tan(y / 2)).
+
+#include <cmath>
+
+#include "common/dual.hpp"
+
+namespace withe {
+
+struct JointTorque {
+  double stiffness = 0, rest_angle = 0, damping = 0, moment = 0;
+
+  bool acts() const { return stiffness != 0.0 || damping != 0.0 || moment != 0.0; }
+  /// k (theta - theta0)^2 / 2 [J].
+  double energy(double angle) const { return 0.5 * stiffness * (angle - rest_angle) * (angle - rest_angle); }
+};
+
+/// T [N m].
+template <class Scalar>
+Scalar torque_of(const JointTorque& joint, const Scalar& angle, const Scalar& rate) {
+  return joint.moment - joint.stiffness * (angle - joint.rest_angle) - joint.damping * rate;
+}
+
+/// s = (x - y) / (2 tan(x / 2) - 2 tan(y / 2)), with tan a - tan b = tan(a - b) (1 + tan a tan b).
+template <class Scalar>
+Scalar share_of_turns(const Scalar& x, const Scalar& y) {
+  const auto tangent_of_half = [](const Scalar& a) {
+    const double t = std::tan(0.5 * value_of(a));
+    return chain(a, t, 0.5 * (1.0 + t * t));
+  };
+  // u / (2 tan(u / 2)) and its derivative.
+  const auto ratio = [](const Scalar& u) {
+    const double v = value_of(u), t = std::tan(0.5 * v);
+    if (std::abs(v) < 1e-2) return chain(u, 1.0 - v * v * (1.0 + v * v / 60.0) / 12.0, -v * (1.0 + v * v / 30.0) / 6.0);
+    return chain(u, 0.5 * v / t, 0.5 * (t - 0.5 * v * (1.0 + t * t)) / (t * t));
+  };
+  return ratio(x - y) / (1.0 + tangent_of_half(x) * tangent_of_half(y));
+}
+
+}  // namespace withe

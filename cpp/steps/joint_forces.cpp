@@ -1,0 +1,170 @@
+#include "steps/joint_forces.hpp"
+
+#include <cmath>
+
+#include "steps/rounding.hpp"
+
+namespace withe {
+namespace {
+
+/// What of a joint's torque is asked for: T [N m], and what multiplies it, by the unknowns of what turns and of what it
+/// turns against, which are those of the drawing's axes.
+template <class Scalar>
+Scalar torque_on(const StepProblem& problem, const JointTorque& torque, const JointAngle& joint, const Scalar (&z)[2],
+                 const Scalar (&start)[2]) {
+  const double rate = problem.moves() ? 1.0 / problem.interval : 0.0;
+  const Scalar angle = joint.sign * (z[0] - z[1]), before = joint.sign * (start[0] - start[1]);
+  const Scalar out = torque_of(torque, angle, rate * (angle - before));
+  if (!problem.conserves_energy() || joint.against < 0) return out;
+  return out * share_of_turns(2.0 * (z[0] - start[0]), 2.0 * (z[1] - start[1]));
+}
+
+double unknown(const VectorX& q, int dof) { return dof < 0 ? 0.0 : q[dof]; }
+
+/// At z.
+double torque_now(const StepProblem& problem, const StepData& data, const JointTorque& torque,
+                  const JointAngle& joint) {
+  const double z[2] = {unknown(data.z, joint.turning), unknown(data.z, joint.against)};
+  const double start[2] = {unknown(problem.start->q, joint.turning), unknown(problem.start->q, joint.against)};
+  return torque_on(problem, torque, joint, z, start);
+}
+
+/// T, and its derivatives by z of both unknowns, then by the start's.
+Dual<4> torque_with_slopes(const StepProblem& problem, const StepData& data, const JointTorque& torque,
+                           const JointAngle& joint) {
+  using D = Dual<4>;
+  const VectorX& q0 = problem.start->q;
+  const D z[2] = {D::unknown(unknown(data.z, joint.turning), 0), D::unknown(unknown(data.z, joint.against), 1)};
+  const D start[2] = {D::unknown(unknown(q0, joint.turning), 2), D::unknown(unknown(q0, joint.against), 3)};
+  return torque_on(problem, torque, joint, z, start);
+}
+
+}  // namespace
+
+JointTorque joint_torque(const Parameters& p, int joint) {
+  return {p.joint_stiffness[joint], p.joint_rest_angle[joint], p.joint_damping[joint], p.joint_moment[joint]};
+}
+
+JointForces::JointForces(const Model& model) {
+  std::vector<int> dofs;
+  for (const JointAngle& joint : model.joint_angles) {
+    dofs.push_back(joint.turning);
+    dofs.push_back(joint.against);
+  }
+  table_ = ElementTable(2, std::move(dofs));
+}
+
+bool JointForces::dissipates(const Parameters& parameters) const {
+  return (parameters.joint_damping.array() > 0.0).any();
+}
+
+void JointForces::add(const StepProblem& problem, StepData& data, const Assembler& assembler,
+                      std::span<double> values) const {
+  const bool symmetric = assembler.solver().symmetry() == Symmetry::symmetric;
+  Local local;
+  for (int j = 0; j < table_.count(); ++j) {
+    const JointAngle& joint = problem.model.joint_angles[at(j)];
+    const JointTorque torque = joint_torque(*problem.parameters, j);
+    if (!joint.turns() || !torque.acts()) continue;
+    const Dual<4> T = torque_with_slopes(problem, data, torque, joint);
+    for (int i = 0; i < 2; ++i) {
+      const double row = i == 0 ? -joint.sign : joint.sign;
+      local.gradient[i] = row * T.value;
+      for (int k = 0; k < 2; ++k) local.hessian[i][k] = row * T.slope[k];
+    }
+    if (symmetric) local.hessian[0][1] = local.hessian[1][0] = 0.5 * (local.hessian[0][1] + local.hessian[1][0]);
+    add_element(table_, j, local, data, values);
+    // Rows of planar frames in energy-momentum steps go by Cayley vectors, as those of elastic forces do.
+    if (problem.conserves_energy() && joint.against >= 0)
+      for (int i = 0; i < 2; ++i) data.elastic_rows[table_.dofs(j)[i]] += local.gradient[i];
+    const double angle = joint.angle(data.z);
+    data.potential += torque.energy(angle) - torque.moment * angle;
+  }
+}
+
+void JointForces::add_adjoint(const StepProblem& problem, const StepData& data, const Assembler&,
+                              StepAdjoint& adjoint) const {
+  double rows[kMaxLocal];
+  for (int j = 0; j < table_.count(); ++j) {
+    const JointAngle& joint = problem.model.joint_angles[at(j)];
+    if (!joint.turns()) continue;
+    gather(table_, j, adjoint.rows, rows);
+    const double apart = -joint.sign * (rows[0] - rows[1]);
+    const JointTorque torque = joint_torque(*problem.parameters, j);
+    const auto by = [&](const JointTorque& unit) { return apart * torque_now(problem, data, unit, joint); };
+    CoefficientAdjoint& out = adjoint.coefficients;
+    out.joint_stiffness[j] += by({.stiffness = 1.0, .rest_angle = torque.rest_angle});
+    out.joint_rest_angle[j] += torque.stiffness * by({.moment = 1.0});
+    out.joint_damping[j] += by({.damping = 1.0});
+    out.joint_moment[j] += by({.moment = 1.0});
+    const Dual<4> T = torque_with_slopes(problem, data, torque, joint);
+    for (int i = 0; i < 2; ++i)
+      if (const int dof = table_.dofs(j)[i]; dof >= 0) adjoint.start[dof] += apart * T.slope[2 + i];
+  }
+}
+
+void JointForces::add_rounding(const StepProblem& problem, StepData& data) const {
+  const double rate = problem.moves() ? 1.0 / problem.interval : 0.0;
+  for (int j = 0; j < table_.count(); ++j) {
+    const JointAngle& joint = problem.model.joint_angles[at(j)];
+    const JointTorque torque = joint_torque(*problem.parameters, j);
+    if (!joint.turns() || !torque.acts()) continue;
+    const double greatest = std::abs(unknown(data.z, joint.turning)) + std::abs(unknown(data.z, joint.against));
+    const double bound =
+        kRounding * (torque.stiffness + 2.0 * torque.damping * rate) * (greatest + std::abs(torque.rest_angle));
+    for (int dof : {joint.turning, joint.against})
+      if (dof >= 0) data.floor[dof] += bound;
+  }
+}
+
+/// At the end of a step a stiffness does less than what its energy changes by; in the middle just that.
+void JointForces::add_gains(const StepProblem& problem, StepData& /*data*/, const Assembler& /*assembler*/,
+                            const VectorX& end, ComponentGains& gains) const {
+  if (problem.in_middle()) return;
+  for (int j = 0; j < table_.count(); ++j) {
+    const JointAngle& joint = problem.model.joint_angles[at(j)];
+    if (!joint.turns()) continue;
+    const double turned = joint.angle(end) - joint.angle(problem.start->q);
+    gains.energy[problem.model.component_of_node(joint.node)] -=
+        0.5 * problem.parameters->joint_stiffness[j] * turned * turned;
+  }
+}
+
+double JointForces::dissipated(const StepProblem& problem, const StepData& data, const Assembler&,
+                               const VectorX& change) const {
+  double work = 0.0;
+  for (int j = 0; problem.moves() && j < table_.count(); ++j) {
+    const JointAngle& joint = problem.model.joint_angles[at(j)];
+    const double damping = problem.parameters->joint_damping[j];
+    if (!joint.turns() || damping == 0.0) continue;
+    work -= torque_now(problem, data, {.damping = damping}, joint) * joint.angle(change);
+  }
+  return work;
+}
+
+void JointForces::add_applied(const StepProblem& problem, const StepData& data, const Assembler&,
+                              VectorX& force) const {
+  for (int j = 0; j < table_.count(); ++j) {
+    const JointAngle& joint = problem.model.joint_angles[at(j)];
+    const double moment = problem.parameters->joint_moment[j];
+    if (!joint.turns() || moment == 0.0) continue;
+    const double torque = joint.sign * torque_now(problem, data, {.moment = moment}, joint);
+    force[joint.turning] += torque;
+    if (joint.against >= 0) force[joint.against] -= torque;
+  }
+}
+
+double joint_energy(const Model& model, const VectorX& stiffness, const VectorX& rest_angle, const VectorX& q) {
+  double energy = 0.0;
+  for (int j = 0; j < static_cast<int>(stiffness.size()); ++j)
+    energy += joint_energy(model, stiffness, rest_angle, q, j);
+  return energy;
+}
+
+double joint_energy(const Model& model, const VectorX& stiffness, const VectorX& rest_angle, const VectorX& q,
+                    int joint) {
+  const JointTorque torque{.stiffness = stiffness[joint], .rest_angle = rest_angle[joint]};
+  return torque.energy(model.joint_angles[at(joint)].angle(q));
+}
+
+}  // namespace withe

@@ -1,0 +1,39 @@
+#pragma once
+/// Torques of revolute joints, see forces/joint.hpp.
+
+#include "forces/joint.hpp"
+#include "steps/term.hpp"
+
+namespace withe {
+
+class JointForces final : public Term {
+ public:
+  explicit JointForces(const Model& model);
+
+  void declare(std::vector<ElementTable*>& tables) override { tables.push_back(&table_); }
+  bool dissipates(const Parameters& parameters) const override;
+  void add(const StepProblem& problem, StepData& data, const Assembler& assembler,
+           std::span<double> values) const override;
+  void add_adjoint(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+                   StepAdjoint& adjoint) const override;
+  void add_rounding(const StepProblem& problem, StepData& data) const override;
+  void add_gains(const StepProblem& problem, StepData& data, const Assembler& assembler, const VectorX& end,
+                 ComponentGains& gains) const override;
+  double dissipated(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+                    const VectorX& change) const override;
+  void add_applied(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+                   VectorX& force) const override;
+
+ private:
+  ElementTable table_;
+};
+
+/// What drives a joint and resists it, as parameters say.
+JointTorque joint_torque(const Parameters& parameters, int joint);
+/// What the stiffness of all joints stores at a configuration [J].
+double joint_energy(const Model& model, const VectorX& stiffness, const VectorX& rest_angle, const VectorX& q);
+/// Of one.
+double joint_energy(const Model& model, const VectorX& stiffness, const VectorX& rest_angle, const VectorX& q,
+                    int joint);
+
+}  // namespace withe
