@@ -107,7 +107,7 @@ def test_no_smoother_curve_within_the_bound_needs_less_without_tension():
 
     raw = wave(count=200)
     spacing = float(np.linalg.norm(np.diff(raw, axis=0), axis=1).mean())
-    best = smooth(raw, spacing, 1e-3)
+    best = smooth(raw, spacing, np.full(200, 1e-3))
     matrix = fourth_differences(200) / spacing**4
 
     def need(points):

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 import withe
 from withe.__main__ import main
 from withe.deployment import Cable, Pattern, Plan, Post, deploy, plan
+from withe.deployment.motion import lengthened
 
 CABLE = Cable.dlo(2)
 JAW = 0.01  # [m] that are held
@@ -256,7 +257,7 @@ def loop(count=300):
         (lambda: plan(CABLE, Pattern(wave()), "optimised"), "'optimised' needs friction"),
         (lambda: plan(CABLE, Pattern(wave()), time_step=-1.0), "time_step must be positive"),
         (lambda: plan(CABLE, Pattern(loop())), "must not cross itself"),
-        (lambda: plan(Cable.dlo(5), Pattern(wave(0.06))), "no floor holds this cable on this pattern"),
+        (lambda: plan(Cable.dlo(5), Pattern(wave(0.12))), "no floor holds this cable on this pattern"),
         (lambda: plan(Cable(1.5, 0.015, 0.1), Pattern(wave(0.2))), "no floor holds this cable .*: no grasp found"),
         (lambda: plan(Cable(1.5, 0.04, 0.09), Pattern(wave(0.2)), "intuitive"), "tighter than the cable's own of 40"),
         (lambda: plan(CABLE, wave()), "pattern must be a withe.deployment.Pattern, got ndarray"),
@@ -289,17 +290,24 @@ def test_lines_of_what_a_pattern_needs_are_drawn_whole():
     assert 2.0 < floor.max() < needs.get_ylim()[1]
 
 
+def nearly_a_circle(turns, radius):
+    """A straight piece, and so many turns towards it."""
+    s = np.linspace(0.0, 1.0, 300)
+    angle = 2 * np.pi * turns * np.clip(s - 0.35, 0.0, None) / 0.65
+    way = 2 * np.pi * turns * radius / 0.65 * np.stack([np.cos(angle), np.sin(angle)], 1) / 300
+    return np.concatenate([[[0.0, 0.0]], np.cumsum(way, axis=0)])
+
+
 def test_a_pattern_that_only_lacks_a_tail_says_so():
-    angle = np.linspace(0.0, 2.0 * np.pi, 200)
-    circle = Pattern(0.1 * np.stack([np.sin(angle), 1.0 - np.cos(angle)], 1))
-    cable = Cable(0.8, 1.6e-3, 0.032)
+    hook = Pattern(nearly_a_circle(0.93, 0.07))
+    cable = Cable(hook.length + 0.3, 1.6e-3, 0.032)
     lacking = r"no floor .* \(lift-off\): .* A tail is missing: with 128 mm .* there are {} mm, it would need 0\.\d\d"
     with pytest.raises(ValueError, match=lacking.format(16)):
-        plan(cable, circle)  # a longer one would cross it
+        plan(cable, hook)  # a longer one would cross it
     with pytest.raises(ValueError, match=lacking.format(0)):
-        plan(cable, circle, tail=0.0)
+        plan(cable, hook, tail=0.0)
     with pytest.raises(ValueError, match=r"no floor (?!.*A tail is missing)"):
-        plan(Cable.dlo(5), Pattern(wave(0.06)), tail=0.0)  # which a tail does not hold either
+        plan(Cable.dlo(5), Pattern(wave(0.12)), tail=0.0)  # which a tail does not hold either
 
 
 def test_a_pattern_that_crosses_itself_is_laid_over_itself_on_request():
@@ -309,11 +317,42 @@ def test_a_pattern_that_crosses_itself_is_laid_over_itself_on_request():
 
 
 def test_a_tail_that_would_cross_the_pattern_is_shortened_or_refused():
-    s = np.linspace(0.0, 1.0, 300)
-    angle = 2 * np.pi * 0.9 * np.clip(s - 0.35, 0.0, None) / 0.65  # a straight piece, and nearly a circle towards it
-    way = 0.6 * np.stack([np.cos(angle), np.sin(angle)], 1) / 300
-    pattern = Pattern(np.concatenate([[[0.0, 0.0]], np.cumsum(way, axis=0)]))
+    pattern = Pattern(nearly_a_circle(0.9, 0.069))
     with pytest.raises(ValueError, match="the tail must not cross the pattern"):
         plan(CABLE, pattern, "intuitive", tail=0.17)
     assert plan(CABLE, pattern, "intuitive").tail < 0.12
     assert plan(CABLE, pattern, "intuitive", tail=0.17, crossings="over").tail == 0.17
+
+
+@pytest.mark.parametrize("turns", [(90,), (90, -90), (180,)])
+@pytest.mark.parametrize("nodes", [301, 601])
+def test_a_tail_lies_straight_on_behind_a_pattern_that_ends_straight(turns, nodes):
+    """Where the last straight piece of what was given points to, by the jaw at the end."""
+    legs = [0.1] * (len(turns) + 1)
+    pattern = Pattern.bends(np.radians(turns), [0.06] * len(turns), legs, nodes=nodes)
+    motion = plan(CABLE, pattern)
+    heading = np.radians(sum(turns))
+    along, aside = np.array([np.cos(heading), np.sin(heading)]), np.array([-np.sin(heading), np.cos(heading)])
+    jaw = motion.positions[-1, :2] - pattern.raw[-1]
+    assert jaw @ along > 0.5 * motion.tail
+    assert abs(jaw @ aside) < 1.5e-3  # half a millimetre more than the smoothing
+
+
+def test_a_bend_at_the_end_fades_out_within_the_tail():
+    """From .05 to nothing; the end that the jaw lets go does not spring back."""
+    angle = np.linspace(0.0, np.pi, 200)
+    half = Pattern(0.08 * np.stack([np.sin(angle), 1.0 - np.cos(angle)], 1))
+    path = lengthened(half, CABLE, 4.0 * CABLE.gravito_bending_length)
+    behind = path.curvature[path.arc_length > half.length]
+    assert np.abs(behind).max() <= 1.01 * abs(half.curvature[-1])
+    assert abs(behind[-1]) < 0.05 * abs(half.curvature).max()
+
+
+@pytest.mark.parametrize("speed", [0.01, 0.05, 0.2])
+def test_the_jaw_starts_and_stops_gently_at_any_speed(speed):
+    """By a hundredth of gravity's acceleration, but for pieces that last a second."""
+    motion = plan(CABLE, Pattern(np.stack([np.linspace(0.0, 0.5, 101), np.zeros(101)], 1)), speed=speed)
+    down = motion.phases[1]
+    inside = (motion.times >= down.start) & (motion.times <= down.end)
+    acceleration = np.diff(motion.positions[inside], 2, axis=0) / np.diff(motion.times[inside]).mean() ** 2
+    assert np.linalg.norm(acceleration, axis=1).max() < 1.5 * 0.0981

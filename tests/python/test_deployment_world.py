@@ -177,7 +177,7 @@ def test_equilibria_follow_a_cable_of_any_mesh_that_slips_along_its_length(nodes
     motion = plan(Cable.dlo(2), Pattern(sine))
     found = deploy(motion, floor=0.2, nodes=nodes, quasi_static=True, progress=False)
     assert found.slipped.max() > 5e-3
-    assert found.error == pytest.approx(3.73e-3, abs=1e-4)  # in time, at 6 mm/s, 80 nodes: 3.78 mm
+    assert found.error == pytest.approx(4.07e-3, abs=1e-4)  # in time, at 6 mm/s, 80 nodes: 4.12 mm
 
 
 def test_equilibria_are_found_where_the_border_of_slip_has_many_nodes_to_go():
@@ -196,7 +196,7 @@ def test_a_cable_put_on_its_pattern_moves_only_where_friction_fails(arc):
     assert rough.error < 2e-4
     assert smooth.error > 5 * rough.error
     still, moving = (place(motion, floor=0.1, nodes=NODES, quasi_static=q, progress=False) for q in (True, False))
-    assert np.abs(still.laid - moving.laid).max() < 5e-4
+    assert np.abs(still.laid - moving.laid).max() < 1e-4
 
 
 @pytest.mark.filterwarnings("ignore:the cable slips")
@@ -213,6 +213,13 @@ def test_optimising_makes_up_for_what_slips():
     assert slipped.error > 1e-3
     assert laid.error < 0.3 * slipped.error
     assert moving.error < 0.5 * slipped.error  # in motion too, which the plan was not made in
+
+
+def test_a_quick_plan_does_not_lose_the_free_end_where_it_touches_down():
+    """The jaw swings the cable no faster than it may, however fast it lays."""
+    line = Pattern(np.stack([np.linspace(0.0, 0.25, 101), np.zeros(101)], 1))
+    found = deploy(plan(CABLE, line, speed=0.15), floor=0.6, nodes=NODES, progress=False)
+    assert found.error < 1e-3
 
 
 def test_optimising_needs_the_friction(arc):

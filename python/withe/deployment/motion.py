@@ -16,11 +16,10 @@ __all__ = ["Course", "Path", "Phase", "Piece", "Start", "course", "displaced", "
 
 FloatArray = npt.NDArray[np.float64]
 Start = Literal["free", "held"]
-_GRAVITY = 9.81
 _LAST_HELD = 0.5  # [Lgb] that still hang when the jaw lets go
 _TAIL_SPACING = 0.02  # [Lgb]
 _CLEARANCE = 0.02  # [m] of the free end above the floor at the beginning
-_FASTEST_SHARE = 0.01  # of the acceleration of gravity: swing then moves the cable by less than a millimetre
+_ACCELERATION = 0.0981  # [m/s^2], a hundredth of gravity's: swing then moves the cable by less than a millimetre
 _PIVOT_ANGLES = 61
 _UPRIGHT = 0.5 * np.pi - 1e-3
 
@@ -61,7 +60,7 @@ class Path:
 
 
 def lengthened(pattern: Pattern, cable: Cable, tail: float) -> Path:
-    """A pattern and its tail, along which the curvature fades out."""
+    """A pattern and its tail, which becomes straight."""
     lgb = cable.gravito_bending_length
     heading = np.unwrap(np.arctan2(pattern.tangent[:, 1], pattern.tangent[:, 0]))
     more = tail - max(_LAST_HELD * lgb, JAW)
@@ -75,8 +74,9 @@ def lengthened(pattern: Pattern, cable: Cable, tail: float) -> Path:
         return Path(pattern.arc_length[last], pattern.points[last], heading[last], pattern.curvature[last])
     spacing = max(pattern.arc_length[1], _TAIL_SPACING * lgb)
     s = np.linspace(0.0, more, max(2, int(np.ceil(more / spacing))) + 1)
-    share = np.minimum(s / min(more, 2.0 * lgb), 1.0)  # the curvature fades out
-    curvature = pattern.curvature[-1] * (1.0 - 3.0 * share**2 + 2.0 * share**3)
+    behind = np.concatenate([pattern.curvature[-1:], pattern.curvature_behind])
+    fading = pattern.arc_length[1] * np.arange(len(behind))  # within the tail, so that its end does not spring back
+    curvature = np.interp(s, fading * min(1.0, more / max(fading[-1], 1e-300)), behind, right=0.0)
     steps = np.diff(s)
     turned = heading[-1] + np.concatenate([[0.0], np.cumsum(0.5 * (curvature[1:] + curvature[:-1]) * steps)])
     middle = 0.5 * (turned[1:] + turned[:-1])
@@ -117,18 +117,19 @@ class Piece:
 
     def duration(self, speed: float) -> float:
         """How long it takes at a speed [m/s], in s."""
-        if not self.laying:
-            return max(1.0, 1.875 * self.reach / speed)  # a quintic's greatest speed is 1.875 times its mean
-        return self.reach / speed + self._ramp()
+        if not self.laying:  # a quintic's greatest speed is 1.875 times its mean, and its acceleration 10 / 3^.5
+            gentle = np.sqrt(10.0 / np.sqrt(3.0) * self.reach / _ACCELERATION)
+            return max(1.0, 1.875 * self.reach / speed, float(gentle))
+        return self.reach / speed + self._ramp(speed)
 
-    def _ramp(self) -> float:
-        return 2.0  # [s] to reach the speed, and to stop
+    def _ramp(self, speed: float) -> float:
+        return max(2.0, 1.875 * speed / _ACCELERATION)  # [s] to reach the speed, and to stop
 
     def _progress(self, share: FloatArray, speed: float) -> FloatArray:
         """Share of the parameter at shares of the duration."""
         if not self.laying:
             return share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
-        duration, ramp = self.duration(speed), self._ramp()
+        duration, ramp = self.duration(speed), self._ramp(speed)
         t = share * duration
 
         def ramped(time: FloatArray) -> FloatArray:  # integral of the smoothstep of fifth order over time
@@ -159,7 +160,7 @@ class Piece:
         from scipy.interpolate import CubicSpline
 
         bend = np.linalg.norm(CubicSpline(self.parameter, self.positions)(self.parameter, 2), axis=1)
-        return float(np.sqrt(_FASTEST_SHARE * _GRAVITY / max(bend.max(), 1e-6)))
+        return float(np.sqrt(_ACCELERATION / max(bend.max(), 1e-6)))
 
 
 def way_along(cable: Cable, path: Path, grasps: Grasp) -> Piece:

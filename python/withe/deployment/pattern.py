@@ -34,6 +34,9 @@ _SLOWEST = 0.15  # of the way along the curve over that along what was given, wh
 _MUCH_FARTHER = 1.5
 _AT_ONCE = 500  # points whose distances from all pieces of a curve are in memory
 _AVERAGED = 101  # samples of an average
+_REACH = 0.02  # of the length: a chord at an end
+_ENOUGH = 10.0  # [smoothing], for a direction
+_LEAST_BEHIND, _MOST_BEHIND = 0.1, 0.5  # of a pattern's length, in which what lies behind it becomes straight
 _BENT_START = 1.0  # [rad]: curvature at a function's start times its length that asks for a lead-in
 
 
@@ -55,7 +58,8 @@ class Pattern:
     smoothing : float [m]
         How far the pattern may depart from what was given, at its nodes: of all such curves it is that which a floor
         holds with least friction (the greatest EI x'''' along it is least). A free end has no moment, so that a curve
-        that begins bent begins a little straighter.
+        that begins bent begins a little straighter. What lies behind it goes straight on from the end of what was
+        given; behind one that ends bent the bend fades out.
     lead_in : float [m]
         Length of an extra piece before the beginning, along which curvature grows from zero. None: that over which the
         cable turns by one radian, for a `function` that begins bent.
@@ -74,6 +78,9 @@ class Pattern:
         Positive to the left of its way.
     curvature_slope, curvature_bend : ndarray of shape (nodes,) [1/m^2], [1/m^3]
         First and second derivative of the curvature by arc length.
+    curvature_behind : ndarray of shape (n,) [1/m]
+        With which a tail goes on behind the pattern, in steps as long as those of `arc_length`; after them it is
+        straight.
     deviation : float [m]
         Greatest distance of a raw point from the pattern.
     lead_in : float [m]
@@ -121,7 +128,7 @@ class Pattern:
             raw = _checked(validation.function(function, "function")(share), "the values of function")
         else:
             raw = _drawn(image, scale)
-        start = _start_curvature(raw)
+        start = _start_curvature(raw, _REACH * float(_lengths(raw)[-1]))
         if lead_in is None:
             turns = abs(start) * _lengths(raw)[-1]
             lead_in = 2.0 / abs(start) if function is not None and turns > _BENT_START else 0.0
@@ -242,22 +249,31 @@ class Pattern:
         lengths = _lengths(self.raw)
         even = np.linspace(0.0, lengths[-1], nodes)
         sampled = np.stack([np.interp(even, lengths, self.raw[:, i]) for i in range(2)], 1)
-        moved = smooth(sampled, even[1], smoothing)
-        curve = make_interp_spline(even, moved, k=5)
-        fine = np.linspace(0.0, even[-1], 20 * nodes)
+        # What was given may be off by as much as it is smoothed.
+        reach = max(min(_REACH * even[-1], _ENOUGH * smoothing), 2.0 * even[1])
+        end = -_start_curvature(sampled[::-1], reach)
+        behind = _straight_on(sampled, end, reach)
+        ways = even[1] * np.arange(1, len(behind) + 1)
+        # As far aside as the circle of the end is, along which the bend may fade out.
+        room = smoothing + np.concatenate([np.zeros(nodes), 0.5 * abs(end) * ways**2])
+        given = np.concatenate([even, even[-1] + ways])
+        curve = make_interp_spline(given, smooth(np.concatenate([sampled, behind]), even[1], room), k=5)
+        fine = np.linspace(0.0, given[-1], 20 * len(given))
         speed = np.linalg.norm(curve(fine, 1), axis=1)
         _require_smooth(speed, fine)
         travelled = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(fine))])
-        self.arc_length = np.linspace(0.0, travelled[-1], nodes)
-        curve = make_interp_spline(self.arc_length, curve(np.interp(self.arc_length, travelled, fine)), k=5)
-        first, second, third = (curve(self.arc_length, order) for order in (1, 2, 3))
-        self.points: FloatArray = curve(self.arc_length)
-        fourth = fourth_differences(nodes) @ self.points / self.arc_length[1] ** 4  # what smoothing kept small
-        fourth[-2:] = fourth[-3]
-        self.tangent: FloatArray = first / np.linalg.norm(first, axis=1)[:, None]
-        self.curvature: FloatArray = _cross(first, second)
-        self.curvature_slope: FloatArray = _cross(first, third)
-        self.curvature_bend: FloatArray = _cross(first, fourth) + _cross(second, third)
+        spacing = np.interp(even[-1], fine, travelled) / (nodes - 1)
+        s = spacing * np.arange(int(travelled[-1] / spacing) + 1)
+        curve = make_interp_spline(s, curve(np.interp(s, travelled, fine)), k=5)
+        points, first, second, third = (curve(s, order) for order in range(4))
+        fourth = fourth_differences(len(s)) @ points / spacing**4  # what smoothing kept small
+        curvature = _cross(first, second)
+        self.arc_length, self.points = s[:nodes], points[:nodes]
+        self.tangent: FloatArray = (first / np.linalg.norm(first, axis=1)[:, None])[:nodes]
+        self.curvature: FloatArray = curvature[:nodes]
+        self.curvature_slope: FloatArray = _cross(first, third)[:nodes]
+        self.curvature_bend: FloatArray = (_cross(first, fourth) + _cross(second, third))[:nodes]
+        self.curvature_behind: FloatArray = curvature[nodes:]
         self.deviation = float(distances(self.raw, self.points).max())
         if self.deviation > _MUCH_FARTHER * smoothing:
             away, asked = 1e3 * self.deviation, 1e3 * smoothing
@@ -270,7 +286,7 @@ class Pattern:
 
     def to_dict(self) -> dict[str, Any]:
         """All its numbers as lists, for JSON. SI units."""
-        columns = {name: getattr(self, name).tolist() for name in ("raw", *_COLUMNS)}
+        columns = {name: getattr(self, name).tolist() for name in ("raw", "curvature_behind", *_COLUMNS)}
         return {**columns, "deviation": self.deviation, "lead_in": self.lead_in}
 
     @classmethod
@@ -290,6 +306,8 @@ class Pattern:
             raise ValueError("arc_length must grow from 0")
         for name, shape in _COLUMNS.items():
             setattr(pattern, name, validation.number_array(content[name], name, (count, *shape)))
+        behind = content.get("curvature_behind", [0.0])  # as in files from before that was kept
+        pattern.curvature_behind = validation.number_array(behind, "curvature_behind", ("n",))
         pattern.deviation = validation.non_negative(content["deviation"], "deviation")
         pattern.lead_in = validation.non_negative(content["lead_in"], "lead_in")
         return pattern
@@ -411,26 +429,42 @@ def _drawn(image: Any, scale: float | None) -> FloatArray:
     return np.asarray(size * longest * [1.0, -1.0])
 
 
-def _start_curvature(points: FloatArray) -> float:
-    """Of the circle through the beginning, a tenth of the way and the point between them."""
-    lengths = _lengths(points)
-    a, b, c = (
-        np.array([np.interp(share * lengths[-1], lengths, points[:, i]) for i in range(2)])
-        for share in (0.0, 0.02, 0.04)
-    )
+def _start_curvature(points: FloatArray, reach: float) -> float:
+    """Of the circle through the beginning, the place so far along the curve, and that twice as far."""
+    a, b, c = (_along(points, way) for way in (0.0, reach, 2.0 * reach))
     area = (b - a)[0] * (c - a)[1] - (b - a)[1] * (c - a)[0]
     sides = np.linalg.norm(b - a) * np.linalg.norm(c - b) * np.linalg.norm(c - a)
     return float(2.0 * area / sides) if sides > 0.0 else 0.0
+
+
+def _straight_on(points: FloatArray, curvature: float, reach: float) -> FloatArray:
+    """Points behind the last one, along its direction as far as twice the radius of the end, spaced as the last two."""
+    lengths = _lengths(points)
+    length, spacing = float(lengths[-1]), float(lengths[-1] - lengths[-2])
+    heading = _start_heading(points[::-1], -curvature, reach) + np.pi
+    far = 2.0 / max(abs(curvature), 1e-300)
+    count = int(np.ceil(np.clip(far, _LEAST_BEHIND * length, _MOST_BEHIND * length) / spacing))
+    ways = spacing * np.arange(1, count + 1)
+    return np.asarray(points[-1] + ways[:, None] * [np.cos(heading), np.sin(heading)])
+
+
+def _start_heading(points: FloatArray, curvature: float, reach: float) -> float:
+    """Direction of a curve at its beginning, from a chord of the circle there."""
+    chord = _along(points, reach) - points[0]
+    return float(np.arctan2(chord[1], chord[0]) - 0.5 * curvature * reach)
+
+
+def _along(points: FloatArray, way: float) -> FloatArray:
+    """The point so far along a polyline."""
+    lengths = _lengths(points)
+    return np.array([np.interp(way, lengths, points[:, i]) for i in range(2)])
 
 
 def _lead_in(points: FloatArray, curvature: float, length: float) -> FloatArray:
     """Points before the first one: curvature falls smoothly to zero, backwards from there."""
     count = 200
     back = np.linspace(0.0, 1.0, count + 1)
-    lengths = _lengths(points)
-    ahead = np.array([np.interp(min(2e-2 * lengths[-1], lengths[-1]), lengths, points[:, i]) for i in range(2)])
-    chord = ahead - points[0]
-    heading = np.arctan2(chord[1], chord[0]) - 0.5 * curvature * 2e-2 * lengths[-1]
+    heading = _start_heading(points, curvature, _REACH * float(_lengths(points)[-1]))
     # Curvature (1 - 3 u^2 + 2 u^3) of its value, u from 0 at the beginning of the pattern to 1 where it is straight.
     angle = heading - curvature * length * (back - back**3 + 0.5 * back**4)
     middle = 0.5 * (angle[1:] + angle[:-1])

@@ -90,17 +90,18 @@ def _minimised(norm: _Norm, x: FloatArray, extra: Any) -> FloatArray:
     return x
 
 
-def smooth(points: FloatArray, spacing: float, deviation: float) -> FloatArray:
-    """Move points, evenly spaced along a curve, by at most `deviation` so that the floor must hold least.
+def smooth(points: FloatArray, spacing: float, deviation: FloatArray) -> FloatArray:
+    """Move points, evenly spaced along a curve, each by at most its `deviation`, so that the floor must hold least.
 
-    Without tension, what a floor must give an elastic rod per length is EI x'''', with x'' = x''' = 0 at the free end.
+    Without tension, what a floor must give an elastic rod per length is EI x'''', with x'' = x''' = 0 at both ends.
     Its greatest size is a convex function of the points: an 8-norm of it is minimised with a logarithmic barrier at
     `deviation`.
 
     Parameters
     ----------
     points : ndarray of shape (n, 2) [m]
-    spacing, deviation : float [m]
+    spacing : float [m]
+    deviation : ndarray of shape (n,) [m]
 
     Returns
     -------
@@ -113,7 +114,7 @@ def smooth(points: FloatArray, spacing: float, deviation: float) -> FloatArray:
     raw = points.T.ravel()
 
     def barrier(x: FloatArray) -> tuple[float, FloatArray, Any]:
-        away = ((x - raw) / deviation).reshape(2, -1)
+        away = (x - raw).reshape(2, -1) / deviation
         room = 1.0 - (away**2).sum(0)
         if not np.all(room > 0.0):
             return np.inf, away.ravel(), sparse.identity(len(x))
@@ -156,8 +157,7 @@ def least_tension(middle: FloatArray, across: FloatArray, along: FloatArray, spa
 def fourth_differences(count: int) -> Any:
     """Fourth differences at every point.
 
-    Before the first one the curve goes on straight, a free end; at the last two nothing is asked, for there the rod
-    goes on.
+    Before the first one and behind the last the curve goes on straight, as at a free end.
     """
     from scipy import sparse
 
@@ -165,28 +165,28 @@ def fourth_differences(count: int) -> Any:
     # x(-1) = 2 x0 - x1, x(-2) = 3 x0 - 2 x1.
     matrix[0, :3] = [6 - 8 + 3, -4 + 4 - 2, 1]
     matrix[1, :4] = [-4 + 2, 6 - 1, -4, 1]
-    matrix[count - 2 :] = 0.0
+    matrix[count - 2 :] = matrix[:2][::-1, ::-1]
     return matrix.tocsr()
 
 
-def _quadratic(both: Any, raw: FloatArray, deviation: float) -> FloatArray:
+def _quadratic(both: Any, raw: FloatArray, deviation: FloatArray) -> FloatArray:
     """Least squares of what the floor gives, weighed against those of the distance so that the greatest is .9."""
     from scipy import sparse
 
-    unit = sparse.identity(len(raw))
+    near = np.tile((deviation.min() / deviation) ** 2, 2)
 
     def solved(log_weight: float) -> FloatArray:
-        return _solved(np.exp(0.5 * log_weight) * both, unit, raw)
+        return _solved(np.exp(0.5 * log_weight) * both, sparse.diags(near), near * raw)
 
     def farthest(x: FloatArray) -> float:
-        return float(np.linalg.norm((x - raw).reshape(2, -1), axis=0).max())
+        return float((np.linalg.norm((x - raw).reshape(2, -1), axis=0) / deviation).max())
 
     low, high = np.log(1e-30), np.log(1e-4)
-    if farthest(solved(high)) <= 0.9 * deviation:
+    if farthest(solved(high)) <= 0.9:
         return solved(high)
     for _ in range(20):
         middle = 0.5 * (low + high)
-        if farthest(solved(middle)) > 0.9 * deviation:
+        if farthest(solved(middle)) > 0.9:
             high = middle
         else:
             low = middle
