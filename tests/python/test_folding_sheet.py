@@ -243,3 +243,26 @@ def test_a_sheet_four_times_as_large_slides_four_times_as_far():
         slides.append(sheet.fold(planned, progress=False).slide / scale)
         assert abs(slides[-1]) == pytest.approx(np.abs(planned.slide).max() / scale, rel=0.02)
     assert slides[1] == pytest.approx(slides[0], rel=0.005)
+
+
+def test_a_sheet_that_slips_in_the_jaw_says_so():
+    """A mat of 24 N asks for more than a jaw's 10 N; one that presses harder folds it as planned."""
+    mat = Paper(1.189, 0.841, 0.15, friction=0.6, thickness=3e-3)
+    planned = plan(mat, progress=False)
+    weak = SimulatedSheet(mat, **COARSE)
+    with pytest.warns(UserWarning, match=r"the sheet slipped by \d+\.\d mm in the jaw, .* force_limit"):
+        found = weak.fold(planned, progress=False)
+    assert found.failure is None
+    assert found.slip > 0.02
+    strong = SimulatedSheet(mat, jaw=Jaw(force_limit=1e3), **COARSE).fold(planned, progress=False)
+    assert strong.slip == 0.0
+    assert abs(strong.error) < 0.1 * abs(found.error)
+
+
+@pytest.mark.parametrize(("expected", "ends"), [(700.0, True), (1.0, False)])
+def test_slow_motions_are_carried_out_to_their_end_or_said_not_to_be(a4, expected, ends):
+    sheet = SimulatedSheet(a4, edges=20, time_step=1.0, record_every=np.inf)
+    motion = still([(0, 0, 0), (0, 0, 0)], np.array([0.0, 700.0]))
+    found = sheet.carry_out([motion], 0.1485, duration=expected, progress=False)
+    assert found.failure == (None if ends else "not over after 600 s")
+    assert sheet.simulation.time == pytest.approx(700.5 if ends else 600.0, abs=1.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 
 import numpy as np
@@ -18,7 +19,8 @@ FRAMES = 0.05  # between those of a record [s]
 _SETTLING = 0.5  # after the last motion [s]
 _SNAP = 10.0  # times as fast as the jaw has lately been is no folding any more,
 _FAST = 0.2  # where it is faster than this [m/s]
-_LONGEST = 600.0  # [s]
+_LONGEST = 600.0  # [s], or twice what is expected
+_SLIPS = 1e-3  # in the jaw, from which on it is said [m]
 
 
 class Watch:
@@ -29,14 +31,19 @@ class Watch:
     max_speed : float [m/s]
     max_curvature : float [1/m]
         Greatest so far.
+    slip : float [m]
+        By how much the sheet has slipped in the jaw, where most.
     failure : str or None
         Why it is no fold.
+    over : bool
+        Whether it ended.
     """
 
     def __init__(self, jaw: JawMotion, rods: Sequence[Rod]) -> None:
         self._jaw, self._rods = jaw, rods
         self._end: float | None = None
-        self.max_speed = self.max_curvature = 0.0
+        self.max_speed = self.max_curvature = self.slip = 0.0
+        self.over = False
         self.failure: str | None = None
 
     def __call__(self, simulation: Simulation) -> bool:
@@ -49,22 +56,31 @@ class Watch:
             self.failure = f"snapped at {simulation.time:.2f} s"
         if self._end is None and simulation.time > self._jaw.end - 1e-9 and not self._jaw.go_on():
             self._end = self._jaw.end + _SETTLING
-        return self.failure is not None or (self._end is not None and simulation.time > self._end - 1e-9)
+        self.over = self.failure is not None or (self._end is not None and simulation.time > self._end - 1e-9)
+        return self.over
 
 
 def carried(
     simulation: Simulation,
     jaw: JawMotion,
     rods: Sequence[Rod],
+    hands: Sequence[str],
     duration: float,
     progress: bool,
     record_every: float = FRAMES,
 ) -> Watch:
     """Run until the jaw has done its motions and the sheet has settled, or until it snaps.
 
-    `duration` [s] is what a progress bar expects of the motions, `record_every` [s] as that of `Simulation.run`.
+    `hands` are the parts of the jaw, `duration` [s] is what a progress bar expects of the motions, `record_every` [s]
+    as that of `Simulation.run`.
+
+    Warns
+    -----
+    UserWarning
+        The sheet slipped in the jaw.
     """
     watch = Watch(jaw, rods)
+    longest = max(_LONGEST, 2.0 * duration)
     with progress_bar(duration + _SETTLING, "folding", progress) as bar:
 
         def ended(simulation: Simulation) -> bool:
@@ -75,7 +91,17 @@ def carried(
             return jaw.longest_step(simulation.time, simulation.time_step)
 
         try:
-            simulation.run(_LONGEST, record_every, progress=False, until=ended, longest_step=longest_step)
+            simulation.run(longest, record_every, progress=False, until=ended, longest_step=longest_step)
         except ConvergenceError as error:
             watch.failure = f"no solution: {error}"
+    if not watch.over and watch.failure is None:
+        watch.failure = f"not over after {simulation.time:.0f} s"
+    watch.slip = max(float(np.linalg.norm(simulation.deflection(hand).slip)) for hand in hands)
+    if watch.slip > _SLIPS:
+        warnings.warn(
+            f"the sheet slipped by {1e3 * watch.slip:.1f} mm in the jaw, which presses on it too little: a greater "
+            "force_limit of the Jaw holds it",
+            UserWarning,
+            stacklevel=4,
+        )
     return watch

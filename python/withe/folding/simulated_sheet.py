@@ -57,12 +57,14 @@ class Fold:
     max_speed : float [m/s]
         Greatest of any part of the sheet.
     failure : str or None
-        Why it is no fold: the sheet snapped, or its equations had no solution. The other numbers are those of that
-        moment.
+        Why it is no fold: the sheet snapped, its equations had no solution, or motions went on for twice as long as
+        expected. The other numbers are those of that moment.
     record : Record
         Of rod "sheet", from the lifted edge on, over obstacle "table".
     seen_slides : tuple of float [m]
         What a camera saw of the slide on the way; NaN where it did not see the far edge.
+    slip : float [m]
+        By how much the sheet has slipped in the jaw, beyond its force limit.
     """
 
     error: float
@@ -73,6 +75,7 @@ class Fold:
     failure: str | None
     record: Record
     seen_slides: tuple[float, ...] = ()
+    slip: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -317,7 +320,7 @@ class SimulatedSheet:
         self._motion = motion
         lead(self.simulation.hand("jaw"), self._flat, motion, self.jaw.depth)
         return self._result(
-            target, carried(self.simulation, motion, [self.rod], duration, progress, self._record_every)
+            target, carried(self.simulation, motion, [self.rod], ["jaw"], duration, progress, self._record_every)
         )
 
     def _result(self, target: float, watch: Watch) -> Fold:
@@ -331,6 +334,7 @@ class SimulatedSheet:
             max_speed=watch.max_speed,
             failure=watch.failure,
             record=self.simulation.record,
+            slip=watch.slip,
         )
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
-from withe.folding.carrying import carried
+from withe.folding.carrying import Watch, carried
 from withe.folding.jaw import Jaw
 from withe.folding.jaw_motion import JawMotion, Motion, lead
 from withe.folding.noise import Drawn, Noise
@@ -58,6 +58,8 @@ class WideFold:
         Of rods "strip 0" and "strip 1".
     seen_slides : tuple of float [m]
         What a camera saw of the slide on the way, of the middle of the far edge; NaN where it did not see it.
+    slip : float [m]
+        By how much the sheet has slipped in the jaw, beyond its force limit, where most.
     """
 
     error: float
@@ -67,6 +69,7 @@ class WideFold:
     failure: str | None
     record: Record
     seen_slides: tuple[float, ...] = ()
+    slip: float = 0.0
 
 
 class WideSheet:
@@ -262,7 +265,8 @@ class WideSheet:
         for strip, y in zip(self.strips, self._sides, strict=True):
             hand = simulation.hand(f"jaw on {strip.name}")
             lead(hand, hand.pose.rotation, jaw, self.jaw.depth, float(y))
-        return self._result(target, carried(simulation, jaw, self.strips, duration, progress).failure)
+        hands = [f"jaw on {strip.name}" for strip in self.strips]
+        return self._result(target, carried(simulation, jaw, self.strips, hands, duration, progress))
 
     def picture(self, camera: Camera, size: tuple[int, int] = (640, 480)) -> npt.NDArray[np.uint8]:
         """Take a picture of the sheet as it lies now, as `SimulatedSheet.picture`; it is straight across.
@@ -286,10 +290,11 @@ class WideSheet:
         middle, across = 0.5 * (first + second), second - first  # strips are in the middles of their halves
         return table_picture([middle - across, middle + across], camera, size, self._grain)
 
-    def _result(self, target: float, failure: str | None) -> WideFold:
+    def _result(self, target: float, watch: Watch) -> WideFold:
         ends = [self.simulation.positions(strip)[[0, -1], 0] for strip in self.strips]
         slides = np.array([far - self.paper.length for _, far in ends])
         errors = 0.5 * (np.array([edge for edge, _ in ends]) - slides - target)
         spin = np.arctan2(errors[0] - errors[1], self._sides[1] - self._sides[0])
         error = float(errors.mean())
-        return WideFold(error, 0.5 * target + error, slides, float(spin), failure, self.simulation.record)
+        record = self.simulation.record
+        return WideFold(error, 0.5 * target + error, slides, float(spin), watch.failure, record, slip=watch.slip)
