@@ -267,6 +267,23 @@ def test_what_a_fit_leaves_beyond_sigma_is_named_and_what_chance_leaves_is_not()
     assert fit(simulation, Tags(points, names(places)), ARM, progress=False).reasons == {}
 
 
+@pytest.mark.parametrize("sigma", [5e-4, None])
+def test_targets_beside_the_plane_of_a_scene_are_said_to_be_and_unknowns_are_no_less_observable(sigma):
+    """As if the camera's axes were shifted along the normal: the fit is the same, and says what is wrong."""
+    simulation, places = arm(), range(5, 31, 5)
+    points = drawn(simulation, [(0.0, 1.0)], places)
+    points += np.random.default_rng(4).normal(0.0, 5e-4, points.shape)
+    right, beside = (
+        fit(simulation, Tags(points + (0.0, off, 0.0), names(places), sigma=sigma), ARM, progress=False)
+        for off in (0.0, 0.03)
+    )
+    np.testing.assert_allclose(beside.values, right.values, rtol=1e-9)
+    np.testing.assert_allclose(beside.covariance, right.covariance, rtol=1e-6)
+    assert beside.unobservable == right.unobservable
+    assert right.reasons == {}
+    assert "targets lie beside the plane of the scene by" in beside.reasons[0]
+
+
 def test_a_tag_that_jumps_in_one_frame_is_named():
     simulation = arm()
     places = range(5, 31, 5)

@@ -18,6 +18,7 @@ __all__ = ["gather"]
 FloatArray = npt.NDArray[np.float64]
 
 _MISFIT = 3.0  # times sigma: residuals beyond it, root of the mean square, are too great for it ...
+_BESIDE = 10.0  # times sigma, and what is left within the plane of a scene: targets do not belong to it
 _CHANCE = 1e-6  # ... if normal errors are as great with a probability below this
 _RESOLVED = 1e-6  # of the extent of all tags: what fits resolve, and usual errors are at least
 
@@ -50,7 +51,11 @@ def gather(
     told = {f: _told(targets, f, residuals, stills.simulation._session.world.plane_normal) for f in with_data}
     covariance *= _variance(stills, targets, list(told.values())) * slopes[:, :, None] * slopes[:, None]
     reasons = {f: "nothing was seen" for f in range(frames) if f not in solutions}
-    reasons |= _misfits(stills, targets, told) | {f: s.reason for f, s in solutions.items() if s.reason}
+    reasons |= (
+        _misfits(stills, targets, told)
+        | _off_plane(targets, told)
+        | {f: s.reason for f, s in solutions.items() if s.reason}
+    )
     outliers, unchecked = _outliers(stills, targets, residuals, with_data)
     return Fit(
         names=stills.names,
@@ -61,7 +66,7 @@ def gather(
         iterations=np.array([solutions[f].iterations if f in solutions else 0 for f in range(frames)]),
         converged=np.array([f in solutions and solutions[f].converged for f in range(frames)]),
         reasons=reasons,
-        unobservable=_unobservable(stills, residuals, own, common),
+        unobservable=_unobservable(stills, residuals, told, own, common),
         outliers=outliers,
         unchecked=unchecked,
         _unknowns=tuple(stills.unknowns),
@@ -70,10 +75,20 @@ def gather(
 
 
 class _Told(NamedTuple):
-    """What the targets tell in one fit: how many numbers, and the sum of the squares that it leaves of them."""
+    """What the targets tell in one fit: how many numbers, and the sum of the squares that it leaves of them.
+
+    And the same of what lies across the plane of a planar scene, of which no fit leaves less.
+    """
 
     numbers: int
     squares: float
+    numbers_across: int = 0
+    squares_across: float = 0.0
+
+    @property
+    def beside(self) -> float:
+        """Root of the mean square across the plane."""
+        return float(np.sqrt(self.squares_across / max(self.numbers_across, 1)))
 
 
 def _told(targets: list[Target], fitted: int, residuals: FloatArray, normal: FloatArray | None) -> _Told:
@@ -84,12 +99,14 @@ def _told(targets: list[Target], fitted: int, residuals: FloatArray, normal: Flo
     numbers = sum(target.told(frame) for target in targets for frame in seen_in)
     rows = residuals[fitted].reshape(len(seen_in), -1)
     inside = np.nan_to_num(rows)
-    if normal is not None:
-        across = block_diag(*(target.across(normal) for target in targets))
-        seen = np.isfinite(rows) @ across**2 > 1.0 - 1e-9
-        numbers -= int(seen.sum())
-        inside = inside - np.where(seen, inside @ across, 0.0) @ across.T
-    return _Told(numbers, float(np.sum(inside**2)))
+    if normal is None:
+        return _Told(numbers, float(np.sum(inside**2)))
+    across = block_diag(*(target.across(normal) for target in targets))
+    seen = np.isfinite(rows) @ across**2 > 1.0 - 1e-9
+    beside = np.where(seen, inside @ across, 0.0)
+    inside = inside - beside @ across.T
+    lost = int(seen.sum())
+    return _Told(numbers - lost, float(np.sum(inside**2)), lost, float(np.sum(beside**2)))
 
 
 def _misfits(stills: Coordinates, targets: list[Target], told: dict[int, _Told]) -> dict[int, str]:
@@ -106,6 +123,20 @@ def _misfits(stills: Coordinates, targets: list[Target], told: dict[int, _Told])
                 f"residuals are {np.sqrt(each.squares / free):.2g} times sigma, too much for chance: a local minimum "
                 "(try another first guess or method), outliers, a model that is not that of the targets, or too small "
                 "a sigma"
+            )
+    return found
+
+
+def _off_plane(targets: list[Target], told: dict[int, _Told]) -> dict[int, str]:
+    """Frames whose targets lie beside the plane of the scene by much more than what a fit leaves within it."""
+    known = all(target.sigma is not None for target in targets)
+    found = {}
+    for frame, each in told.items():
+        within = max(float(known), float(np.sqrt(each.squares / max(each.numbers, 1))))
+        if each.beside > _BESIDE * within:
+            found[frame] = (
+                f"targets lie beside the plane of the scene by {each.beside:.2g} {'times sigma' if known else 'm'}, "
+                "which no fit in it follows: give them in the axes of the scene, or build(planar=False)"
             )
     return found
 
@@ -162,14 +193,21 @@ def _spreads(
 
 
 def _unobservable(
-    stills: Coordinates, residuals: FloatArray, own: dict[int, Spectrum], common: Spectrum | None
+    stills: Coordinates,
+    residuals: FloatArray,
+    told: dict[int, _Told],
+    own: dict[int, Spectrum],
+    common: Spectrum | None,
 ) -> tuple[Unobservable, ...]:
     """Combinations of shared unknowns, and of the frames' own, that move targets by less than the misfit."""
     counts = np.isfinite(residuals).sum(axis=1)
+    for frame, each in told.items():
+        counts[frame] -= each.numbers_across
     rows = int(counts.sum())
     if rows == 0:
         return ()
-    misfit = float(np.sqrt(np.nansum(residuals**2) / rows))
+    within = np.nansum(residuals**2) - sum(each.squares_across for each in told.values())
+    misfit = float(np.sqrt(max(within, 0.0) / rows))
     local = stills.per_frame
     found = []
     if common is not None:

@@ -131,7 +131,8 @@ class Fit:
     _coordinates: FloatArray
 
     def __repr__(self) -> str:
-        left = np.sqrt(np.nanmean(self.rms**2))
+        seen = np.isfinite(self.rms)
+        left = np.sqrt(np.mean(self.rms[seen] ** 2)) if seen.any() else np.nan
         return "\n  ".join(
             [
                 f"Fit({self.converged.sum()} of {len(self.values)} frames converged, RMS of the residuals {left:.3g})",
