@@ -13,6 +13,16 @@ Vector3 in_space(const Model& model, const Vec3d& v, bool is_point) {
   return v.x * p.first + v.y * p.second + (is_point ? p.origin : Vector3(Vector3::Zero()));
 }
 
+/// Whether a node of one edge is where one of the other is, to rounding.
+bool nodes_meet(const Model& model, const VectorX& q, int a, int b) {
+  const int first[2] = {model.edge_tail[at(a)], model.edge_head[at(a)]},
+            second[2] = {model.edge_tail[at(b)], model.edge_head[at(b)]};
+  for (int i : first)
+    for (int j : second)
+      if ((node_position(model, q, i) - node_position(model, q, j)).norm() <= 1e-9 * model.length_scale) return true;
+  return false;
+}
+
 }  // namespace
 
 ContactTable World::contacts() const {
@@ -69,13 +79,14 @@ void World::Implementation::check_overlap() const {
   };
   const std::string other = deepest->key.b < 0 ? "'" + description.contact.obstacles[at(-1 - deepest->key.b)].name + "'"
                                                : name(deepest->key.b);
+  const bool meet = deepest->key.b >= 0 && nodes_meet(model, state.q, deepest->key.a, deepest->key.b);
   const std::string advice =
       description.contact.overlap == Overlap::separate
           ? std::string(" m at the start and cannot be moved apart") +
                 (model.planar() && deepest->key.b >= 0 ? " within their plane: build with planar=False, " : ": ") +
                 "draw them apart, or leave the pair out with ignore_contact"
-          : " m at the start: draw them apart, leave the pair out with ignore_contact, or take "
-            "enable_contact(overlap='separate')";
+          : std::string(" m at the start: ") + (meet ? "join the nodes that meet there, " : "") +
+                "draw them apart, leave the pair out with ignore_contact, or take enable_contact(overlap='separate')";
   require(false, name(deepest->key.a) + " and " + other + " overlap by " + text(0.0 - deepest->gap) + advice);
 }
 

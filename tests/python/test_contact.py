@@ -206,6 +206,13 @@ def overlapping(scene: withe.Scene) -> None:
     scene.build()
 
 
+def not_joined(scene: withe.Scene) -> None:
+    scene.add_rod(start=(-0.1, 0, 0), end=(0, 0, 0), nodes=5, radius=5e-3, material=RUBBER, name="a")
+    scene.add_rod(start=(0, 0, 0), end=(0.1, 0, 0), nodes=5, radius=5e-3, material=RUBBER, name="b")
+    scene.enable_contact()
+    scene.build()
+
+
 def buried(scene: withe.Scene) -> None:
     scene.add_rod(start=(-0.1, 0, 0), end=(0.1, 0, 0), nodes=5, radius=5e-3, material=RUBBER, name="a")
     scene.add_floor(name="table")
@@ -256,6 +263,8 @@ REFUSED: list[tuple[Callable[[withe.Scene], Any], str]] = [
     (lambda scene: scene.enable_contact(friction_model="sticky"), "friction_model"),
     (lambda scene: scene.set_friction("nobody", "noone", 0.1), "what touches 'nobody' is not in the scene"),
     (overlapping, "edge . of rod 'a' and edge . of rod 'b' overlap by 0.003"),
+    (overlapping, "at the start: draw them apart, leave the pair out"),
+    (not_joined, "at the start: join the nodes that meet there, draw them apart, leave the pair out"),
     (buried, "edge . of rod 'a' and 'table' overlap by 0.005"),
     (floor_through_a_clamp, "edge 0 of rod 'a' and 'table' overlap by 0.005 m at the start and cannot be moved apart"),
     (crossing_in_a_plane, "cannot be moved apart within their plane"),

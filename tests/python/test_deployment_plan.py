@@ -261,6 +261,10 @@ def loop(count=300):
         (lambda: plan(Cable(1.5, 0.015, 0.1), Pattern(wave(0.2))), "no floor holds this cable .*: no grasp found"),
         (lambda: plan(Cable(1.5, 0.04, 0.09), Pattern(wave(0.2)), "intuitive"), "tighter than the cable's own of 40"),
         (lambda: plan(CABLE, wave()), "pattern must be a withe.deployment.Pattern, got ndarray"),
+        (
+            lambda: plan(Cable(1.2, 1.6e-3, 0.01), Pattern(arc_of(0.1))),
+            "stretch by an eighth .* is 6.2 times its radius",
+        ),
         (lambda: plan(2, Pattern(wave())), "cable must be a withe.deployment.Cable, got int"),
     ],
 )
@@ -288,6 +292,12 @@ def test_lines_of_what_a_pattern_needs_are_drawn_whole():
     needs = eight.plot(0.4).axes[1]
     floor = next(line for line in needs.lines if line.get_label() == "floor").get_ydata()
     assert 2.0 < floor.max() < needs.get_ylim()[1]
+
+
+def arc_of(radius):
+    """Three quarters of a circle."""
+    angle = np.linspace(0.0, 1.5 * np.pi, 300)
+    return radius * np.stack([np.sin(angle), 1.0 - np.cos(angle)], 1)
 
 
 def nearly_a_circle(turns, radius):

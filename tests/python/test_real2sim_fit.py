@@ -274,7 +274,7 @@ def test_targets_beside_the_plane_of_a_scene_are_said_to_be_and_unknowns_are_no_
     points = drawn(simulation, [(0.0, 1.0)], places)
     points += np.random.default_rng(4).normal(0.0, 5e-4, points.shape)
     right, beside = (
-        fit(simulation, Tags(points + (0.0, off, 0.0), names(places), sigma=sigma), ARM, progress=False)
+        fit(simulation, Tags(points + np.array((0.0, off, 0.0)), names(places), sigma=sigma), ARM, progress=False)
         for off in (0.0, 0.03)
     )
     np.testing.assert_allclose(beside.values, right.values, rtol=1e-9)

@@ -44,6 +44,7 @@ EXAMPLES = {
     "press_sheet.py": (["--edges", "75"], r"presses with ([.\d]+) N for each mm", 1.95, 2.0),
     "pull_rope.py": (["--step", "1e-2"], r"([.\d]+) cm of the rope are through the eye", 75.0, 90.0),
     "robot.py": (["--steps", "2"], r"walked ([-.\d]+) cm", 4.0, 10.0),
+    "servo_arm.py": ([], r"by ([.\d]+) mm where it is shaped", 0.0, 1.0),
     "snake.py": (["--periods", "3"], r"Crawls at ([.\d]+) mm/s", 27.8, 28.7),
     "soft_limb.py": ([], r"tip ([.\d]+) mm off on the mean", 0.3, 0.7),
     "tapered_arm.py": ([], r"tapered: clearance off by ([.\d]+) mm", 0.0, 1.0),

@@ -12,6 +12,7 @@ from withe.batch.lanes import Lanes
 from withe.batch.reading import Reading
 from withe.batch.setting import Setting
 from withe.common import validation
+from withe.common.attributes import known_attributes
 from withe.common.keywords import keyword_hints
 from withe.errors import ConvergenceError
 from withe.simulation.functions import force_function, step_callback
@@ -28,6 +29,7 @@ _MAX_STEPS = 2**31 - 1
 
 
 @keyword_hints
+@known_attributes("set changes what acts, such as set(gravity=[(0, 0, -1.6)])")
 class Batch(Setting, Reading):
     """Many simulations of one shape, stepped in one call over threads, and read out into one array.
 

@@ -11,7 +11,16 @@ import numpy.typing as npt
 from withe.common import validation
 from withe.deployment.cable import JAW, Cable
 from withe.deployment.grasp_network import shipped
-from withe.deployment.grasping import Grasp, carrying, grasp, least_friction, needed_friction, table, thickened
+from withe.deployment.grasping import (
+    Grasp,
+    carrying,
+    grasp,
+    least_friction,
+    least_stiffness,
+    needed_friction,
+    table,
+    thickened,
+)
 from withe.deployment.smoothing import least_tension
 from withe.errors import ConvergenceError
 
@@ -204,6 +213,12 @@ def grasps_along(pattern: Laid, cable: Cable, controller: str) -> Grasp:
             f"the cable is {suspended.max():.0f} of its gravito-bending lengths long, those of up to"
             f" {table().longest:g} are laid down: hold it nearer to its free end, or is {lgb:g} m in metres?"
         )
+    if np.any(cable.stretch_stiffness < least_stiffness(suspended)):
+        raise ValueError(
+            f"the cable would stretch by an eighth under its own weight: {lgb * suspended.max():.2g} m of it hang, and"
+            f" its gravito-bending length, {lgb:g} m, is {lgb / cable.radius:.2g} times its radius. Hold it nearer to"
+            " its free end, or are both in metres?"
+        )
     curvature = -lgb * pattern.curvature  # grasps bend to the right
     thick = cable.radius / lgb
     if controller == "network":
@@ -229,7 +244,7 @@ def require_bendable(pattern: Laid, cable: Cable) -> tuple[float, float]:
     if tightest * cable.radius >= 1.0:
         raise ValueError(
             f"the pattern bends to a radius of {1e3 / tightest:.2g} mm at {at:.0f} mm, tighter than the cable's own of"
-            f" {1e3 * cable.radius:.2g} mm"
+            f" {1e3 * cable.radius:.2g} mm: draw it wider, or, if it is noise, give the Pattern a greater smoothing="
         )
     return tightest, at
 

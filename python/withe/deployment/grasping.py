@@ -140,9 +140,14 @@ def grasp(
     return _described(solver.grasps(questions, TWIST_STIFFNESS), questions, length.shape)
 
 
+def least_stiffness(suspended: FloatArray) -> FloatArray:
+    """The stretch stiffness with which what hangs stretches by an eighth under its own weight."""
+    return np.maximum(100.0, 4.0 * suspended)
+
+
 def require_stiff(suspended: FloatArray, stretch: FloatArray) -> None:
     """Refuse rods that would stretch by an eighth under their own weight."""
-    if not np.all(stretch >= np.maximum(100.0, 4.0 * suspended)):
+    if not np.all(stretch >= least_stiffness(suspended)):
         raise ValueError(
             f"stretch_stiffness must be at least 100 and 4 times suspended, got {stretch.min():g}: such a rod"
             " would stretch by an eighth under its own weight"

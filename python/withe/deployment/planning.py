@@ -273,7 +273,7 @@ def plan(
     >>> wave = withe.deployment.Pattern(np.stack([x, 0.03 * np.sin(4 * np.pi * x)], 1))
     >>> motion = withe.deployment.plan(withe.deployment.Cable.dlo(2), wave)
     >>> print([phase.name for phase in motion.phases], f"{motion.needed_friction.max():.1f}")
-    ['hang', 'touch down', 'lay'] 0.2
+    ['hang', 'touch down', 'lay'] 0.1
     """
     validation.choice(controller, "controller", get_args(PlanController))
     speed = validation.positive(speed, "speed")

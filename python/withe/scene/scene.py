@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from withe.batch import Batch
 from withe.common import validation
+from withe.common.attributes import known_attributes
 from withe.common.keywords import keyword_hints
 from withe.parts.applied_loads import AppliedLoads, Bearer
 from withe.parts.directory import Directory
@@ -30,6 +31,7 @@ FloatArray = npt.NDArray[np.float64]
 
 
 @keyword_hints
+@known_attributes("its methods describe it, such as set_friction, and what steps are made of is for build")
 class Scene(AppliedLoads, Loads, Contacts, Supports):
     """A description of rods, joints, supports and loads, from which simulations are built.
 

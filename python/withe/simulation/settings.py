@@ -41,6 +41,8 @@ class Settings:
         all other friction.
     loads : dict of str to LoadPart
         Those put on while running, in order.
+    ramps : dict of (str, str or None) to float [s]
+        When what is reached after a while was last asked for: by method and part.
     """
 
     rods: list[RodParameters]
@@ -54,6 +56,7 @@ class Settings:
     friction_fields: dict[int, tuple[int, str, Coefficients]] = field(default_factory=dict)
     frictions: dict[tuple[str, ...], Coefficients] = field(default_factory=dict)
     loads: dict[str, LoadPart] = field(default_factory=dict)
+    ramps: dict[tuple[str, str | None], float] = field(default_factory=dict)
 
     def copy(self) -> Settings:
         """Settings that no longer change with these. What they hold is never changed in place."""
@@ -69,4 +72,5 @@ class Settings:
             dict(self.friction_fields),
             dict(self.frictions),
             dict(self.loads),
+            dict(self.ramps),
         )

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.attributes import known_attributes
 from withe.common.keywords import keyword_hints
 from withe.common.progress import progress as progress_bar
 from withe.parts.applied_loads import AppliedLoads
@@ -44,6 +45,9 @@ _MAX_STEPS = 2**31 - 1
 
 
 @keyword_hints
+@known_attributes(
+    "set changes what acts, such as set(gravity=(0, 0, -1.6)), and Scene.build takes what steps are made of"
+)
 class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
     """A scene while it runs. Made by `Scene.build`.
 
@@ -140,6 +144,9 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
         turn: float = 0.1,
     ) -> Equilibrium | EquilibriumPath:
         """Find the static equilibrium that the present state leads to, and go there. Time stands still.
+
+        So what was told to be reached after a while (`over`) stays where it is now; a warning says so where it has not
+        begun.
 
         Supports that were moved go to their places, natural shapes that were set grow from those that the state last
         moved with (from the drawn shape at first), and loads that were changed come in, along the branch of equilibria

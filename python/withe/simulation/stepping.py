@@ -80,6 +80,14 @@ class Stepping:
     def equilibrium(self) -> Equilibrium:
         """Go to the equilibrium that the present state leads to."""
         world = self.session.world
+        begun = [name for (_, name), time in self.session.settings.ramps.items() if time == world.time]
+        if begun:
+            warnings.warn(
+                f"what {begun[0]!r} was told to reach after a while (over=) has not begun, and time stands still in "
+                "equilibrium(): without over= it is reached at once, or step() or run() first",
+                UserWarning,
+                stacklevel=4,
+            )
         apply_functions(self.session, world.time, world.time)
         with self._convergence():
             found = world.equilibrium(None, force_function(self.session))

@@ -1,0 +1,49 @@
+"""Objects to which nothing new can be assigned: a misspelt name would act on nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from difflib import get_close_matches
+from typing import Any, TypeVar
+
+__all__ = ["known_attributes"]
+
+T = TypeVar("T", bound=type)
+
+
+def known_attributes(instead: str) -> Callable[[T], T]:
+    """Let a class refuse public attributes that it does not define.
+
+    Parameters
+    ----------
+    instead : str
+        What to do, where no name of the class is near.
+
+    Returns
+    -------
+    callable
+        Of the class, which it returns.
+
+    Examples
+    --------
+    >>> @known_attributes("build makes another")
+    ... class Model:
+    ...     pass
+    >>> Model().gravity = 9.81
+    Traceback (most recent call last):
+        ...
+    AttributeError: Model has no attribute 'gravity' to assign: build makes another
+    """
+
+    def refusing(known: T) -> T:
+        def assign(self: Any, name: str, value: Any) -> None:
+            if not name.startswith("_") and not hasattr(known, name):
+                near = get_close_matches(name, [word for word in dir(known) if not word.startswith("_")], 1)
+                meant = f"did you mean {near[0]}?" if near else instead
+                raise AttributeError(f"{known.__name__} has no attribute {name!r} to assign: {meant}")
+            object.__setattr__(self, name, value)
+
+        known.__setattr__ = assign  # type: ignore[assignment, method-assign]
+        return known
+
+    return refusing

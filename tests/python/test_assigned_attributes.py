@@ -1,0 +1,69 @@
+"""What is assigned to a scene or a simulation acts, or is refused."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+import withe
+
+
+def arm():
+    scene = withe.Scene()
+    rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+    rod = scene.add_rod(start=(0, 0, 0), end=(0.3, 0, 0), nodes=11, radius=5e-3, material=rubber, name="arm")
+    scene.clamp(rod.start, name="wall")
+    return scene
+
+
+@pytest.mark.parametrize(
+    ("make", "name", "message"),
+    [
+        (arm, "gravty", "Scene has no attribute 'gravty' to assign: did you mean gravity?"),
+        (arm, "integrator", "Scene has no attribute 'integrator' to assign: .* is for build"),
+        (lambda: arm().build(), "gravity", "Simulation has no attribute 'gravity' to assign: set changes what acts"),
+        (lambda: arm().build(), "tolerance", "Simulation has no attribute 'tolerance' to assign: .* Scene.build takes"),
+        (lambda: arm().build_batch(2), "gravity", "Batch has no attribute 'gravity' to assign: set changes"),
+    ],
+)
+def test_what_would_act_on_nothing_is_refused(make, name, message):
+    thing = make()
+    with pytest.raises(AttributeError, match=message):
+        setattr(thing, name, (0, 0, 0))
+    assert not hasattr(thing, name)
+
+
+def test_gravity_of_a_scene_is_assigned():
+    scene = arm()
+    scene.gravity = (0, 0, -1.6)
+    assert scene.build().get("gravity")[2] == -1.6
+
+
+@pytest.mark.parametrize("integrator", ["static", "implicit_midpoint"])
+def test_an_equilibrium_of_what_has_not_begun_says_so(integrator):
+    simulation = arm().build(integrator=integrator)
+    simulation.set_natural_curvature("arm", (0, 3.0), over=1.0)
+    with pytest.warns(UserWarning, match="what 'arm' was told to reach after a while .* time stands still"):
+        simulation.equilibrium()
+    simulation.set_natural_curvature("arm", (0, 3.0))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        simulation.equilibrium()
+    simulation.move("wall", position=(0, 0, 0.1), over=0.5)
+    with pytest.warns(UserWarning, match="what 'wall' was told"):
+        simulation.equilibrium()
+    simulation.step(3)  # a ramp on its way is a state like any other
+    simulation.equilibrium()
+    assert 0.0 < simulation.positions("arm")[0, 2] < 0.1
+
+
+def test_a_ramp_that_was_restored_away_is_forgotten():
+    simulation = arm().build()
+    drawn = simulation.snapshot()
+    simulation.move("wall", position=(0, 0, 0.1), over=0.5)
+    simulation.restore(drawn)
+    simulation.equilibrium()
+    simulation.move("wall", position=(0, 0, 0.1), over=0.5)
+    simulation.reset()
+    simulation.equilibrium()
+    np.testing.assert_allclose(simulation.positions("arm")[0], (0, 0, 0))
