@@ -124,6 +124,12 @@ void World::Implementation::check_resolution() {
   if (std::string found = unresolved(); !found.empty()) mesh_warning = std::move(found);
 }
 
+void Warnings::add(const Warnings& other) {
+  for (std::string Warnings::* each :
+       {&Warnings::mesh, &Warnings::steps, &Warnings::impact, &Warnings::branch, &Warnings::plane})
+    if ((this->*each).empty()) this->*each = other.*each;
+}
+
 Warnings World::take_warnings() {
   const auto take = [](std::optional<std::string>& warning) { return warning ? std::exchange(*warning, {}) : ""; };
   Implementation& self = *implementation_;

@@ -82,6 +82,9 @@ struct Warnings {
   std::string impact;  ///< they are too long for one
   std::string branch;  ///< a static step has left it
   std::string plane;   ///< an equilibrium in it is not stable against motions out of it
+
+  /// Takes what is not said yet from others.
+  void add(const Warnings& other);
 };
 
 struct EquilibriumResult {

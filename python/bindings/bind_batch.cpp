@@ -61,17 +61,10 @@ class GuardedBatch {
   }
 
   /// What has not been heard yet of any lane.
-  std::tuple<std::string, std::string, std::string, std::string, std::string> take_warnings() {
+  Warnings take_warnings() {
     Warnings out;
-    for (GuardedWorld* world : worlds_) {
-      Warnings found = world->changing().take_warnings();
-      if (out.mesh.empty()) out.mesh = std::move(found.mesh);
-      if (out.steps.empty()) out.steps = std::move(found.steps);
-      if (out.impact.empty()) out.impact = std::move(found.impact);
-      if (out.branch.empty()) out.branch = std::move(found.branch);
-      if (out.plane.empty()) out.plane = std::move(found.plane);
-    }
-    return {out.mesh, out.steps, out.impact, out.branch, out.plane};
+    for (GuardedWorld* world : worlds_) out.add(world->changing().take_warnings());
+    return out;
   }
 
   /// Released since it was last asked: lane, support, when [s].

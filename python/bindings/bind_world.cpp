@@ -105,6 +105,12 @@ void register_results(py::module_& module) {
       .def_readwrite("twists", &RodState::twists)
       .def_readwrite("velocities", &RodState::velocities)
       .def_readwrite("spins", &RodState::spins);
+  py::class_<Warnings>(module, "Warnings", "What is wrong with how a scene is run; empty where nothing is.")
+      .def_readonly("mesh", &Warnings::mesh)
+      .def_readonly("steps", &Warnings::steps)
+      .def_readonly("impact", &Warnings::impact)
+      .def_readonly("branch", &Warnings::branch)
+      .def_readonly("plane", &Warnings::plane);
   py::class_<Linearisation>(module, "Linearisation", "Equations linearised about the present configuration.")
       .def_property_readonly("geometric", [](const Linearisation& self) { return self.geometric; })
       .def_property_readonly("gradients", [](const Linearisation& self) { return self.gradients; })
@@ -446,10 +452,7 @@ void define_readouts(WorldClass& world) {
       "joint_torque", [](const GuardedWorld& self, int joint) { return self.reading().joint_torque(joint); },
       py::arg("joint"));
   world.def("spins", [](const GuardedWorld& self, int rod) { return self.reading().spins(rod); }, py::arg("rod"));
-  world.def("take_warnings", [](GuardedWorld& self) {
-    const Warnings found = self.changing().take_warnings();
-    return std::make_tuple(found.mesh, found.steps, found.impact, found.branch, found.plane);
-  });
+  world.def("take_warnings", [](GuardedWorld& self) { return self.changing().take_warnings(); });
   world.def("energy", [](const GuardedWorld& self) { return self.reading().energy(); });
   world.def(
       "rod_energy", [](const GuardedWorld& self, int rod) { return self.reading().rod_energy(rod); }, py::arg("rod"));

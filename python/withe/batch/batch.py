@@ -153,7 +153,7 @@ class Batch(Setting, Reading):
         finally:
             self._lanes.note_failures()
             left = self._left_rings(int(number) for number in functions)
-            pass_on((each._session for each in self._lanes.simulations), *self._lanes.engine.take_warnings())
+            pass_on([each._session for each in self._lanes.simulations], self._lanes.engine.take_warnings())
             if left:
                 lane, name, time = left[0]
                 more = f", and {len(left) - 1} more" if len(left) > 1 else ""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -183,7 +183,7 @@ class Stepping:
         finally:
             forget_left_rings(self.session, world.take_left_rings())
             left, self.session.left_rings = self.session.left_rings, []
-            pass_on([self.session], *world.take_warnings())
+            pass_on([self.session], world.take_warnings())
             if left:
                 rings = " and ".join(f"ring {name!r} (time {time:.6g} s)" for name, time in left)
                 report_left(f"{rings}: released")
@@ -196,17 +196,17 @@ def convergence_error(session: Session, numbers: tuple[Any, ...]) -> Convergence
     return ConvergenceError(message, time, step, name, node if node >= 0 else None, residual)
 
 
-def pass_on(sessions: Iterable[Session], mesh: str, steps: str, impact: str, branch: str, plane: str) -> None:
+def pass_on(sessions: Sequence[Session], found: _core.Warnings) -> None:
     """Give warnings of the engine where there are any: of meshes, steps for motion and impacts, branches and planes."""
-    if mesh:
-        warnings.warn(mesh, CoarseMeshWarning, stacklevel=_levels_to_user())
-    for coarse in (steps, impact):
+    if found.mesh:
+        warnings.warn(found.mesh, CoarseMeshWarning, stacklevel=_levels_to_user())
+    for coarse in (found.steps, found.impact):
         if coarse and any(session.options.time_step > session.longest_meant for session in sessions):
             warnings.warn(coarse, CoarseStepWarning, stacklevel=_levels_to_user())
-    if branch:
-        warnings.warn(branch, BranchChangedWarning, stacklevel=_levels_to_user())
-    if plane:
-        warnings.warn(plane, OutOfPlaneWarning, stacklevel=_levels_to_user())
+    if found.branch:
+        warnings.warn(found.branch, BranchChangedWarning, stacklevel=_levels_to_user())
+    if found.plane:
+        warnings.warn(found.plane, OutOfPlaneWarning, stacklevel=_levels_to_user())
 
 
 def report_left(what: str) -> None:
