@@ -100,6 +100,8 @@ void set_elastic(const Parameters& p, ElasticCoefficients& out) {
   out.stretch_stiffness = p.edge_stretch;
   out.bend_stiffness = p.bend_stiffness;
   out.half_stiffness = p.half_stiffness;
+  out.joint_stiffness = p.joint_stiffness;
+  out.joint_natural = p.joint_rest_angle;
   set_natural(p, out);
 }
 

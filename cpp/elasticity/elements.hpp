@@ -25,6 +25,7 @@ struct ElasticCoefficients {
   VectorX stretch_natural;                ///< natural strain [-]
   Columns3 bend_stiffness, bend_natural;  ///< [N m]; natural strains f (kappa1, kappa2, tau)
   Columns3 half_stiffness, half_natural;
+  VectorX joint_stiffness, joint_natural;  ///< per revolute joint [N m/rad], [rad]
 };
 
 /// Those of bending and twisting of one stencil.

@@ -88,18 +88,28 @@ void moment_on_frame(const Model& model, const VectorX& q, const Configuration& 
     out.gradient[0] = -value.dot(model.plane->normal);
     return;
   }
-  const Vector3 M = piece.follower ? Vector3(configuration.frame[at(piece.frame)] * value) : value;
+  const Matrix3& frame = configuration.frame[at(piece.frame)];
+  const Hinge* hinge = piece.hinge < 0 ? nullptr : &model.hinges[at(piece.hinge)];
+  Vector3 M = value;
+  if (piece.follower) M = frame * (hinge ? Vector3(rotation_exp(q(hinge->dof) * hinge->axis) * value) : value);
   const Vector3 w = q.segment<3>(model.frame_dof[at(piece.frame)]);
   const double c = 1.0 / (1.0 + 0.25 * w.squaredNorm());
   const Vector3 u = M - 0.5 * w.cross(M);
+  const Matrix3 J = cayley_spin(w);
   Matrix3 D = -0.5 * c * c * u * w.transpose() + 0.5 * c * cross_matrix(M);
-  if (piece.follower) {
-    const Matrix3 J = cayley_spin(w);
-    D -= J.transpose() * cross_matrix(M) * J;
-  }
+  if (piece.follower) D -= J.transpose() * cross_matrix(M) * J;
   for (int i = 0; i < 3; ++i) {
     out.gradient[i] = -c * u(i);
     for (int j = 0; j < 3; ++j) out.hessian[i][j] = -D(i, j);
+  }
+  if (!hinge) return;
+  const Vector3 axis = frame * hinge->axis, across = J.transpose() * axis.cross(M);
+  out.gradient[3] = -axis.dot(M);
+  for (int i = 0; i < 3; ++i) {
+    if (piece.follower)
+      out.hessian[i][3] = -across(i);
+    else
+      out.hessian[3][i] = -across(i);
   }
 }
 
@@ -169,16 +179,21 @@ std::vector<int> edges_at(const Model& model, const RodPass& pass) {
   return edges;
 }
 
-/// Custom moments: each on the joint at its node, or else shared evenly by the edges there.
+/// Custom moments: each on the joint at its node, what others turn against there, or else shared evenly by the edges.
 void add_node_moments(const Model& model, Loads& loads) {
   loads.node_moments = model.node_count;
   std::vector<std::vector<int>> edges(at(model.node_count));
   for (int e = 0; e < model.edge_count; ++e)
     for (int node : {model.edge_tail[at(e)], model.edge_head[at(e)]}) edges[at(node)].push_back(e);
   std::vector<int> frame(at(model.node_count), -1);
-  for (const FrameStencil& half : model.half)
-    if (half.hinge < 0 && frame[at(model.frame_node[at(half.frame)])] < 0)
-      frame[at(model.frame_node[at(half.frame)])] = half.frame;
+  const auto turns = [&](int of) {
+    return std::any_of(model.joint_angles.begin(), model.joint_angles.end(),
+                       [&](const JointAngle& joint) { return joint.turning == model.frame_dof[at(of)]; });
+  };
+  for (const FrameStencil& half : model.half) {
+    int& known = frame[at(model.frame_node[at(half.frame)])];
+    if (half.hinge < 0 && (known < 0 || turns(known))) known = half.frame;
+  }
   for (int node = 0; node < model.node_count; ++node) {
     if (frame[at(node)] >= 0) {
       loads.pieces.push_back({LoadShape::frame_moment, -1, 1.0, node, -1, frame[at(node)]});
@@ -225,15 +240,22 @@ Loads resolve_loads(const Model& model) {
         for (int e : edges) loads.pieces.push_back({LoadShape::follower, index, share, node, e});
         continue;
       }
-      int frame = -1;
-      for (const FrameStencil& half : model.half)
-        if (half.hinge < 0 && std::find(edges.begin(), edges.end(), half.edge) != edges.end() &&
-            model.frame_node[at(half.frame)] == node)
-          frame = half.frame;
-      if (frame >= 0) {
-        loads.pieces.push_back({LoadShape::frame_moment, index, 1.0, node, -1, frame, load.follower});
-      } else {
-        for (int e : edges) loads.pieces.push_back({LoadShape::edge_moment, index, share, node, e, -1, load.follower});
+      const auto half = std::find_if(model.half.begin(), model.half.end(), [&](const FrameStencil& of) {
+        return std::find(edges.begin(), edges.end(), of.edge) != edges.end() && model.frame_node[at(of.frame)] == node;
+      });
+      LoadPiece piece{.shape = LoadShape::frame_moment, .load = index, .weight = 1.0, .node = node};
+      piece.follower = load.follower;
+      if (half != model.half.end()) {
+        piece.frame = half->frame;
+        piece.hinge = half->hinge;
+        loads.pieces.push_back(piece);
+        continue;
+      }
+      piece.shape = LoadShape::edge_moment;
+      piece.weight = share;
+      for (int e : edges) {
+        piece.edge = e;
+        loads.pieces.push_back(piece);
       }
     }
   }
@@ -258,6 +280,7 @@ int load_dofs(const Model& model, const LoadPiece& piece, int (&dofs)[kMaxLocal]
   };
   if (piece.shape == LoadShape::dead_node || piece.shape == LoadShape::follower) add(model.node_dof[at(piece.node)], d);
   if (piece.shape == LoadShape::frame_moment) add(model.frame_dof[at(piece.frame)], model.frame_size());
+  if (piece.hinge >= 0) add(model.hinges[at(piece.hinge)].dof, 1);
   if (piece.edge >= 0 && piece.shape != LoadShape::dead_node) {
     add(model.node_dof[at(model.edge_tail[at(piece.edge)])], d);
     if (!model.planar() && piece.shape != LoadShape::edge_pressure) add(model.edge_dof[at(piece.edge)], 1);

@@ -2,8 +2,9 @@
 /// Loads that a user puts on: forces, moments, distributed loads, dead or following their edge, and pressure.
 ///
 /// A moment M does the work M . (t x dt + t dpsi) on an edge, so it is a pair of nodal forces and a torque
-/// on theta; on a frame it is J(w)^T M. In space neither has a symmetric Jacobian; in a plane both do. One that follows
-/// turns with the edge or frame that it acts on, dM = dphi x M with dphi that frame's turn.
+/// on theta; on a frame it is J(w)^T M, and on what turns about a hinge's axis a of it M . a on the hinge too. In space
+/// neither has a symmetric Jacobian; in a plane both do. One that follows turns with the edge or frame that it acts on,
+/// dM = dphi x M with dphi that frame's turn.
 ///
 /// A pressure p n pushes an edge e by p n x e, half of it on either node: per present length p, normal to the edge and
 /// to n. Along a closed rod that is minus the gradient of p times the area that it goes round about n, so that the
@@ -23,6 +24,7 @@ struct LoadPiece {
   int node = -1;
   int edge = -1;  ///< that carries a follower or takes a moment
   int frame = -1;
+  int hinge = -1;         ///< in space: of the frame, that what a moment acts on turns about
   bool follower = false;  ///< of a moment: whether it turns with its edge or frame
   bool along = false;     ///< of a load along a rod: whether its weight is a part of the edge's length
 };

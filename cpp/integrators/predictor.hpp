@@ -34,6 +34,8 @@ class Predictor {
     for (VectorX& a : slow_) a.resize(0);
   }
   bool empty() const { return count_ == 0; }
+  /// Mean velocity of the last step, where there is one.
+  const VectorX& latest() const { return velocity_[0]; }
   Choice choice(int slot) const {
     const Choice best = best_[static_cast<std::size_t>(slot)];
     return {best.velocities && count_ > 0, std::min(best.points, count_)};

@@ -136,10 +136,7 @@ class Builder {
   }
 
   void add_links(const JointDescription& joint, int base) {
-    if (model_.planar()) {
-      for (const RevoluteLink& link : joint.links) add_planar_link(base + link.parent, base + link.child, link.axis);
-      return;
-    }
+    if (model_.planar()) return add_planar_links(joint, base);
     if (joint.links.empty()) return;
     const int root = root_of(joint, base);
     for (const RevoluteLink& link : joint.links) {
@@ -153,13 +150,21 @@ class Builder {
     }
   }
 
-  void add_planar_link(int parent, int child, const Vector3& axis) {
-    for (int* cluster : {&parent, &child})
-      while (clusters_[at(*cluster)].merged_into >= 0) *cluster = clusters_[at(*cluster)].merged_into;
-    const double along = axis.dot(model_.plane->normal);
-    const bool turns = std::abs(along) > 0.5;
-    links_.push_back({parent, child, along < 0.0 ? -1.0 : 1.0, -1, turns});
-    if (!turns) merge(parent, child);
+  /// In a plane a hinge lies between two frames, or, about an axis in the plane, lets nothing turn: those clusters
+  /// become one first.
+  void add_planar_links(const JointDescription& joint, int base) {
+    const auto along = [&](const RevoluteLink& link) { return link.axis.normalized().dot(model_.plane->normal); };
+    const auto now = [&](int cluster) {
+      int out = base + cluster;
+      while (clusters_[at(out)].merged_into >= 0) out = clusters_[at(out)].merged_into;
+      return out;
+    };
+    for (const RevoluteLink& link : joint.links)
+      if (std::abs(along(link)) < 0.5) merge(now(link.parent), now(link.child));
+    for (const RevoluteLink& link : joint.links) {
+      const int parent = now(link.parent), child = now(link.child);
+      links_.push_back({parent, child, along(link) < 0.0 ? -1.0 : 1.0, -1, parent != child});
+    }
   }
 
   /// The cluster that all others at a node turn against in space; of two that which is clamped, else the first.
@@ -180,6 +185,9 @@ class Builder {
                                 name(first.parent) + " and " + name(first.child) +
                                 " are joined, join each of the rods to one of them");
   }
+
+  /// What a cluster on a hinge turns against.
+  int root_of(const Cluster& turning) const { return hinge_parent_[at(turning.hinge)]; }
 
   bool is_clamped(int cluster) const {
     const auto in_cluster = [&](const RodPass& pass) {
@@ -253,9 +261,10 @@ class Builder {
       if (holds_frame(support.kind)) {
         Cluster& cluster = cluster_at(support.pass);
         if (cluster.hinge >= 0)
-          throw std::invalid_argument("a clamp must hold the fixed side of a revolute joint, not rod '" +
-                                      rod(support.pass.rod).name +
-                                      "', which turns: join it first, join(clamped, other, 'revolute', axis=...)");
+          throw std::invalid_argument("a clamp must hold what hinges at its node turn against, not rod '" +
+                                      rod(support.pass.rod).name + "', which turns: clamp rod '" +
+                                      rod(clusters_[at(root_of(cluster))].passes.front().rod).name +
+                                      "' there, or hold=\"edge\"");
         frame_of(cluster);
         if (support.gripped && cluster.passes.size() == 1) gripped_frames_.insert(cluster.frame);
       }

@@ -41,8 +41,8 @@ Dual<4> torque_with_slopes(const StepProblem& problem, const StepData& data, con
 
 }  // namespace
 
-JointTorque joint_torque(const Parameters& p, int joint) {
-  return {p.joint_stiffness[joint], p.joint_rest_angle[joint], p.joint_damping[joint], p.joint_moment[joint]};
+JointTorque joint_torque(const Parameters& p, const ElasticCoefficients& elastic, int joint) {
+  return {elastic.joint_stiffness[joint], elastic.joint_natural[joint], p.joint_damping[joint], p.joint_moment[joint]};
 }
 
 JointForces::JointForces(const Model& model) {
@@ -64,7 +64,7 @@ void JointForces::add(const StepProblem& problem, StepData& data, const Assemble
   Local local;
   for (int j = 0; j < table_.count(); ++j) {
     const JointAngle& joint = problem.model.joint_angles[at(j)];
-    const JointTorque torque = joint_torque(*problem.parameters, j);
+    const JointTorque torque = joint_torque(*problem.parameters, problem.elastic, j);
     if (!joint.turns() || !torque.acts()) continue;
     const Dual<4> T = torque_with_slopes(problem, data, torque, joint);
     for (int i = 0; i < 2; ++i) {
@@ -90,7 +90,7 @@ void JointForces::add_adjoint(const StepProblem& problem, const StepData& data, 
     if (!joint.turns()) continue;
     gather(table_, j, adjoint.rows, rows);
     const double apart = -joint.sign * (rows[0] - rows[1]);
-    const JointTorque torque = joint_torque(*problem.parameters, j);
+    const JointTorque torque = joint_torque(*problem.parameters, problem.elastic, j);
     const auto by = [&](const JointTorque& unit) { return apart * torque_now(problem, data, unit, joint); };
     CoefficientAdjoint& out = adjoint.coefficients;
     out.joint_stiffness[j] += by({.stiffness = 1.0, .rest_angle = torque.rest_angle});
@@ -107,7 +107,7 @@ void JointForces::add_rounding(const StepProblem& problem, StepData& data) const
   const double rate = problem.moves() ? 1.0 / problem.interval : 0.0;
   for (int j = 0; j < table_.count(); ++j) {
     const JointAngle& joint = problem.model.joint_angles[at(j)];
-    const JointTorque torque = joint_torque(*problem.parameters, j);
+    const JointTorque torque = joint_torque(*problem.parameters, problem.elastic, j);
     if (!joint.turns() || !torque.acts()) continue;
     const double greatest = std::abs(unknown(data.z, joint.turning)) + std::abs(unknown(data.z, joint.against));
     const double bound =
@@ -126,7 +126,7 @@ void JointForces::add_gains(const StepProblem& problem, StepData& /*data*/, cons
     if (!joint.turns()) continue;
     const double turned = joint.angle(end) - joint.angle(problem.start->q);
     gains.energy[problem.model.component_of_node(joint.node)] -=
-        0.5 * problem.parameters->joint_stiffness[j] * turned * turned;
+        0.5 * problem.elastic.joint_stiffness[j] * turned * turned;
   }
 }
 
@@ -154,16 +154,14 @@ void JointForces::add_applied(const StepProblem& problem, const StepData& data, 
   }
 }
 
-double joint_energy(const Model& model, const VectorX& stiffness, const VectorX& rest_angle, const VectorX& q) {
+double joint_energy(const Model& model, const ElasticCoefficients& elastic, const VectorX& q) {
   double energy = 0.0;
-  for (int j = 0; j < static_cast<int>(stiffness.size()); ++j)
-    energy += joint_energy(model, stiffness, rest_angle, q, j);
+  for (int j = 0; j < static_cast<int>(model.joint_angles.size()); ++j) energy += joint_energy(model, elastic, q, j);
   return energy;
 }
 
-double joint_energy(const Model& model, const VectorX& stiffness, const VectorX& rest_angle, const VectorX& q,
-                    int joint) {
-  const JointTorque torque{.stiffness = stiffness[joint], .rest_angle = rest_angle[joint]};
+double joint_energy(const Model& model, const ElasticCoefficients& elastic, const VectorX& q, int joint) {
+  const JointTorque torque{.stiffness = elastic.joint_stiffness[joint], .rest_angle = elastic.joint_natural[joint]};
   return torque.energy(model.joint_angles[at(joint)].angle(q));
 }
 

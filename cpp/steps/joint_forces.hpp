@@ -28,12 +28,11 @@ class JointForces final : public Term {
   ElementTable table_;
 };
 
-/// What drives a joint and resists it, as parameters say.
-JointTorque joint_torque(const Parameters& parameters, int joint);
+/// What drives a joint and resists it.
+JointTorque joint_torque(const Parameters& parameters, const ElasticCoefficients& elastic, int joint);
 /// What the stiffness of all joints stores at a configuration [J].
-double joint_energy(const Model& model, const VectorX& stiffness, const VectorX& rest_angle, const VectorX& q);
+double joint_energy(const Model& model, const ElasticCoefficients& elastic, const VectorX& q);
 /// Of one.
-double joint_energy(const Model& model, const VectorX& stiffness, const VectorX& rest_angle, const VectorX& q,
-                    int joint);
+double joint_energy(const Model& model, const ElasticCoefficients& elastic, const VectorX& q, int joint);
 
 }  // namespace withe

@@ -16,14 +16,21 @@ void add_drawn(const StepProblem& problem, const LoadPiece& piece, const Vector3
   if (follows && piece.edge >= 0) out.edge_turn.row(piece.edge) += by.cross(value).transpose();
 }
 
-/// By how a joint's frame F is turned beyond its unknowns, of the rows -J(w)^T F M of a moment M that follows it.
+/// By how a joint's frame F is turned beyond its unknowns, of the rows -J(w)^T F M of a moment M that follows it, or of
+/// the row -(F a) . M of one that does not, on what turns about the axis a of a hinge.
 void add_frame_turn(const StepProblem& problem, const StepData& data, const LoadPiece& piece, const double* rows,
                     StepAdjoint& adjoint) {
+  const Matrix3& frame = data.configuration.frame[at(piece.frame)];
+  const Hinge* hinge = piece.hinge < 0 ? nullptr : &problem.model.hinges[at(piece.hinge)];
+  const Vector3 value = piece.weight * problem.parameters->loads.row(piece.load);
+  if (!piece.follower) {
+    adjoint.middle_spin.row(piece.frame) -= rows[3] * (frame * hinge->axis).cross(value).transpose();
+    return;
+  }
   const Vector3 w = data.z.segment<3>(problem.model.frame_dof[at(piece.frame)]),
-                value = piece.weight * problem.parameters->loads.row(piece.load),
-                moment = data.configuration.frame[at(piece.frame)] * value,
+                own = hinge ? Vector3(rotation_exp(data.z(hinge->dof) * hinge->axis) * value) : value,
                 spin = cayley_spin(w) * Eigen::Map<const Vector3>(rows);
-  adjoint.middle_spin.row(piece.frame) -= moment.cross(spin).transpose();
+  adjoint.middle_spin.row(piece.frame) -= (frame * own).cross(spin).transpose();
 }
 
 }  // namespace
@@ -76,7 +83,8 @@ void LoadForces::add_adjoint(const StepProblem& problem, const StepData& data, c
     }
     adjoint.coefficients.loads.row(piece.load) += by.transpose();
     add_drawn(problem, piece, by, adjoint.coefficients);
-    if (piece.shape == LoadShape::frame_moment && piece.follower && !problem.model.planar() && problem.moves())
+    if (piece.shape == LoadShape::frame_moment && (piece.follower || piece.hinge >= 0) && !problem.model.planar() &&
+        problem.moves())
       add_frame_turn(problem, data, piece, rows, adjoint);
   }
 }

@@ -38,6 +38,15 @@ StrainParts::StrainParts(const Equations& system, const State& state, const Conf
     half_gradients(model, state.q, k.measure, configuration, h, strains);
     add_rows(assembler.half, h, strains, k.half_stiffness, without_.half_stiffness, without_.half_natural);
   }
+  for (int j = 0; j < static_cast<int>(model.joint_angles.size()); ++j) {
+    const JointAngle& joint = model.joint_angles[at(j)];
+    if (!joint.turns() || k.joint_stiffness(j) == 0.0) continue;
+    const auto row = static_cast<int>(stiffnesses_.size());
+    gradients_.emplace_back(row, joint.turning, 1.0);
+    if (joint.against >= 0) gradients_.emplace_back(row, joint.against, -1.0);
+    stiffnesses_.push_back(k.joint_stiffness(j));
+    take_away(joint.angle(state.q), without_.joint_stiffness(j), without_.joint_natural(j));
+  }
 }
 
 void StrainParts::add_row(const ElementTable& table, int element, const double* gradient, double stiffness) {

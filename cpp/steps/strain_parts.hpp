@@ -10,8 +10,8 @@
 
 namespace withe {
 
-/// Splits the stiffness into sum k g g^T over the strains of all stencils, g their gradients, and what is left where
-/// their stiffnesses are taken away but their forces are kept.
+/// Splits the stiffness into sum k g g^T over the strains of all stencils and the angles of all joints, g their
+/// gradients, and what is left where their stiffnesses are taken away but their forces are kept.
 class StrainParts {
  public:
   StrainParts(const Equations& system, const State& state, const Configuration& configuration);

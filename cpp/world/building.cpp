@@ -7,20 +7,38 @@
 #include "common/text.hpp"
 #include "geometry/rotation.hpp"
 #include "model/edge_vectors.hpp"
+#include "steps/joint_forces.hpp"
 #include "world/implementation.hpp"
 
 namespace withe {
 namespace {
 
-/// Frames are the same when the same end of an edge is attached to both, and not through a hinge: a node may have
-/// several.
-bool same_frame(const Model& a, int frame_a, const Model& b, int frame_b) {
-  for (const FrameStencil& s : a.half) {
-    if (s.frame != frame_a || s.hinge >= 0) continue;
-    for (const FrameStencil& t : b.half)
-      if (t.frame == frame_b && t.hinge < 0 && t.edge == s.edge && t.frame_first == s.frame_first) return true;
+/// The half stencil of another model of the same scene at the end of an edge that is attached to a frame, not through a
+/// hinge; a node may have several frames. -1 where there is none.
+Eigen::Index known_half(const Model& model, int frame, const Model& other) {
+  for (const FrameStencil& half : model.half) {
+    if (half.frame != frame || half.hinge >= 0) continue;
+    if (const Eigen::Index known = same_stencil(other, half); known >= 0) return known;
   }
-  return false;
+  return -1;
+}
+
+/// How what a half stencil attaches has turned since it was drawn.
+Matrix3 attached_rotation(const Model& model, const State& state, const FrameStencil& half) {
+  const Matrix3 frame = frame_rotation(model, state, half.frame);
+  if (half.hinge < 0) return frame;
+  const Hinge& hinge = model.hinges[at(half.hinge)];
+  return frame * rotation_exp(state.q(hinge.dof) * hinge.axis);
+}
+
+/// With which angular velocity it turns [rad/s].
+Vector3 attached_spin(const Model& model, const State& state, const FrameStencil& half) {
+  const int dof = model.frame_dof[at(half.frame)];
+  if (model.planar()) return state.v(dof) * model.plane->normal;
+  const Vector3 spin = state.v.segment<3>(dof);
+  if (half.hinge < 0) return spin;
+  const Hinge& hinge = model.hinges[at(half.hinge)];
+  return spin + state.v(hinge.dof) * (frame_rotation(model, state, half.frame) * hinge.axis);
 }
 
 /// An angle, but for whole turns, that is near another one.
@@ -48,14 +66,6 @@ Eigen::Index same_stencil(const Model& model, const FrameStencil& stencil) {
 Matrix3 frame_rotation(const Model& model, const State& state, int frame) {
   if (model.planar()) return rotation_exp(state.q(model.frame_dof[at(frame)]) * model.plane->normal);
   return cayley(state.q.segment<3>(model.frame_dof[at(frame)])) * state.frame[at(frame)];
-}
-
-Vector3 angular_velocity(const Model& model, const State& state, const Configuration& c, int edge) {
-  const Vector3 t = edge_directors(model, c, edge).col(2);
-  const Vector3 along =
-      node_vector(model, state.v, model.edge_head[at(edge)]) - node_vector(model, state.v, model.edge_tail[at(edge)]);
-  const double spin = model.planar() ? 0.0 : state.v(model.edge_dof[at(edge)]);
-  return t.cross(along) / c.length(edge) + spin * t;
 }
 
 World::Implementation::Implementation(SceneDescription scene, Options choice)
@@ -185,9 +195,7 @@ void World::Implementation::carry_over(const Model& old, Rebuild why) {
   std::vector<std::vector<int>> held_before;
   for (const Support& s : old.supports) held_before.push_back(s.nodes);
   std::vector<bool> is_new(at(model.frame_count), true);
-  for (int f = 0; f < model.frame_count; ++f)
-    for (int g = 0; g < old.frame_count; ++g)
-      if (same_frame(model, f, old, g)) is_new[at(f)] = false;
+  for (int f = 0; f < model.frame_count; ++f) is_new[at(f)] = known_half(model, f, old) < 0;
   state = transferred(old, from);
   // A motion that is prescribed in the course of a step may leave the plane: the step still returns to its start.
   if (why == Rebuild::running && kept.state.q.size() == old.dof_count) {
@@ -302,18 +310,19 @@ State World::Implementation::transferred(const Model& old, const State& from) co
       copy(old.edge_dof[at(e)], model.edge_dof[at(e)], 1);
     }
   }
-  for (int f = 0; f < model.frame_count; ++f)
-    for (int g = 0; g < old.frame_count; ++g) {
-      if (!same_frame(model, f, old, g)) continue;
-      const int dof = model.frame_dof[at(f)];
-      if (lifted) {
-        to.frame[at(f)] = frame_rotation(old, from, g);
-        to.v.segment<3>(dof) = from.v(old.frame_dof[at(g)]) * old.plane->normal;
-      } else {
-        to.frame[at(f)] = from.frame[at(g)];
-        copy(old.frame_dof[at(g)], dof, model.frame_size());
-      }
+  for (int f = 0; f < model.frame_count; ++f) {
+    const Eigen::Index known = known_half(model, f, old);
+    if (known < 0) continue;
+    const FrameStencil& half = old.half[static_cast<std::size_t>(known)];
+    const int dof = model.frame_dof[at(f)];
+    if (lifted || half.hinge >= 0) {
+      to.frame[at(f)] = attached_rotation(old, from, half);
+      to.v.segment<3>(dof) = attached_spin(old, from, half);
+    } else {
+      to.frame[at(f)] = from.frame[at(half.frame)];
+      copy(old.frame_dof[at(half.frame)], dof, model.frame_size());
     }
+  }
   for (std::size_t j = 0; !model.planar() && j < model.joint_angles.size(); ++j) {
     const JointAngle &before = old.joint_angles[j], &now = model.joint_angles[j];
     to.q[now.turning] = now.sign * before.angle(from.q);
@@ -373,6 +382,21 @@ void World::Implementation::relax_frame(int f, const Matrix3& free) {
   for (std::size_t h = 0; h < model.hinges.size(); ++h)
     if (model.hinges[h].frame == f) hinges.push_back(static_cast<int>(h));
   const int size = n + static_cast<int>(hinges.size());
+  const auto place_of = [&](int unknown) {  // among those of the frame and its hinges; -1: it is none of them
+    if (unknown >= dof && unknown < dof + n) return unknown - dof;
+    for (int h = n; h < size; ++h)
+      if (model.hinges[at(hinges[at(h - n)])].dof == unknown) return h;
+    return -1;
+  };
+  const auto add_joint = [&](const JointAngle& joint, const JointTorque& torque, VectorX& g, Eigen::MatrixXd& H) {
+    const double pull = joint.sign * torque_of(torque, joint.angle(state.q), 0.0);
+    for (const auto& [unknown, way] : {std::pair(joint.turning, -1.0), std::pair(joint.against, 1.0)}) {
+      const int i = unknown < 0 ? -1 : place_of(unknown);
+      if (i < 0) continue;
+      g(i) += way * pull;
+      H(i, i) += torque.stiffness;
+    }
+  };
   Eigen::MatrixXd project = Eigen::MatrixXd::Identity(size, size);
   project.topLeftCorner(n, n) = free.topLeftCorner(n, n);
   for (int k = 0; k < 20; ++k) {
@@ -390,6 +414,8 @@ void World::Implementation::relax_frame(int f, const Matrix3& free) {
         for (int j = 0; j < count; ++j) H(place(i), place(j)) += local.hessian[row + i][row + j];
       }
     }
+    for (int j = 0; j < static_cast<int>(model.joint_angles.size()); ++j)
+      add_joint(model.joint_angles[at(j)], withe::joint_torque(parameters, elastic, j), g, H);
     const double scale = std::max(H.diagonal().cwiseAbs().maxCoeff(), 1e-300);
     H = project * H * project + scale * (Eigen::MatrixXd::Identity(size, size) - project);
     const VectorX step = project * H.ldlt().solve(-project * g);

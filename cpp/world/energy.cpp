@@ -61,8 +61,7 @@ Energy mechanical_energy(const Model& model, const EnergyCoefficients& k, const 
   e.twist = turned.twist;
   e.gravity = gravity_energy(model, k, state.q, [](int) { return 1.0; });
   e.spring = spring_energy(model, k.spring_stiffness, k.spring_rest_length, state.q) +
-             joint_energy(model, k.joint_stiffness, k.joint_rest_angle, state.q) +
-             hand_energy(model, k.elastic.measure, state, c);
+             joint_energy(model, k.elastic, state.q) + hand_energy(model, k.elastic.measure, state, c);
   return e;
 }
 
@@ -79,8 +78,6 @@ void EnergyCoefficients::set(const Model& model, const Parameters& p) {
   gravity = p.gravity;
   spring_stiffness = p.spring_stiffness;
   spring_rest_length = p.spring_rest_length;
-  joint_stiffness = p.joint_stiffness;
-  joint_rest_angle = p.joint_rest_angle;
 }
 
 /// Takes ramps on to a time at a configuration that stays, and adds what that changes of the elastic energy [J].
@@ -119,13 +116,13 @@ double World::Implementation::work_of_settings() const {
          (b.gravity - a.gravity) + (b.spring - a.spring);
 }
 
-/// Of stretching, bending and twisting, as it is [J].
+/// Of stretching, bending, twisting and joints, as it is [J].
 double World::Implementation::elastic_energy() const {
   auto& [c, now, touching, components] = energy_scratch;
   compute_configuration(model, state, state.q, c);
   now.set(model, parameters);
   const BendTwistEnergy turned = bend_twist_energy(model, now.elastic, c);
-  return stretch_energy(model, now.elastic, c) + turned.bend + turned.twist;
+  return stretch_energy(model, now.elastic, c) + turned.bend + turned.twist + joint_energy(model, now.elastic, state.q);
 }
 
 Energy World::Implementation::energy() const {
@@ -255,7 +252,7 @@ void World::Implementation::find_component_energies(const State& then, Component
         spring_energy(model, k.spring_stiffness, k.spring_rest_length, then.q, static_cast<int>(s));
   for (std::size_t j = 0; j < model.joint_angles.size(); ++j)
     out.elastic[model.component_of_node(model.joint_angles[j].node)] +=
-        joint_energy(model, k.joint_stiffness, k.joint_rest_angle, then.q, static_cast<int>(j));
+        joint_energy(model, k.elastic, then.q, static_cast<int>(j));
   // In a frame that goes with the nodes that supports hold, else with the centre of mass.
   MatrixX3& frame = out.frame;
   VectorX& nodes = out.held_nodes;

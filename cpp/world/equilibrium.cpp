@@ -20,6 +20,13 @@ constexpr const char* kSideways =
     "the equilibrium in the plane of the scene is not stable against motions out of it: in space the scene buckles or "
     "tips over sideways; build(planar=False) lets it, build(planar=True) says that something keeps it in its plane";
 
+constexpr const char* kNotInSpace =
+    "the equilibrium is stable in the plane of the scene, and was not looked at in space, where a clamp cannot hold "
+    "what "
+    "turns about one of several hinges: clamp what they turn against, or build(planar=True) says that something keeps "
+    "it "
+    "in its plane";
+
 }  // namespace
 
 Equations& World::Implementation::statics() {
@@ -244,8 +251,9 @@ bool World::Implementation::buckles_out_of_plane() {
     spatial_twin->spatial = true;
     try {
       spatial_twin->rebuild(Rebuild::running);
-    } catch (const std::invalid_argument&) {  // it exists in its plane only: a clamp holds what a hinge turns
+    } catch (const std::invalid_argument&) {  // it exists in its plane only
       spatial_twin.reset();
+      if (!plane_warning) plane_warning = kNotInSpace;
       return false;
     }
   }

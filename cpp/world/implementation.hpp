@@ -16,7 +16,6 @@ struct EnergyCoefficients {
   VectorX node_mass;                             ///< [kg]
   Vector3 gravity;                               ///< [m/s^2]
   VectorX spring_stiffness, spring_rest_length;  ///< [N/m], [m]
-  VectorX joint_stiffness, joint_rest_angle;     ///< [N m/rad], [rad]
   long version = -1, natural_version = -1;       ///< of the parameters
 
   void set(const Model& model, const Parameters& parameters);
@@ -350,7 +349,5 @@ Eigen::Index same_stencil(const Model& model, const BendStencil& stencil);
 Eigen::Index same_stencil(const Model& model, const FrameStencil& stencil);
 /// Rotation of a joint frame from the drawn axes.
 Matrix3 frame_rotation(const Model& model, const State& state, int frame);
-/// Of an edge, by its nodes and its spin [rad/s].
-Vector3 angular_velocity(const Model& model, const State& state, const Configuration& c, int edge);
 
 }  // namespace withe

@@ -1,7 +1,6 @@
 /// What a scene answers: copies, in world coordinates.
 
 #include <Eigen/Geometry>
-#include <algorithm>
 
 #include "common/check.hpp"
 #include "elasticity/stretch.hpp"
@@ -147,35 +146,19 @@ double World::joint_angle(int joint) const {
   return checked_joint(self.model, joint).angle(self.state.q);
 }
 
-/// By the edges at either side. Frames have little inertia of their own: what a step does not resolve of it, and does
-/// not damp, changes their rates from step to step.
+/// The mean of the last step, where there is one: what steps do not resolve, as of frames with little inertia of their
+/// own, changes the sign of its velocity from step to step.
 double World::joint_rate(int joint) const {
   const Implementation& self = *implementation_;
-  const Model& model = self.model;
-  const JointAngle& turning = checked_joint(model, joint);
-  if (!turning.turns()) return 0.0;
-  const auto hinge =
-      std::find_if(model.hinges.begin(), model.hinges.end(), [&](const Hinge& h) { return h.dof == turning.turning; });
-  const auto belongs = [&](const FrameStencil& half, bool turns) {
-    if (model.planar()) return model.frame_dof[at(half.frame)] == (turns ? turning.turning : turning.against);
-    return half.frame == hinge->frame && (turns ? half.hinge == hinge - model.hinges.begin() : half.hinge < 0);
-  };
-  const Configuration& c = self.configuration();
-  const auto rate = [&](bool turns) -> Vector3 {
-    Vector3 sum = Vector3::Zero();
-    int count = 0;
-    for (const FrameStencil& half : model.half)
-      if (belongs(half, turns)) sum += angular_velocity(model, self.state, c, half.edge), ++count;
-    return sum / count;
-  };
-  const Vector3 axis =
-      model.planar() ? model.plane->normal : Vector3(frame_rotation(model, self.state, hinge->frame) * hinge->axis);
-  return turning.sign * axis.dot(rate(true) - rate(false));
+  const JointAngle& turning = checked_joint(self.model, joint);
+  return turning.angle(self.predictor.empty() ? self.state.v : self.predictor.latest());
 }
 
 double World::joint_torque(int joint) const {
   const double angle = joint_angle(joint);
-  return torque_of(withe::joint_torque(implementation_->parameters, joint), angle, joint_rate(joint));
+  ElasticCoefficients elastic;
+  set_elastic(implementation_->parameters, elastic);
+  return torque_of(withe::joint_torque(implementation_->parameters, elastic, joint), angle, joint_rate(joint));
 }
 
 VectorX World::spins(int rod) const {

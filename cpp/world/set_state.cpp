@@ -269,7 +269,13 @@ void World::Implementation::set_rates(const std::vector<RodState>& rods) {
 void World::Implementation::turn_frames(const std::vector<bool>& is_told) {
   Configuration c;
   compute_configuration(model, state, state.q, c);
-  const auto rate = [&](int e) { return angular_velocity(model, state, c, e); };
+  const auto rate = [&](int e) -> Vector3 {
+    const Vector3 t = edge_directors(model, c, e).col(2);
+    const Vector3 along =
+        node_vector(model, state.v, model.edge_head[at(e)]) - node_vector(model, state.v, model.edge_tail[at(e)]);
+    const double spin = model.planar() ? 0.0 : state.v(model.edge_dof[at(e)]);
+    return t.cross(along) / c.length(e) + spin * t;
+  };
   for (int f = 0; f < model.frame_count; ++f) {
     bool told = false;
     int count = 0;

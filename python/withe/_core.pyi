@@ -52,6 +52,7 @@ __all__: list[str] = [
     "StraightRod",
     "SupportDescription",
     "Tape",
+    "Warnings",
     "World",
     "check_turns",
     "close_and_open",
@@ -777,6 +778,21 @@ class RodState:
     @velocities.setter
     def velocities(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"]) -> None: ...
 
+class Warnings:
+    """
+    What is wrong with how a scene is run; empty where nothing is.
+    """
+    @property
+    def branch(self) -> str: ...
+    @property
+    def impact(self) -> str: ...
+    @property
+    def mesh(self) -> str: ...
+    @property
+    def plane(self) -> str: ...
+    @property
+    def steps(self) -> str: ...
+
 class Linearisation:
     """
     Equations linearised about the present configuration.
@@ -1167,7 +1183,7 @@ class World:
         """
         Supports that were released since rods have left them, and when [s].
         """
-    def take_warnings(self) -> tuple[str, str, str, str, str]: ...
+    def take_warnings(self) -> Warnings: ...
     def tensions(
         self, rod: typing.SupportsInt | typing.SupportsIndex
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
@@ -1254,7 +1270,7 @@ class Batch:
         """
         Lanes and supports that were released since rods have left them, and when [s].
         """
-    def take_warnings(self) -> tuple[str, str, str, str, str]: ...
+    def take_warnings(self) -> Warnings: ...
     @property
     def workers(self) -> int: ...
 

@@ -228,6 +228,7 @@ def test_gradient_of_a_run_through_joints_that_turn_is_that_of_differences(integ
     sim, arm = drawn.simulation, drawn.arm
     put_on, about = ((0, -0.01, 0), np.array([0, 1.0, 0])) if planar else ((0.02, -0.01, 0.015), np.array([1.0, 0, 0]))
     moment = sim.add_moment(arm.node(6), put_on)
+    beside = [sim.add_moment(sim.rods[1].start, 0.3 * np.array(put_on), follower=follows) for follows in (False, True)]
     nodes = len(sim.positions())
     velocities, way = drawn.vectors(random, nodes), drawn.vectors(random, nodes)
     seen, fast = (np.stack([drawn.vectors(random, nodes) for _ in range(3)]) for _ in range(2))
@@ -244,6 +245,10 @@ def test_gradient_of_a_run_through_joints_that_turn_is_that_of_differences(integ
     cases = [
         *settings(drawn, random),
         ((moment, "moment"), about, lambda h: sim.set(moment, moment=put_on + h * about), 5e-4),
+        *(
+            ((load, "moment"), about, lambda h, m=load: sim.set(m, moment=0.3 * np.array(put_on) + h * about), 5e-4)
+            for load in beside
+        ),
         ("initial_velocities", way, lambda h: sim.set_velocities(None, 2.0 * velocities + h * way), 1e-4),
     ]
     start = sim.snapshot()

@@ -36,6 +36,7 @@ _KNOWN = 1e-7  # of a shift, what a square is known to
 _PAIR = 1e-6  # of a square, what its imaginary part is known to
 _ROUNDING = 64.0 * np.finfo(float).eps  # of the parts of a stiffness, as in the engine's `curvature_along`
 _RESIDUAL = 1e-9  # of an eigenvalue of the inverse
+_LOST = 0.01  # of its square, a direction that one orthonormalisation has left of what it was
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -200,6 +201,8 @@ class Linearisation:
         chosen = np.argsort(squares.real, kind="stable")[:count]
         squares, shapes = squares[chosen], shapes[:, chosen]
         if self._symmetric:
+            # By how much moves what has hardly any mass, orthogonal shapes have few digits, and what they push has all.
+            shapes = self._inverse(shift)(self._mass @ shapes) * (squares + shift)
             squares = self._rayleigh(shapes)
             order = np.argsort(squares, kind="stable")
             return squares[order], shapes[:, order]
@@ -296,6 +299,8 @@ class Linearisation:
         from scipy.sparse import bmat, diags
         from scipy.sparse.linalg import splu
 
+        if shift in self._last_inverse:
+            return self._last_inverse[shift]
         size = self._mass.shape[0]
         matrix = bmat(
             [
@@ -313,7 +318,14 @@ class Linearisation:
             x += factors.solve(right - matrix @ x)
             return np.asarray(x[:size])
 
+        self._last_inverse.clear()
+        self._last_inverse[shift] = solve
         return solve
+
+    @cached_property
+    def _last_inverse(self) -> dict[float, Callable[[FloatArray], FloatArray]]:
+        """What `_inverse` last answered, by its shift."""
+        return {}
 
     def _krylov(
         self, shift: float, count: int, rounds: int | None = None
@@ -368,10 +380,11 @@ class Linearisation:
         roots = np.sqrt(squares[kept])
         axes = axes[:, kept]
         first = block @ (axes / roots)
-        # Once more, since columns that nearly agree lose digits.
-        root = np.linalg.cholesky(first.T @ (self._mass @ first)).T if kept.any() else np.zeros((0, 0))
-        q = np.linalg.solve(root.T, first.T).T if kept.any() else first
-        return q, root @ (roots[:, None] * axes.T)
+        # Once more, since columns that nearly agree lose digits, and some all that they had.
+        squares, turned = np.linalg.eigh(first.T @ (self._mass @ first))
+        kept = squares > _LOST * squares.max(initial=0.0)
+        again, turned = np.sqrt(squares[kept]), turned[:, kept]
+        return first @ (turned / again), (again[:, None] * turned.T) @ (roots[:, None] * axes.T)
 
     def _full(self, shift: float) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
         """All of them: slow ones from the inverse, whose greatest eigenvalues they are, fast ones from the matrix."""

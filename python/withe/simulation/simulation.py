@@ -332,7 +332,8 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
         A record holds positions, velocities, frames and spins of rods and their time, to the last digit or nearly;
         everything else stays as it is here: supports must be where they were then, and what was set (loads, natural
         shapes, materials) and the history that contact and friction remember are not in it. Joints are
-        turned so that they stress the edges at them least, and turn as these do on the mean.
+        turned so that they stress the edges at them least, and turn as these do on the mean; of whole turns of revolute
+        ones a record knows nothing: their angles are those nearest to the present ones.
 
         Parameters
         ----------
