@@ -7,8 +7,7 @@
 namespace withe {
 namespace {
 
-/// What of a joint's torque is asked for: T [N m], and what multiplies it, by the unknowns of what turns and of what it
-/// turns against, which are those of the drawing's axes.
+/// T over the step [N m], by the unknowns of what turns and of what it turns against, at z and at the start.
 template <class Scalar>
 Scalar torque_on(const StepProblem& problem, const JointTorque& torque, const JointAngle& joint, const Scalar (&z)[2],
                  const Scalar (&start)[2]) {

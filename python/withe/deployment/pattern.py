@@ -443,7 +443,7 @@ def _straight_on(points: FloatArray, curvature: float, reach: float) -> FloatArr
     length, spacing = float(lengths[-1]), float(lengths[-1] - lengths[-2])
     heading = _start_heading(points[::-1], -curvature, reach) + np.pi
     far = 2.0 / max(abs(curvature), 1e-300)
-    count = int(np.ceil(np.clip(far, _LEAST_BEHIND * length, _MOST_BEHIND * length) / spacing))
+    count = min(int(np.ceil(np.clip(far, _LEAST_BEHIND * length, _MOST_BEHIND * length) / spacing)), len(points))
     ways = spacing * np.arange(1, count + 1)
     return np.asarray(points[-1] + ways[:, None] * [np.cos(heading), np.sin(heading)])
 
