@@ -68,6 +68,14 @@ Matrix3 frame_rotation(const Model& model, const State& state, int frame) {
   return cayley(state.q.segment<3>(model.frame_dof[at(frame)])) * state.frame[at(frame)];
 }
 
+Vector3 angular_velocity(const Model& model, const State& state, const Configuration& c, int edge) {
+  const Vector3 t = edge_directors(model, c, edge).col(2);
+  const Vector3 along =
+      node_vector(model, state.v, model.edge_head[at(edge)]) - node_vector(model, state.v, model.edge_tail[at(edge)]);
+  const double spin = model.planar() ? 0.0 : state.v(model.edge_dof[at(edge)]);
+  return t.cross(along) / c.length(edge) + spin * t;
+}
+
 World::Implementation::Implementation(SceneDescription scene, Options choice)
     : description(std::move(scene)), drawn_contact(description.contact), options(choice) {
   require(options.time_step > 0.0 && std::isfinite(options.time_step), "time_step must be positive and finite");
@@ -336,7 +344,7 @@ State World::Implementation::transferred(const Model& old, const State& from) co
 /// A new frame takes the orientation that stresses its halves least, with the edges where they are.
 void World::Implementation::relax_frames(const std::vector<bool>& is_new) {
   for (int f = 0; f < model.frame_count; ++f)
-    if (is_new[at(f)]) relax_frame(f, Matrix3::Identity());
+    if (is_new[at(f)]) relax_together({f}, {Matrix3::Identity()});
 }
 
 /// Turns a frame that nothing holds, and the hinges on it, with the edges that are attached to them.
@@ -370,60 +378,72 @@ void World::Implementation::orient_frame(int f, const Matrix3& free) {
     }
 }
 
-/// The frame and the hinges on it, with the edges where they are; the frame turns about what `free` projects onto.
-void World::Implementation::relax_frame(int f, const Matrix3& free) {
-  orient_frame(f, free);
+/// Forces on unknowns of frames and of hinges, `dofs`, of half stencils and joints, and their derivatives.
+void World::Implementation::add_frame_forces(const std::vector<int>& dofs, VectorX& g, Eigen::MatrixXd& H) const {
+  const auto place_of = [&](int dof) {
+    const auto found = std::find(dofs.begin(), dofs.end(), dof);
+    return dof < 0 || found == dofs.end() ? -1 : static_cast<int>(found - dofs.begin());
+  };
   ElasticCoefficients elastic;
   set_elastic(parameters, elastic);
-  Configuration c;
+  const Configuration& c = configuration();
   Local local;
-  const int dof = model.frame_dof[at(f)], n = model.frame_size(), row = model.planar() ? 4 : 7;
-  std::vector<int> hinges;  // each one's unknown follows those of the frame
-  for (std::size_t h = 0; h < model.hinges.size(); ++h)
-    if (model.hinges[h].frame == f) hinges.push_back(static_cast<int>(h));
-  const int size = n + static_cast<int>(hinges.size());
-  const auto place_of = [&](int unknown) {  // among those of the frame and its hinges; -1: it is none of them
-    if (unknown >= dof && unknown < dof + n) return unknown - dof;
-    for (int h = n; h < size; ++h)
-      if (model.hinges[at(hinges[at(h - n)])].dof == unknown) return h;
-    return -1;
-  };
-  const auto add_joint = [&](const JointAngle& joint, const JointTorque& torque, VectorX& g, Eigen::MatrixXd& H) {
-    const double pull = joint.sign * torque_of(torque, joint.angle(state.q), 0.0);
-    for (const auto& [unknown, way] : {std::pair(joint.turning, -1.0), std::pair(joint.against, 1.0)}) {
-      const int i = unknown < 0 ? -1 : place_of(unknown);
-      if (i < 0) continue;
-      g(i) += way * pull;
-      H(i, i) += torque.stiffness;
+  const int n = model.frame_size(), row = model.planar() ? 4 : 7;
+  for (std::size_t h = 0; h < model.half.size(); ++h) {
+    const FrameStencil& half = model.half[h];
+    int place[4] = {-1, -1, -1, -1};
+    for (int i = 0; i < n; ++i) place[i] = place_of(model.frame_dof[at(half.frame)] + i);
+    if (half.hinge >= 0) place[n] = place_of(model.hinges[at(half.hinge)].dof);
+    if (place[0] < 0) continue;
+    half_local(model, state.q, half_coefficients(elastic, static_cast<int>(h)), c, static_cast<int>(h), true, local);
+    for (int i = 0; i <= n; ++i) {
+      if (place[i] < 0) continue;
+      g(place[i]) += local.gradient[row + i];
+      for (int j = 0; j <= n; ++j)
+        if (place[j] >= 0) H(place[i], place[j]) += local.hessian[row + i][row + j];
     }
-  };
+  }
+  for (int j = 0; j < static_cast<int>(model.joint_angles.size()); ++j) {
+    const JointAngle& joint = model.joint_angles[at(j)];
+    const JointTorque torque = withe::joint_torque(parameters, elastic, j);
+    const double pull = joint.sign * torque_of(torque, joint.angle(state.q), 0.0);
+    const int turning = place_of(joint.turning), against = place_of(joint.against);
+    if (turning >= 0) g(turning) -= pull, H(turning, turning) += torque.stiffness;
+    if (against >= 0) g(against) += pull, H(against, against) += torque.stiffness;
+    if (turning < 0 || against < 0) continue;
+    H(turning, against) -= torque.stiffness;
+    H(against, turning) -= torque.stiffness;
+  }
+}
+
+/// Frames and the hinges on them, with the edges where they are; each frame turns about what its `free` projects onto.
+void World::Implementation::relax_together(const std::vector<int>& frames, const std::vector<Matrix3>& free) {
+  const int n = model.frame_size();
+  std::vector<int> dofs;
+  for (std::size_t f = 0; f < frames.size(); ++f) {
+    orient_frame(frames[f], free[f]);
+    for (int i = 0; i < n; ++i) dofs.push_back(model.frame_dof[at(frames[f])] + i);
+  }
+  for (const Hinge& hinge : model.hinges)
+    if (std::find(frames.begin(), frames.end(), hinge.frame) != frames.end()) dofs.push_back(hinge.dof);
+  const auto size = static_cast<Eigen::Index>(dofs.size());
   Eigen::MatrixXd project = Eigen::MatrixXd::Identity(size, size);
-  project.topLeftCorner(n, n) = free.topLeftCorner(n, n);
+  for (std::size_t f = 0; f < frames.size(); ++f)
+    project.block(static_cast<Eigen::Index>(f) * n, static_cast<Eigen::Index>(f) * n, n, n) =
+        free[f].topLeftCorner(n, n);
   for (int k = 0; k < 20; ++k) {
-    compute_configuration(model, state, state.q, c);
     Eigen::MatrixXd H = Eigen::MatrixXd::Zero(size, size);
     VectorX g = VectorX::Zero(size);
-    for (std::size_t h = 0; h < model.half.size(); ++h) {
-      if (model.half[h].frame != f) continue;
-      half_local(model, state.q, half_coefficients(elastic, static_cast<int>(h)), c, static_cast<int>(h), true, local);
-      const auto own = std::find(hinges.begin(), hinges.end(), model.half[h].hinge);
-      const int last = n + static_cast<int>(own - hinges.begin()), count = own == hinges.end() ? n : n + 1;
-      const auto place = [&](int i) { return i < n ? i : last; };
-      for (int i = 0; i < count; ++i) {
-        g(place(i)) += local.gradient[row + i];
-        for (int j = 0; j < count; ++j) H(place(i), place(j)) += local.hessian[row + i][row + j];
-      }
-    }
-    for (int j = 0; j < static_cast<int>(model.joint_angles.size()); ++j)
-      add_joint(model.joint_angles[at(j)], withe::joint_torque(parameters, elastic, j), g, H);
+    add_frame_forces(dofs, g, H);
     const double scale = std::max(H.diagonal().cwiseAbs().maxCoeff(), 1e-300);
     H = project * H * project + scale * (Eigen::MatrixXd::Identity(size, size) - project);
     const VectorX step = project * H.ldlt().solve(-project * g);
     if (!step.allFinite()) break;
     const VectorX taken = step * std::min(1.0, 0.5 / std::max(step.norm(), 1e-300));
-    state.q.segment(dof, n) += taken.head(n);
-    for (int h = n; h < size; ++h) state.q(model.hinges[at(hinges[at(h - n)])].dof) += taken(h);
-    if (!model.planar()) {
+    for (Eigen::Index i = 0; i < size; ++i) state.q(dofs[static_cast<std::size_t>(i)]) += taken(i);
+    for (int f : frames) {
+      if (model.planar()) continue;
+      const int dof = model.frame_dof[at(f)];
       state.frame[at(f)] = orthonormalized(cayley(state.q.segment<3>(dof)) * state.frame[at(f)]);
       state.q.segment<3>(dof).setZero();
     }

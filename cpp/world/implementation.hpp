@@ -132,7 +132,8 @@ struct World::Implementation : Running {
   State transferred(const Model& old, const State& from) const;
   void relax_frames(const std::vector<bool>& is_new);
   void orient_frame(int frame, const Matrix3& free);
-  void relax_frame(int frame, const Matrix3& free);
+  void relax_together(const std::vector<int>& frames, const std::vector<Matrix3>& free);
+  void add_frame_forces(const std::vector<int>& dofs, VectorX& g, Eigen::MatrixXd& H) const;
 
   // set_state.cpp
   bool leaves_plane(const RodState& rod) const;
@@ -349,5 +350,7 @@ Eigen::Index same_stencil(const Model& model, const BendStencil& stencil);
 Eigen::Index same_stencil(const Model& model, const FrameStencil& stencil);
 /// Rotation of a joint frame from the drawn axes.
 Matrix3 frame_rotation(const Model& model, const State& state, int frame);
+/// Of an edge, by its nodes and its spin [rad/s].
+Vector3 angular_velocity(const Model& model, const State& state, const Configuration& c, int edge);
 
 }  // namespace withe

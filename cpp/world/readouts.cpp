@@ -1,6 +1,7 @@
 /// What a scene answers: copies, in world coordinates.
 
 #include <Eigen/Geometry>
+#include <algorithm>
 
 #include "common/check.hpp"
 #include "elasticity/stretch.hpp"
@@ -146,12 +147,31 @@ double World::joint_angle(int joint) const {
   return checked_joint(self.model, joint).angle(self.state.q);
 }
 
-/// The mean of the last step, where there is one: what steps do not resolve, as of frames with little inertia of their
-/// own, changes the sign of its velocity from step to step.
+/// The mean of the last step: what steps do not resolve, as of frames with little inertia of their own, changes the
+/// sign of its velocity from step to step. Where there was none, by the edges at either side.
 double World::joint_rate(int joint) const {
   const Implementation& self = *implementation_;
-  const JointAngle& turning = checked_joint(self.model, joint);
-  return turning.angle(self.predictor.empty() ? self.state.v : self.predictor.latest());
+  const Model& model = self.model;
+  const JointAngle& turning = checked_joint(model, joint);
+  if (!self.predictor.empty()) return turning.angle(self.predictor.latest());
+  if (!turning.turns()) return 0.0;
+  const auto hinge =
+      std::find_if(model.hinges.begin(), model.hinges.end(), [&](const Hinge& h) { return h.dof == turning.turning; });
+  const auto belongs = [&](const FrameStencil& half, bool turns) {
+    if (model.planar()) return model.frame_dof[at(half.frame)] == (turns ? turning.turning : turning.against);
+    return half.frame == hinge->frame && (turns ? half.hinge == hinge - model.hinges.begin() : half.hinge < 0);
+  };
+  const Configuration& c = self.configuration();
+  const auto rate = [&](bool turns) -> Vector3 {
+    Vector3 sum = Vector3::Zero();
+    int count = 0;
+    for (const FrameStencil& half : model.half)
+      if (belongs(half, turns)) sum += angular_velocity(model, self.state, c, half.edge), ++count;
+    return sum / count;
+  };
+  const Vector3 axis =
+      model.planar() ? model.plane->normal : Vector3(frame_rotation(model, self.state, hinge->frame) * hinge->axis);
+  return turning.sign * axis.dot(rate(true) - rate(false));
 }
 
 double World::joint_torque(int joint) const {

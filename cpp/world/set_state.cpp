@@ -222,17 +222,28 @@ void World::Implementation::meet_anew(const std::vector<bool>& moved) {
   check_overlap();
 }
 
-/// Frames that edges are attached to turn with them, as far as nothing holds them.
+/// Frames that edges are attached to turn with them, as far as nothing holds them, and with those that hinges have
+/// beside them in a plane.
 void World::Implementation::relax_joints(const std::vector<bool>& is_told) {
   std::vector<bool> which(at(model.frame_count), false);
   for (const FrameStencil& half : model.half)
     if (is_told[at(half.edge)]) which[at(half.frame)] = true;
+  const auto free_of = [&](int f) -> Matrix3 {
+    for (const Constraint& c : model.constraints)
+      if (c.first == model.frame_dof[at(f)]) return c.free;
+    return Matrix3::Identity();
+  };
   for (int f = 0; f < model.frame_count; ++f) {
     if (!which[at(f)]) continue;
-    Matrix3 free = Matrix3::Identity();
-    for (const Constraint& c : model.constraints)
-      if (c.first == model.frame_dof[at(f)]) free = c.free;
-    relax_frame(f, free);
+    std::vector<int> together{f};
+    for (int other = 0; model.planar() && !model.joint_angles.empty() && other < model.frame_count; ++other)
+      if (other != f && model.frame_node[at(other)] == model.frame_node[at(f)]) together.push_back(other);
+    std::vector<Matrix3> free;
+    for (int each : together) {
+      free.push_back(free_of(each));
+      which[at(each)] = false;
+    }
+    relax_together(together, free);
   }
 }
 
@@ -269,13 +280,7 @@ void World::Implementation::set_rates(const std::vector<RodState>& rods) {
 void World::Implementation::turn_frames(const std::vector<bool>& is_told) {
   Configuration c;
   compute_configuration(model, state, state.q, c);
-  const auto rate = [&](int e) -> Vector3 {
-    const Vector3 t = edge_directors(model, c, e).col(2);
-    const Vector3 along =
-        node_vector(model, state.v, model.edge_head[at(e)]) - node_vector(model, state.v, model.edge_tail[at(e)]);
-    const double spin = model.planar() ? 0.0 : state.v(model.edge_dof[at(e)]);
-    return t.cross(along) / c.length(e) + spin * t;
-  };
+  const auto rate = [&](int e) { return angular_velocity(model, state, c, e); };
   for (int f = 0; f < model.frame_count; ++f) {
     bool told = false;
     int count = 0;

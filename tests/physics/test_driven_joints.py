@@ -384,3 +384,36 @@ def test_frequencies_with_stiff_joints_are_those_with_rigid_ones(planar, radius)
         soft = 1e7 * np.pi * radius**4 / 4 / 0.05  # [N m/rad] of half an edge, at most
         for stiffness in (1.0, 1e3, 1e5, 1e6, 1e7, 1e8):
             np.testing.assert_allclose(found[stiffness], found[None], rtol=1e-6 + 3.0 * soft / stiffness)
+
+
+@pytest.mark.parametrize("planar", [True, False])
+def test_hinges_are_relaxed_with_both_sides_in_whatever_order_rods_are_told(planar):
+    """A hub that is held far away, and an arm that is told to have turned: the same angle, of least energy."""
+    seen = []
+    for order in (("arm",), ("hub", "arm"), ("arm", "hub")):
+        scene = rods.weightless()
+        scene.add_rod(start=(-0.2, 0, 0), end=(0, 0, 0), nodes=7, name="hub", **SOFT)
+        scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=7, name="arm", **SOFT)
+        hinge = scene.join("hub.end", "arm.start", "revolute", axis=(0, 1, 0), stiffness=0.02)
+        scene.clamp("hub.start")
+        simulation = scene.build(integrator="static", planar=planar)
+        turned = simulation.positions("arm") @ rods.rotation((0, 1, 0), 0.5).T
+        for name in order:
+            simulation.set_state(name, positions=turned if name == "arm" else simulation.positions("hub"))
+        energy = simulation.energy()
+        seen.append((simulation.joint_angle(hinge), energy.spring + energy.bend))
+    np.testing.assert_allclose(seen, [seen[0]] * 3, rtol=1e-6)
+    # Half an edge at either side in a row with the spring, k (2 B / l) each: the energy of 0.5 rad over all three.
+    share = 2.0 * 2e-2 / (0.2 / 6.0) * 6.0 / 5.0
+    whole = 1.0 / (1.0 / 0.02 + 2.0 / share)
+    assert seen[0][0] == pytest.approx(0.5 * whole / 0.02, rel=0.02)
+
+
+@pytest.mark.parametrize("planar", [True, False])
+def test_joints_stand_still_when_they_are_told_to(planar):
+    simulation = bar(planar, gravity=(0, 0, -9.81), integrator="implicit_midpoint", step=1e-3, damping=0.1)
+    simulation.run(0.1, progress=False)
+    assert abs(simulation.joint_rate("hinge")) > 0.1
+    simulation.set_velocities(None, np.zeros((6, 3)))
+    assert simulation.joint_rate("hinge") == pytest.approx(0.0, abs=1e-9)
+    assert simulation.joint_torque("hinge") == pytest.approx(0.0, abs=1e-9)

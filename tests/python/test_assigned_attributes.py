@@ -67,3 +67,33 @@ def test_a_ramp_that_was_restored_away_is_forgotten():
     simulation.reset()
     simulation.equilibrium()
     np.testing.assert_allclose(simulation.positions("arm")[0], (0, 0, 0))
+
+
+def test_what_derives_from_a_scene_may_have_attributes_of_its_own():
+    class Robot(withe.Scene):
+        def __init__(self):
+            super().__init__()
+            self.legs = [
+                self.add_rod(
+                    start=(0, 0, 0),
+                    end=(1, 0, 0),
+                    nodes=3,
+                    radius=0.01,
+                    line_density=1.0,
+                    stiffness=withe.Stiffness(stretch=1.0, bend=1.0, twist=1.0),
+                )
+            ]
+
+    robot = Robot()
+    robot.height = 0.3
+    assert (robot.height, len(robot.legs)) == (0.3, 1)
+
+
+def test_a_support_that_was_released_has_nothing_to_begin():
+    simulation = arm().build()
+    simulation.move("wall", position=(0, 0, 0.1), over=0.5)
+    simulation.release("wall")
+    simulation.clamp("arm.start")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        simulation.equilibrium()

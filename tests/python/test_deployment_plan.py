@@ -366,3 +366,9 @@ def test_the_jaw_starts_and_stops_gently_at_any_speed(speed):
     inside = (motion.times >= down.start) & (motion.times <= down.end)
     acceleration = np.diff(motion.positions[inside], 2, axis=0) / np.diff(motion.times[inside]).mean() ** 2
     assert np.linalg.norm(acceleration, axis=1).max() < 1.5 * 0.0981
+
+
+def test_a_greater_speed_never_takes_longer():
+    line = Pattern(np.stack([np.linspace(0.0, 0.5, 101), np.zeros(101)], 1))
+    durations = [plan(CABLE, line, speed=speed).times[-1] for speed in (0.02, 0.05, 0.1, 0.2, 0.5, 2.0)]
+    assert (np.diff(durations) <= 1e-9).all()

@@ -12,7 +12,7 @@ T = TypeVar("T", bound=type)
 
 
 def known_attributes(instead: str) -> Callable[[T], T]:
-    """Let a class refuse public attributes that it does not define.
+    """Let a class, but not those that derive from it, refuse public attributes that it does not define.
 
     Parameters
     ----------
@@ -37,7 +37,8 @@ def known_attributes(instead: str) -> Callable[[T], T]:
 
     def refusing(known: T) -> T:
         def assign(self: Any, name: str, value: Any) -> None:
-            if not name.startswith("_") and not hasattr(known, name):
+            own = type(self) is known  # classes that derive from it may have what they want
+            if own and not name.startswith("_") and not hasattr(known, name):
                 near = get_close_matches(name, [word for word in dir(known) if not word.startswith("_")], 1)
                 meant = f"did you mean {near[0]}?" if near else instead
                 raise AttributeError(f"{known.__name__} has no attribute {name!r} to assign: {meant}")

@@ -120,7 +120,12 @@ class Piece:
         if not self.laying:  # a quintic's greatest speed is 1.875 times its mean, and its acceleration 10 / 3^.5
             gentle = np.sqrt(10.0 / np.sqrt(3.0) * self.reach / _ACCELERATION)
             return max(1.0, 1.875 * self.reach / speed, float(gentle))
+        speed = self._reached(speed)
         return self.reach / speed + self._ramp(speed)
+
+    def _reached(self, speed: float) -> float:
+        """A speed, or what the way is long enough to reach."""
+        return min(speed, float(np.sqrt(self.reach * _ACCELERATION / 1.875)))
 
     def _ramp(self, speed: float) -> float:
         return max(2.0, 1.875 * speed / _ACCELERATION)  # [s] to reach the speed, and to stop
@@ -129,7 +134,7 @@ class Piece:
         """Share of the parameter at shares of the duration."""
         if not self.laying:
             return share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
-        duration, ramp = self.duration(speed), self._ramp(speed)
+        duration, ramp = self.duration(speed), self._ramp(self._reached(speed))
         t = share * duration
 
         def ramped(time: FloatArray) -> FloatArray:  # integral of the smoothstep of fifth order over time

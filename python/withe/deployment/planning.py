@@ -62,7 +62,7 @@ class Plan:
     start : str
         "free", or "held" so that the free end slides up and down only.
     speed : float [m/s]
-        Of the lift-off point along the pattern.
+        Of the lift-off point along the pattern, where that is long enough to reach it.
     fastest : float [m/s]
         The speed at which the jaw's acceleration while it lays reaches a hundredth of gravity's. Faster, the cable
         swings, and that, not friction, soon decides how well it lies.

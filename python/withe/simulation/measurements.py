@@ -124,7 +124,9 @@ class Measurements:
         return self._session.world.joint_angle(find_joint(self._session, joint))
 
     def joint_rate(self, joint: Joint | str) -> float:
-        """The rate of `joint_angle` [rad/s].
+        """The rate of `joint_angle` [rad/s]: the mean of the last step (by fourth order, of its last part).
+
+        Before the first one, and where a state was set, by how the edges at either side turn.
 
         Raises
         ------

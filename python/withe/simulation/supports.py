@@ -47,6 +47,7 @@ def release(session: Session, support: Handle | str) -> None:
 def forget(session: Session, part: SupportPart) -> None:
     """Drop what is known of a support that the engine has released."""
     del session.settings.supports[part.name]
+    session.settings.ramps.pop(("move", part.name), None)
     for word in POSE_WORDS:
         session.settings.paths.pop((part.name, word), None)
     if part.name not in session.scene.parts:
