@@ -297,3 +297,25 @@ def test_what_lbfgs_does_not_go_with_says_what_to_do(unknowns, options, message)
     target = Tags([[(0, 0, 0)]], ["arm.end"], times=[0.1])
     with pytest.raises(ValueError, match=message):
         fit_motion(ringing(), target, unknowns, progress=False, **({"method": "lbfgs"} | options))
+
+
+@pytest.mark.parametrize("planar", [None, False])
+def test_stiffness_and_damping_of_a_joint_are_found_from_how_it_swings(planar):
+    def leg(stiffness, damping):
+        scene = withe.Scene()
+        rubber = withe.Material(youngs_modulus=1e7, density=1000.0)
+        thigh = scene.add_rod(start=(0, 0, 0), end=(0.1, 0, 0), nodes=5, radius=5e-3, material=rubber)
+        shank = scene.add_rod(start=(0.1, 0, 0), end=(0.2, 0, 0), nodes=5, radius=5e-3, material=rubber, name="shank")
+        scene.clamp(thigh.start)
+        turns = {"axis": (0, 1, 0), "stiffness": stiffness, "rest_angle": 0.4, "damping": damping}
+        scene.join(thigh.end, shank.start, "revolute", name="knee", **turns)
+        return scene.build(planar=planar, time_step=2e-3)
+
+    true, times, seen = leg(0.3, 3e-4), np.arange(0.02, 0.4, 0.02), []
+    for time in times:
+        true.run(time - true.time, progress=False)
+        seen.append(true.positions("shank")[[2, 4]])
+    tags = Tags(np.array(seen), ["shank.node(2)", "shank.end"], times=times)
+    found = fit_motion(leg(0.2, 1e-4), tags, [("knee", "stiffness"), ("knee", "damping")], progress=False)
+    np.testing.assert_allclose(found.values[0], (0.3, 3e-4), rtol=1e-4)
+    assert found.unobservable == ()

@@ -57,7 +57,8 @@ def fit(
         ``(rod, "natural_curvature", basis)``, with basis "constant", "linear" (its values at both ends), "segment" (one
         a stencil), or functions along the rod, array_like of shape (stencils, n); in space these count twice, for
         both directors. ``(part, word)`` for a positive parameter of a part or of a tuple of parts, all multiplied by
-        one factor: youngs_modulus, density, bend_stiffness, line_density, ... of rods, mass, friction of an obstacle.
+        one factor: youngs_modulus, density, bend_stiffness, line_density, ... of rods, mass, friction of an obstacle,
+        stiffness and damping of revolute joints and springs.
         ``(rod, "points", basis)`` for a rod as it was drawn, in a plane: by how much its edges are turned, over
         functions of the same kinds, (edges, n), as if the scene were built anew: natural curvature follows, and
         supports go where its nodes are drawn. ``(support, "position")`` and ``(support, "rotation")`` for poses.

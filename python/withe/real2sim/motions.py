@@ -67,9 +67,9 @@ def fit_motion(
     targets : Tags, Centrelines, Curvatures, or several
         With the times of their frames, from the start of the motion.
     unknowns : sequence
-        As in `fit`; viscosity, viscous_time, drag and friction show here too, and natural curvature is one for the
-        whole motion. Where supports are unknown, `begin` has to go to an equilibrium. Or "delay": how much later than
-        the run's the clock of the targets began, so that their time t is t + delay in the run, never less than 0.
+        As in `fit`; viscosity, viscous_time, drag, damping and friction show here too, and natural curvature is one for
+        the whole motion. Where supports are unknown, `begin` has to go to an equilibrium. Or "delay": how much later
+        than the run's the clock of the targets began, so that their time t is t + delay in the run, never less than 0.
     begin : callable, optional
         Called with a simulation before each run, when its numbers are set: to find the equilibrium from which it is let
         go, which depends on them, and to let it go.

@@ -21,7 +21,14 @@ __all__ = ["POSITIVE", "Coordinates", "Delay", "Parameter", "Tilt", "Unknown", "
 
 FloatArray = npt.NDArray[np.float64]
 
-POSITIVE = (*(word for word in ROD_WORDS if word != "poisson_ratio"), "mass", "friction")
+POSITIVE = (
+    *(word for word in ROD_WORDS if word != "poisson_ratio"),
+    "mass",
+    "friction",
+    "stiffness",
+    "rest_length",
+    "damping",
+)
 
 
 class Unknown(ABC):
