@@ -25,7 +25,7 @@ Eigen::Index known_half(const Model& model, int frame, const Model& other) {
 
 /// How what a half stencil attaches has turned since it was drawn.
 Matrix3 attached_rotation(const Model& model, const State& state, const FrameStencil& half) {
-  const Matrix3 frame = frame_rotation(model, state, half.frame);
+  Matrix3 frame = frame_rotation(model, state, half.frame);
   if (half.hinge < 0) return frame;
   const Hinge& hinge = model.hinges[at(half.hinge)];
   return frame * rotation_exp(state.q(hinge.dof) * hinge.axis);
@@ -35,7 +35,7 @@ Matrix3 attached_rotation(const Model& model, const State& state, const FrameSte
 Vector3 attached_spin(const Model& model, const State& state, const FrameStencil& half) {
   const int dof = model.frame_dof[at(half.frame)];
   if (model.planar()) return state.v(dof) * model.plane->normal;
-  const Vector3 spin = state.v.segment<3>(dof);
+  Vector3 spin = state.v.segment<3>(dof);
   if (half.hinge < 0) return spin;
   const Hinge& hinge = model.hinges[at(half.hinge)];
   return spin + state.v(hinge.dof) * (frame_rotation(model, state, half.frame) * hinge.axis);
