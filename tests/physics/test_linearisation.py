@@ -1,5 +1,7 @@
 """Frequencies, flutter and divergence of the linearised equations: slender, fine and free rods, turning loads."""
 
+import pickle
+
 import numpy as np
 import pytest
 from scipy.linalg import eig
@@ -74,6 +76,16 @@ def test_frequencies_and_modes_are_those_of_the_matrices():
     np.testing.assert_allclose((2.0 * np.pi * found.frequencies(4)) ** 2, squares[:4], rtol=1e-9)
     assert found.modes(4).shape == (4, 13, 3)
     np.testing.assert_allclose(np.linalg.norm(found.modes(4), axis=2).max(axis=1), 1.0)
+
+
+def test_it_pickles_also_once_modes_are_found():
+    scene = withe.Scene()
+    rod = scene.add_rod(start=(0, 0, 0), end=(1, 0, 0), nodes=41, radius=5e-3, material=STEEL)
+    scene.clamp(rod.start)
+    linearisation = scene.build().linearise()
+    modes = linearisation.modes(4)
+    again = pickle.loads(pickle.dumps(linearisation))
+    np.testing.assert_array_equal(again.modes(4), modes)
 
 
 def test_a_hanging_cable_swings_with_the_zeros_of_a_bessel_function():

@@ -26,6 +26,7 @@ __all__ = ["Linearisation"]
 
 FloatArray = npt.NDArray[np.float64]
 Stability = Literal["stable", "diverges", "flutters"]
+Inverse = Callable[[FloatArray], FloatArray]
 
 _BLOCK = 8
 _FULL = 8  # share of all modes, one in so many, from which on matrices are full
@@ -190,19 +191,20 @@ class Linearisation:
         if not 1 <= count <= size:
             raise ValueError(f"count must be between 1 and {size}, got {count}")
         shift = self._shift
+        inverse = self._inverse(shift)
         # Nearest to -shift are those of the lowest real part, but for pairs that lie off the axis.
         found = count if self._symmetric else min(2 * count + _BLOCK, size)
         if found > size // _FULL:
-            squares, shapes = self._full(shift)
+            squares, shapes = self._full(inverse, shift)
         else:
-            squares, shapes, _ = self._krylov(shift, found)
+            squares, shapes, _ = self._krylov(inverse, shift, found)
             if not self._symmetric:
                 squares, shapes = self._with_fast_growth(squares, shapes, shift, found)
         chosen = np.argsort(squares.real, kind="stable")[:count]
         squares, shapes = squares[chosen], shapes[:, chosen]
         if self._symmetric:
             # By how much moves what has hardly any mass, orthogonal shapes have few digits, and what they push has all.
-            shapes = self._inverse(shift)(self._mass @ shapes) * (squares + shift)
+            shapes = inverse(self._mass @ shapes) * (squares + shift)
             squares = self._rayleigh(shapes)
             order = np.argsort(squares, kind="stable")
             return squares[order], shapes[:, order]
@@ -227,7 +229,7 @@ class Linearisation:
             beyond *= 4.0
         if beyond <= 4.0 * shift:
             return squares, shapes
-        far, far_shapes, residuals = self._krylov(beyond, count)
+        far, far_shapes, residuals = self._krylov(self._inverse(beyond), beyond, count)
         grows = (far.real < -shift) & (residuals <= _RESIDUAL / (np.abs(far + beyond)))
         near = squares.real >= -shift
         return (
@@ -263,7 +265,7 @@ class Linearisation:
         shift = float(np.median(np.abs(self._assembled.diagonal()) / self._mass.diagonal())) / nodes**4
         count = _BLOCK
         for _ in range(40):
-            squares, shapes, _ = self._krylov(shift, count, rounds=2)
+            squares, shapes, _ = self._krylov(self._inverse(shift), shift, count, rounds=2)
             moving = np.abs(squares[np.abs(squares) > np.maximum(_NEUTRAL * shift, self._neutral(shapes, shift))])
             if not len(moving) and count < self._mass.shape[0]:
                 count *= 2  # every free rod has six that are neutral
@@ -294,13 +296,11 @@ class Linearisation:
             return False
         return bool((factors.U.diagonal() > 0.0).all())
 
-    def _inverse(self, shift: float) -> Callable[[FloatArray], FloatArray]:
+    def _inverse(self, shift: float) -> Inverse:
         """Answers b with (K + shift M)^-1 b; see the head of this file."""
         from scipy.sparse import bmat, diags
         from scipy.sparse.linalg import splu
 
-        if shift in self._last_inverse:
-            return self._last_inverse[shift]
         size = self._mass.shape[0]
         matrix = bmat(
             [
@@ -318,34 +318,26 @@ class Linearisation:
             x += factors.solve(right - matrix @ x)
             return np.asarray(x[:size])
 
-        self._last_inverse.clear()
-        self._last_inverse[shift] = solve
         return solve
 
-    @cached_property
-    def _last_inverse(self) -> dict[float, Callable[[FloatArray], FloatArray]]:
-        """What `_inverse` last answered, by its shift."""
-        return {}
-
     def _krylov(
-        self, shift: float, count: int, rounds: int | None = None
+        self, inverse: Inverse, shift: float, count: int, rounds: int | None = None
     ) -> tuple[npt.NDArray[Any], npt.NDArray[Any], FloatArray]:
-        """Squares nearest to -shift, shapes and residuals, from a Krylov space of (K + shift M)^-1 M.
+        """Squares nearest to -shift, shapes and residuals, from a Krylov space of the inverse, (K + shift M)^-1 M.
 
         Ends when `count` have converged, after some rounds, or where the space is whole.
         """
         size = self._mass.shape[0]
-        solve = self._inverse(shift)
         # As many at once as are asked for: of equal ones, a narrower block sees no more than it is wide.
         start = np.random.default_rng(0).standard_normal((size, min(max(_BLOCK, count + 1), size)))
-        block, _ = self._orthonormal(solve(self._mass @ start))
+        block, _ = self._orthonormal(inverse(self._mass @ start))
         basis, images = block, self._mass @ block
         projected = np.zeros((0, 0))
         step = 0
         while True:
             step += 1
             width = block.shape[1]
-            answer = solve(self._mass @ block)
+            answer = inverse(self._mass @ block)
             column = images.T @ answer
             answer -= basis @ column
             again = images.T @ answer
@@ -386,12 +378,12 @@ class Linearisation:
         again, turned = np.sqrt(squares[kept]), turned[:, kept]
         return first @ (turned / again), (again[:, None] * turned.T) @ (roots[:, None] * axes.T)
 
-    def _full(self, shift: float) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+    def _full(self, inverse: Inverse, shift: float) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
         """All of them: slow ones from the inverse, whose greatest eigenvalues they are, fast ones from the matrix."""
         from scipy.linalg import eig, eigh
 
         mass = self.mass
-        flexibility = self._inverse(shift)(np.eye(len(mass)))
+        flexibility = inverse(np.eye(len(mass)))
         scale = 1.0 / np.sqrt(np.diag(mass))[:, None]
         stiffness, scaled = scale * self.stiffness * scale.T, scale * mass * scale.T
         if self._symmetric:
