@@ -91,7 +91,7 @@ void moment_on_frame(const Model& model, const VectorX& q, const Configuration& 
   const Matrix3& frame = configuration.frame[at(piece.frame)];
   const Hinge* hinge = piece.hinge < 0 ? nullptr : &model.hinges[at(piece.hinge)];
   Vector3 M = value;
-  if (piece.follower) M = frame * (hinge ? Vector3(rotation_exp(q(hinge->dof) * hinge->axis) * value) : value);
+  if (piece.follower) M = frame * (hinge_turn(model, q, piece.hinge) * value);
   const Vector3 w = q.segment<3>(model.frame_dof[at(piece.frame)]);
   const double c = 1.0 / (1.0 + 0.25 * w.squaredNorm());
   const Vector3 u = M - 0.5 * w.cross(M);

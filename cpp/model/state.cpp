@@ -78,10 +78,7 @@ void attach(const Model& model, const State& state, const VectorX& q, Configurat
   for (std::size_t h = 0; h < model.half.size(); ++h) {
     const FrameStencil& s = model.half[h];
     Matrix3 m = s.attachment;
-    if (s.hinge >= 0) {
-      const Hinge& hinge = model.hinges[static_cast<std::size_t>(s.hinge)];
-      m = rotation_exp(q(hinge.dof) * hinge.axis) * m;
-    }
+    if (s.hinge >= 0) m = hinge_turn(model, q, s.hinge) * m;
     m = out.frame[static_cast<std::size_t>(s.frame)] * m;
     out.attached[h] = {to_vec3(m.col(2)), to_vec3(m.col(0)), to_vec3(m.col(1)), 1.0, {}, {}};
   }
@@ -211,6 +208,12 @@ void accept_configuration(const Model& model, const VectorX& q, const Configurat
                          .source = &state.tangent.data()->x,
                          .reference = &state.director.data()->x});
   accept_frames(model, configuration, state);
+}
+
+Matrix3 hinge_turn(const Model& model, const VectorX& q, int hinge) {
+  if (hinge < 0) return Matrix3::Identity();
+  const auto& [frame, axis, dof] = model.hinges[static_cast<std::size_t>(hinge)];
+  return rotation_exp(q(dof) * axis);
 }
 
 Matrix3 edge_directors(const Model& model, const Configuration& c, int edge) {

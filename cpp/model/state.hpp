@@ -138,6 +138,8 @@ struct Configuration {
 void compute_configuration(const Model& model, const State& state, const VectorX& q, Configuration& out);
 /// The same without strains.
 void compute_frames(const Model& model, const State& state, const VectorX& q, Configuration& out);
+/// The turn about a hinge since it was drawn, in the axes of the drawn scene; none where hinge is -1.
+Matrix3 hinge_turn(const Model& model, const VectorX& q, int hinge);
 /// Directors of an edge in the axes of space: columns d1, d2, t.
 Matrix3 edge_directors(const Model& model, const Configuration& c, int edge);
 

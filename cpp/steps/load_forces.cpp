@@ -21,14 +21,14 @@ void add_drawn(const StepProblem& problem, const LoadPiece& piece, const Vector3
 void add_frame_turn(const StepProblem& problem, const StepData& data, const LoadPiece& piece, const double* rows,
                     StepAdjoint& adjoint) {
   const Matrix3& frame = data.configuration.frame[at(piece.frame)];
-  const Hinge* hinge = piece.hinge < 0 ? nullptr : &problem.model.hinges[at(piece.hinge)];
   const Vector3 value = piece.weight * problem.parameters->loads.row(piece.load);
   if (!piece.follower) {
-    adjoint.middle_spin.row(piece.frame) -= rows[3] * (frame * hinge->axis).cross(value).transpose();
+    const Vector3 axis = frame * problem.model.hinges[at(piece.hinge)].axis;
+    adjoint.middle_spin.row(piece.frame) -= rows[3] * axis.cross(value).transpose();
     return;
   }
   const Vector3 w = data.z.segment<3>(problem.model.frame_dof[at(piece.frame)]),
-                own = hinge ? Vector3(rotation_exp(data.z(hinge->dof) * hinge->axis) * value) : value,
+                own = hinge_turn(problem.model, data.z, piece.hinge) * value,
                 spin = cayley_spin(w) * Eigen::Map<const Vector3>(rows);
   adjoint.middle_spin.row(piece.frame) -= (frame * own).cross(spin).transpose();
 }

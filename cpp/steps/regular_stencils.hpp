@@ -23,9 +23,7 @@ inline Angles half_angles(const Model& model, int h) {
 inline Matrix3 attached_axes(const Model& model, const Configuration& c, const VectorX& q, int h) {
   if (model.planar()) return Matrix3::Identity();
   const FrameStencil& half = model.half[at(h)];
-  if (half.hinge < 0) return c.frame[at(half.frame)];
-  const Hinge& hinge = model.hinges[at(half.hinge)];
-  return c.frame[at(half.frame)] * rotation_exp(q(hinge.dof) * hinge.axis);
+  return c.frame[at(half.frame)] * hinge_turn(model, q, half.hinge);
 }
 
 /// Strains f (kappa1, kappa2, tau) of all stencils.

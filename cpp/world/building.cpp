@@ -25,10 +25,7 @@ Eigen::Index known_half(const Model& model, int frame, const Model& other) {
 
 /// How what a half stencil attaches has turned since it was drawn.
 Matrix3 attached_rotation(const Model& model, const State& state, const FrameStencil& half) {
-  Matrix3 frame = frame_rotation(model, state, half.frame);
-  if (half.hinge < 0) return frame;
-  const Hinge& hinge = model.hinges[at(half.hinge)];
-  return frame * rotation_exp(state.q(hinge.dof) * hinge.axis);
+  return frame_rotation(model, state, half.frame) * hinge_turn(model, state.q, half.hinge);
 }
 
 /// With which angular velocity it turns [rad/s].
