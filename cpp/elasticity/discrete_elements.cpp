@@ -69,31 +69,6 @@ void clear(Local& out, int width, bool with_matrix) {
   }
 }
 
-/// How the torque on a hinge follows from the moment m on what it carries: m . arm. Behind a frame that turns by the
-/// Cayley vector w the hinge turns by `angle` about `axis`, and what both make of the carried frame is a rotation with
-/// the Cayley vector w + angle arm.
-struct HingeArm {
-  Vector3 arm;
-  Matrix3 by_frame;  ///< by w
-  Vector3 by_angle;
-};
-
-HingeArm hinge_arm(const Vector3& w, const Vector3& axis, double angle) {
-  const Vector3 x = 0.5 * w;
-  const double t = std::tan(0.5 * angle), along = x.dot(axis), n = 1.0 / (1.0 - along * t);
-  const bool little = std::abs(angle) < 1e-4;
-  const double k = little ? 1.0 + angle * angle / 12.0 : 2.0 * t / angle;
-  const double by_k = little ? angle / 6.0 : ((1.0 + t * t) * angle - 2.0 * t) / (angle * angle);
-  const Vector3 a = n * (axis + x.cross(axis) + along * x);
-  HingeArm h;
-  h.arm = k * a;
-  h.by_frame =
-      0.5 * k *
-      (n * (-cross_matrix(axis) + along * Matrix3::Identity() + x * axis.transpose()) + n * t * a * axis.transpose());
-  h.by_angle = by_k * a + k * n * along * 0.5 * (1.0 + t * t) * a;
-  return h;
-}
-
 Vec3d spin_of(const DiscreteStep& step, int edge) {
   return step.transported ? step.middle.edge[at(edge)].spin : Vec3d{};
 }
@@ -210,6 +185,22 @@ Eigen::Matrix<double, 3, 11> moment_columns(const EdgeColumns<double>& by_edge, 
 
 }  // namespace
 
+HingeArm hinge_arm(const Vector3& w, const Vector3& axis, double angle) {
+  const Vector3 x = 0.5 * w;
+  const double t = std::tan(0.5 * angle), along = x.dot(axis), n = 1.0 / (1.0 - along * t);
+  const bool little = std::abs(angle) < 1e-4;
+  const double k = little ? 1.0 + angle * angle / 12.0 : 2.0 * t / angle;
+  const double by_k = little ? angle / 6.0 : ((1.0 + t * t) * angle - 2.0 * t) / (angle * angle);
+  const Vector3 a = n * (axis + x.cross(axis) + along * x);
+  HingeArm h;
+  h.arm = k * a;
+  h.by_frame =
+      0.5 * k *
+      (n * (-cross_matrix(axis) + along * Matrix3::Identity() + x * axis.transpose()) + n * t * a * axis.transpose());
+  h.by_angle = by_k * a + k * n * along * 0.5 * (1.0 + t * t) * a;
+  return h;
+}
+
 void discrete_bend_local(const Model& model, const TurnCoefficients& elastic, const DiscreteStep& step, int stencil,
                          bool with_matrix, Local& out) {
   if (model.planar()) return planar_bend_local(model, elastic, step, stencil, with_matrix, out);
@@ -324,11 +315,11 @@ Eigen::Matrix<double, 7, 3> discrete_held_spin(const Model& model, const TurnCoe
   return out;
 }
 
-Eigen::Matrix<double, kMaxLocal, 3> discrete_half_spin(const Model& model, const TurnCoefficients& elastic,
-                                                       const DiscreteStep& step, int stencil) {
+Eigen::Matrix<double, kMaxStencil, 3> discrete_half_spin(const Model& model, const TurnCoefficients& elastic,
+                                                         const DiscreteStep& step, int stencil) {
   const FrameStencil& s = model.half[at(stencil)];
   const AttachedStep attached = attached_frame(model, step, stencil);
-  Eigen::Matrix<double, kMaxLocal, 3> out = Eigen::Matrix<double, kMaxLocal, 3>::Zero();
+  Eigen::Matrix<double, kMaxStencil, 3> out = Eigen::Matrix<double, kMaxStencil, 3>::Zero();
   out.topRows<7>() = discrete_held_spin(model, elastic, step, s.edge, attached);
   if (model.planar()) {
     const double by_turn = 0.5 * planar_attached_forces(elastic, step, s.edge, attached).frame_frame;
@@ -336,7 +327,7 @@ Eigen::Matrix<double, kMaxLocal, 3> discrete_half_spin(const Model& model, const
     return out;
   }
   Local unused;
-  clear(unused, kMaxLocal, true);
+  clear(unused, kMaxStencil, true);
   const AttachedMoments a = put_attached_edge(elastic, step, s.edge, attached, true, unused);
   const Mat3<double>& by_spin = attached.first ? a.m.by_a : a.m.by_b;
   for (int i = 0; i < 3; ++i)

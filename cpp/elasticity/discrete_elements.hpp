@@ -32,6 +32,16 @@ inline MeanStretch mean_stretch(const Model& model, const ElasticCoefficients& e
   return {axial_force(0.5 * sum, rest, EA, elastic.stretch_natural[edge]), EA / rest, 2.0 / sum};
 }
 
+/// How the torque on a hinge follows from the moment m on what it carries: m . arm. Behind a frame that turns by the
+/// Cayley vector w the hinge turns by `angle` about `axis`, and what both make of the carried frame is a rotation with
+/// the Cayley vector w + angle arm.
+struct HingeArm {
+  Vector3 arm;
+  Matrix3 by_frame;  ///< by w
+  Vector3 by_angle;
+};
+HingeArm hinge_arm(const Vector3& w, const Vector3& axis, double angle);
+
 /// `given_force`: axial, per edge, in place of that of the mean strain in the matrix, see add_stretch_hessian; or null.
 void discrete_stretch_local(const Model& model, const ElasticCoefficients& elastic, const DiscreteStep& step, int edge,
                             bool with_matrix, const double* given_force, Local& out);
@@ -57,7 +67,7 @@ Eigen::Matrix<double, 7, 3> discrete_held_spin(const Model& model, const TurnCoe
                                                const DiscreteStep& step, int edge, const AttachedStep& hold);
 /// Likewise, of the rows of a half stencil, as what is attached to its frame turns against it: no hinge's axis does.
 /// In a plane tail, head and frame, by the normal.
-Eigen::Matrix<double, kMaxLocal, 3> discrete_half_spin(const Model& model, const TurnCoefficients& elastic,
-                                                       const DiscreteStep& step, int stencil);
+Eigen::Matrix<double, kMaxStencil, 3> discrete_half_spin(const Model& model, const TurnCoefficients& elastic,
+                                                         const DiscreteStep& step, int stencil);
 
 }  // namespace withe

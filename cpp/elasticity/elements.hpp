@@ -9,7 +9,8 @@
 
 namespace withe {
 
-constexpr int kMaxLocal = 11;
+constexpr int kMaxStencil = 11;  ///< unknowns of a stencil
+constexpr int kMaxLocal = 14;    ///< of any element: a tendon between edges that share no node has the most
 
 /// Numbers of one stencil. The Hessian is full and symmetric.
 struct Local {

@@ -57,6 +57,7 @@ class Chain {
     out.joint_rest_angle = by.joint_rest_angle;
     out.joint_damping = by.joint_damping;
     out.joint_moment = by.joint_moment;
+    out.tendon_tension = by.tendon_tension;
     out.fluid_viscosity = by.fluid_viscosity;
     out.friction = by.friction;
     out.slip_tolerance = by.slip_tolerance;

@@ -17,6 +17,7 @@ struct ParameterGradient {
   MatrixX3 loads;
   VectorX spring_stiffness, spring_rest_length, spring_damping;
   VectorX joint_stiffness, joint_rest_angle, joint_damping, joint_moment;  ///< per revolute joint
+  VectorX tendon_tension;                                                  ///< per tendon
   double fluid_viscosity = 0, friction = 0, slip_tolerance = 0;
   MatrixX3 obstacle_friction, pair_friction;
   VectorX obstacle_rolling;

@@ -456,6 +456,10 @@ class Builder {
     const auto connect = [&](int a, int b) { parent[static_cast<std::size_t>(root(a))] = root(b); };
     for (std::size_t e = 0; e < model_.edge_tail.size(); ++e) connect(model_.edge_tail[e], model_.edge_head[e]);
     for (const SpringDescription& spring : scene_.springs) connect(spring.nodes[0], spring.nodes[1]);
+    for (const TendonDescription& tendon : scene_.tendons)
+      for (const TendonGuide& guide : tendon.guides)
+        connect(scene_.rods[static_cast<std::size_t>(tendon.guides.front().rod)].nodes[0],
+                scene_.rods[static_cast<std::size_t>(guide.rod)].nodes[0]);
     for (const Cluster& cluster : clusters_)
       for (const RodPass& pass : cluster.passes) connect(global_node(cluster.passes.front()), global_node(pass));
     std::vector<int> number(parent.size(), -1);
@@ -544,6 +548,26 @@ void add_offsets(Model& model, std::size_t uncorrected_end, const Vector3& at_fr
   model.bend_offset.row(bend) += in_model(at_next).transpose();
 }
 
+namespace {
+
+void check_tendon(const SceneDescription& scene, const TendonDescription& tendon) {
+  require(tendon.guides.size() >= 2, "a tendon must have two guides or more");
+  require(tendon.offsets.rows() == static_cast<Eigen::Index>(tendon.guides.size()) && tendon.offsets.allFinite(),
+          "a tendon must have a finite offset for each of its guides");
+  require(tendon.tension >= 0.0 && std::isfinite(tendon.tension),
+          "tension of a tendon must be finite and not negative, got " + std::to_string(tendon.tension));
+  const TendonGuide* before = nullptr;
+  for (const TendonGuide& guide : tendon.guides) {
+    require(guide.rod >= 0 && guide.rod < static_cast<int>(scene.rods.size()) && guide.edge >= 0 &&
+                guide.edge < scene.rods[static_cast<std::size_t>(guide.rod)].rest_lengths.size(),
+            "guide of a tendon on an edge that is not there");
+    require(!before || *before != guide, "a tendon must run from each guide to another");
+    before = &guide;
+  }
+}
+
+}  // namespace
+
 Model build_model(const SceneDescription& description, std::optional<bool> planar) {
   require(!description.rods.empty(), "the scene has no rods: add one with add_rod");
   for (const SpringDescription& spring : description.springs) {
@@ -551,6 +575,7 @@ Model build_model(const SceneDescription& description, std::optional<bool> plana
       require(node >= 0 && node < description.positions.rows(), "spring at a node that is not there");
     require(spring.nodes[0] != spring.nodes[1], "a spring must act between two different nodes");
   }
+  for (const TendonDescription& tendon : description.tendons) check_tendon(description, tendon);
   for (const LoadDescription& load : description.loads) check_load(description, load);
   Model model;
   model.description = description;

@@ -142,6 +142,24 @@ struct SpringDescription {
   double damping = 0;          ///< c [N s/m]
 };
 
+/// Where along an edge a guide of a tendon is. At the start or the end of a rod that is rigid with a joint or a clamp
+/// there, it sits on that.
+enum class GuidePlace { start, middle, end };
+
+struct TendonGuide {
+  int rod = 0, edge = 0;
+  GuidePlace place = GuidePlace::middle;
+
+  friend bool operator==(const TendonGuide&, const TendonGuide&) = default;
+};
+
+/// A tendon that runs through guides from the first to the last; see forces/tendon.hpp.
+struct TendonDescription {
+  std::vector<TendonGuide> guides;
+  MatrixX2 offsets;    ///< per guide, along the material directors d1, d2 of its edge [m]
+  double tension = 0;  ///< T [N]
+};
+
 enum class ContactLaw { imcv2, imcv1, barrier, spillmann_teschner };
 
 /// How the stiffness of contact is found where no number is given.
@@ -251,6 +269,7 @@ struct SceneDescription {
   std::vector<UncorrectedEnd> uncorrected_ends;  ///< found by `build_model`; once one, always one
   std::vector<LoadDescription> loads;
   std::vector<SpringDescription> springs;
+  std::vector<TendonDescription> tendons;
   bool has_custom_force = false;  ///< nodal forces come from a callback
   bool custom_implicit = false;   ///< it knows their derivatives, so they are solved for
   bool custom_moments = false;    ///< and moments on nodes

@@ -154,7 +154,8 @@ struct Parameters {
   VectorX spring_stiffness, spring_rest_length, spring_damping;  ///< per spring [N/m], [m], [N s/m]
   /// Per revolute joint [N m/rad], [rad], [N m s/rad], [N m].
   VectorX joint_stiffness, joint_rest_angle, joint_damping, joint_moment;
-  MatrixX3 loads;  ///< rows of each load after those of the one before; see `LoadDescription::values`
+  VectorX tendon_tension;  ///< per tendon [N]
+  MatrixX3 loads;          ///< rows of each load after those of the one before; see `LoadDescription::values`
   BendMeasure measure;
   bool lumped = false;       ///< whether masses sit at nodes alone; see mass_matrix.hpp
   bool held_lumped = false;  ///< whether those of edges at held nodes do

@@ -15,7 +15,7 @@ namespace {
 
 using enum ParameterKind;
 
-constexpr std::array<ParameterInfo, 32> kIndex{{
+constexpr std::array<ParameterInfo, 33> kIndex{{
     {stretch_stiffness, "stretch_stiffness", Extent::edge, 1, "N", Range::positive, Derived::nothing},
     {bend_stiffness, "bend_stiffness", Extent::edge, 2, "N m^2", Range::positive, Derived::stiffness},
     {twist_stiffness, "twist_stiffness", Extent::edge, 1, "N m^2", Range::positive, Derived::stiffness},
@@ -38,6 +38,7 @@ constexpr std::array<ParameterInfo, 32> kIndex{{
     {joint_rest_angle, "joint_rest_angle", Extent::joint, 1, "rad", Range::any, Derived::nothing},
     {joint_damping, "joint_damping", Extent::joint, 1, "N m s/rad", Range::non_negative, Derived::nothing},
     {joint_moment, "joint_moment", Extent::joint, 1, "N m", Range::any, Derived::nothing},
+    {tendon_tension, "tendon_tension", Extent::tendon, 1, "N", Range::non_negative, Derived::nothing},
     {friction, "friction", Extent::scene, 1, "-", Range::non_negative, Derived::nothing},
     {slip_tolerance, "slip_tolerance", Extent::scene, 1, "m/s", Range::positive, Derived::nothing},
     {restitution, "restitution", Extent::scene, 1, "-", Range::non_negative, Derived::nothing},
@@ -81,6 +82,8 @@ Eigen::Index rows_of(const Model& model, const ParameterInfo& info, int rod) {
       return static_cast<Eigen::Index>(model.description.springs.size());
     case Extent::joint:
       return static_cast<Eigen::Index>(model.joint_angles.size());
+    case Extent::tendon:
+      return static_cast<Eigen::Index>(model.description.tendons.size());
     case Extent::load:
       return first_load_row(model.description, model.description.loads.size());
     case Extent::obstacle:
@@ -159,6 +162,8 @@ ParameterView parameter_view(const Model& model, Parameters& p, ParameterKind ki
         return p.joint_damping.data();
       case joint_moment:
         return p.joint_moment.data();
+      case tendon_tension:
+        return p.tendon_tension.data();
       case friction:
         return &p.surfaces.friction;
       case slip_tolerance:

@@ -31,6 +31,7 @@ enum class ParameterKind {
   joint_rest_angle,
   joint_damping,
   joint_moment,
+  tendon_tension,
   friction,
   slip_tolerance,
   restitution,
@@ -44,9 +45,9 @@ enum class ParameterKind {
 };
 
 /// What a parameter has a row of numbers for: the scene; every node; every edge, or stencil, of a rod; every obstacle;
-/// every spring; every revolute joint; every load, or each of its edges; every pair of bodies that has something of its
-/// own.
-enum class Extent { scene, node, edge, stencil, spring, joint, load, obstacle, pair };
+/// every spring; every revolute joint; every tendon; every load, or each of its edges; every pair of bodies that has
+/// something of its own.
+enum class Extent { scene, node, edge, stencil, spring, joint, tendon, load, obstacle, pair };
 
 enum class Range { any, non_negative, positive };
 

@@ -177,6 +177,9 @@ Parameters initial_parameters(const Model& model) {
       p.joint_moment[j] = link.moment;
       ++j;
     }
+  p.tendon_tension.resize(static_cast<Eigen::Index>(scene.tendons.size()));
+  for (std::size_t t = 0; t < scene.tendons.size(); ++t)
+    p.tendon_tension[static_cast<Eigen::Index>(t)] = scene.tendons[t].tension;
   p.added_mass = scene.added_mass;
   p.gravity = scene.gravity;
   p.loads.resize(first_load_row(scene, scene.loads.size()), 3);

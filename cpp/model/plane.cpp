@@ -16,6 +16,18 @@ bool isotropic(const RodDescription& rod) {
       .all();
 }
 
+/// From the centreline to a guide of a tendon, as drawn [m].
+Vector3 guide_arm(const SceneDescription& scene, const TendonDescription& tendon, std::size_t guide) {
+  const auto& [rod, edge, place] = tendon.guides[guide];
+  const RodDescription& of = scene.rods[static_cast<std::size_t>(rod)];
+  const auto e = static_cast<std::size_t>(edge);
+  const Vector3 d1 = of.directors.row(edge),
+                t = (scene.positions.row(of.nodes[(e + 1) % of.nodes.size()]) - scene.positions.row(of.nodes[e]))
+                        .normalized();
+  const Vector2 offset = tendon.offsets.row(static_cast<Eigen::Index>(guide));
+  return offset.x() * d1 + offset.y() * t.cross(d1);
+}
+
 /// Collects unit directions that must lie in the plane.
 void collect_directions(const SceneDescription& scene, std::vector<Vector3>& directions) {
   const auto add = [&](const Vector3& v, double scale) {
@@ -27,6 +39,8 @@ void collect_directions(const SceneDescription& scene, std::vector<Vector3>& dir
     for (int node : rod.nodes) add(Vector3(scene.positions.row(node).transpose()) - start, 1e3 * size);
     add(start - Vector3(scene.positions.row(scene.rods.front().nodes.front()).transpose()), 1e3 * size);
   }
+  for (const TendonDescription& tendon : scene.tendons)
+    for (std::size_t g = 0; g < tendon.guides.size(); ++g) add(guide_arm(scene, tendon, g), 0.0);
   add(scene.gravity, 0.0);
   for (const LoadDescription& load : scene.loads)
     if (!load.added && !is_axial(load.kind))
@@ -81,7 +95,8 @@ std::optional<Vector3> normal_of(const SceneDescription& scene, bool asked, std:
   }
   for (const Vector3& d : directions)
     if (std::abs(d.dot(normal)) > kTolerance * 100 * d.norm()) {
-      reason = "rods, gravity and forces do not share a plane";
+      reason = scene.tendons.empty() ? "rods, gravity and forces do not share a plane"
+                                     : "rods, gravity, forces and tendons do not share a plane";
       return std::nullopt;
     }
   return normal;

@@ -68,12 +68,14 @@ class DiscreteAdjoint {
     const auto [start, end] = add_ends(table, i, rows, angles,
                                        [&](const DiscreteStep& step, Local& local) { evaluate(step, k, true, local); });
     if (frame < 0 || problem_.model.planar()) return;
+    adjoint_.start_spin.row(frame) += by_spin(backwards_, frame, start.data() + 7).transpose();
+    adjoint_.end_spin.row(frame) += by_spin(forth_, frame, end.data() + 7).transpose();
+  }
+
+  /// From derivatives by a frame's Cayley vector at the end of a step to those by its rotation vector there.
+  Vector3 by_spin(const DiscreteStep& step, int frame, const double* by) const {
     const int dof = problem_.model.frame_dof[at(frame)];
-    const auto by_spin = [&](const VectorX& q, const LocalVector& by) -> Vector3 {
-      return cayley_spin(q.segment<3>(dof)).transpose().inverse() * Eigen::Map<const Vector3>(by.data() + 7);
-    };
-    adjoint_.start_spin.row(frame) += by_spin(back_q_, start).transpose();
-    adjoint_.end_spin.row(frame) += by_spin(forth_.end_q, end).transpose();
+    return cayley_spin(step.end_q.segment<3>(dof)).transpose().inverse() * Eigen::Map<const Vector3>(by);
   }
 
   using LocalVector = std::array<double, kMaxLocal>;

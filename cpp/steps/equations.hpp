@@ -102,9 +102,10 @@ class Equations {
   double dissipated(const StepData& data, const VectorX& change) const;
   bool loaded() const {
     return !loads().pieces.empty() || terms_.custom != nullptr ||
-           (problem_.parameters->joint_moment.array() != 0.0).any();
+           (problem_.parameters->joint_moment.array() != 0.0).any() ||
+           (problem_.parameters->tendon_tension.array() != 0.0).any();
   }
-  /// Of loads, motors of joints and custom forces in the last evaluation, per unknown.
+  /// Of loads, motors of joints, tendons and custom forces in the last evaluation, per unknown.
   void load_force(const StepData& data, VectorX& out) const;
 
   /// What solves left for those to come; the matrix where its factorisation may serve again.

@@ -22,6 +22,7 @@ struct CoefficientAdjoint {
   MatrixX3 loads;                                                          ///< by `Parameters::loads`
   VectorX spring_stiffness, spring_rest_length, spring_damping;            ///< per spring
   VectorX joint_stiffness, joint_rest_angle, joint_damping, joint_moment;  ///< per revolute joint
+  VectorX tendon_tension;                                                  ///< per tendon
   VectorX edge_mass;                          ///< of contacts, by line density times length
   double gravity_size = 0;                    ///< of contacts, by that of gravity [s^2/m]
   double fluid_viscosity = 0;                 ///< [1/(Pa s)]
@@ -60,6 +61,7 @@ struct CoefficientAdjoint {
         joint_rest_angle(joint_stiffness),
         joint_damping(joint_stiffness),
         joint_moment(joint_stiffness),
+        tendon_tension(VectorX::Zero(static_cast<Eigen::Index>(model.description.tendons.size()))),
         edge_mass(stretch_stiffness),
         obstacle_friction(rows_of_three(model.description.contact.obstacles.size())),
         pair_friction(rows_of_three(model.description.contact.pairs.size())),

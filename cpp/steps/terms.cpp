@@ -9,6 +9,7 @@
 #include "steps/joint_forces.hpp"
 #include "steps/load_forces.hpp"
 #include "steps/spring_forces.hpp"
+#include "steps/tendon_forces.hpp"
 
 namespace withe {
 
@@ -27,6 +28,7 @@ Terms make_terms(const Model& model, const Loads& loads, StepRule rule, bool exa
   if (!loads.pieces.empty()) applied = add(std::make_unique<LoadForces>(model, loads));
   if (!scene.springs.empty()) add(std::make_unique<SpringForces>(model));
   if (!model.joint_angles.empty()) add(std::make_unique<JointForces>(model));
+  if (!scene.tendons.empty()) add(std::make_unique<TendonForces>(model));
   if (std::any_of(model.supports.begin(), model.supports.end(),
                   [](const Support& s) { return s.active && s.yields(); }))
     terms.hands = add(std::make_unique<HandForces>(model));

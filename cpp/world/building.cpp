@@ -5,6 +5,7 @@
 
 #include "common/check.hpp"
 #include "common/text.hpp"
+#include "forces/tendon.hpp"
 #include "geometry/rotation.hpp"
 #include "model/edge_vectors.hpp"
 #include "steps/joint_forces.hpp"
@@ -375,7 +376,8 @@ void World::Implementation::orient_frame(int f, const Matrix3& free) {
     }
 }
 
-/// Forces on unknowns of frames and of hinges, `dofs`, of half stencils and joints, and their derivatives.
+/// Forces on unknowns of frames and of hinges, `dofs`, of half stencils, tendons and joints, and their
+/// derivatives.
 void World::Implementation::add_frame_forces(const std::vector<int>& dofs, VectorX& g, Eigen::MatrixXd& H) const {
   const auto place_of = [&](int dof) {
     const auto found = std::find(dofs.begin(), dofs.end(), dof);
@@ -399,6 +401,21 @@ void World::Implementation::add_frame_forces(const std::vector<int>& dofs, Vecto
       for (int j = 0; j <= n; ++j)
         if (place[j] >= 0) H(place[i], place[j]) += local.hessian[row + i][row + j];
     }
+  }
+  const auto add = [&](const int* own, int count, bool with_matrix) {
+    int place[kMaxLocal];
+    for (int i = 0; i < count; ++i) place[i] = place_of(own[i]);
+    for (int i = 0; i < count; ++i) {
+      if (place[i] < 0) continue;
+      g(place[i]) += local.gradient[i];
+      for (int k = 0; with_matrix && k < count; ++k)
+        if (place[k] >= 0) H(place[i], place[k]) += local.hessian[i][k];
+    }
+  };
+  for (const TendonSegment& segment : tendon_segments(model)) {
+    if (segment.seat[0].half < 0 && segment.seat[1].half < 0) continue;
+    tendon_local(model, segment, parameters.tendon_tension[segment.tendon], state.q, c, true, local);
+    add(segment.unknowns.dofs, segment.unknowns.size, true);
   }
   for (int j = 0; j < static_cast<int>(model.joint_angles.size()); ++j) {
     const JointAngle& joint = model.joint_angles[at(j)];

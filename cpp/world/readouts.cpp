@@ -5,6 +5,7 @@
 
 #include "common/check.hpp"
 #include "elasticity/stretch.hpp"
+#include "forces/tendon.hpp"
 #include "model/edge_vectors.hpp"
 #include "steps/joint_forces.hpp"
 #include "steps/spring_forces.hpp"
@@ -140,6 +141,29 @@ double World::spring_tension(int spring) const {
   const Implementation& self = *implementation_;
   require(spring >= 0 && spring < self.parameters.spring_stiffness.size(), "no such spring: ", spring);
   return withe::spring_tension(self.model, self.parameters, self.state.q, self.state.v, spring);
+}
+
+namespace {
+
+int checked_tendon(const Model& model, int tendon) {
+  require(tendon >= 0 && tendon < static_cast<int>(model.description.tendons.size()), "no such tendon: ", tendon);
+  return tendon;
+}
+
+}  // namespace
+
+double World::tendon_length(int tendon) const {
+  const Implementation& self = *implementation_;
+  double length = 0.0;
+  for (const TendonSegment& segment : tendon_segments(self.model))
+    if (segment.tendon == checked_tendon(self.model, tendon))
+      length += segment_length(self.model, segment, self.state.q, self.configuration());
+  return length;
+}
+
+MatrixX3 World::tendon_points(int tendon) const {
+  const Implementation& self = *implementation_;
+  return guide_points(self.model, checked_tendon(self.model, tendon), self.state.q, self.configuration());
 }
 
 double World::joint_angle(int joint) const {

@@ -12,9 +12,9 @@ namespace {
 constexpr int kMostSteps = 60;
 constexpr double kStiffer = 4.0;
 
-/// A quasi-static descent of elastic and contact energy, without friction, loads or weight: steps of backward Euler
-/// from rest, of a mass that makes them long against the rods' slowest modes, and contact that becomes stiffer until
-/// nothing overlaps. Supports hold.
+/// A quasi-static descent of elastic and contact energy, without friction, loads, tendons or weight: steps of backward
+/// Euler from rest, of a mass that makes them long against the rods' slowest modes, and contact that becomes stiffer
+/// until nothing overlaps. Supports hold.
 class Separation {
  public:
   Separation(const Model& model, const Parameters& parameters, const Options& options, const State& start)
@@ -63,6 +63,7 @@ class Separation {
   static Model without_loads(Model model) {
     SceneDescription& scene = model.description;
     scene.loads.clear();
+    scene.tendons.clear();
     scene.fluid = FluidDescription{};
     ContactDescription& contact = scene.contact;
     contact.friction = 0.0;

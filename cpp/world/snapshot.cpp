@@ -155,6 +155,11 @@ std::uint64_t fingerprint(const SceneDescription& scene) {
   w(static_cast<std::int64_t>(scene.springs.size()));
   for (const SpringDescription& spring : scene.springs)
     for (int node : spring.nodes) w(node);
+  if (!scene.tendons.empty()) w(static_cast<std::int64_t>(scene.tendons.size()));
+  for (const TendonDescription& tendon : scene.tendons) {
+    for (const auto& [rod, edge, place] : tendon.guides) w(rod), w(edge), w(static_cast<int>(place));
+    w(tendon.offsets);
+  }
   w(static_cast<int>(scene.fluid.model));
   w(scene.fluid.regularization);
   w(scene.fluid.wavelength);
@@ -319,6 +324,8 @@ void check_running(const World::Implementation& self) {
     require(v->allFinite() && (v->array() >= 0.0).all(), "snapshot is damaged: impossible joint");
   for (const VectorX* v : {&self.parameters.joint_rest_angle, &self.parameters.joint_moment})
     require(v->allFinite(), "snapshot is damaged: impossible joint");
+  require(self.parameters.tendon_tension.allFinite() && (self.parameters.tendon_tension.array() >= 0.0).all(),
+          "snapshot is damaged: impossible tendon");
   for (std::size_t s = 0; s < self.model.supports.size(); ++s) {
     const Support& support = self.model.supports[s];
     if (!support.active || !support.slides()) continue;

@@ -296,15 +296,17 @@ class World {
   /// and turn as the edges at them do on the mean. Throws std::invalid_argument, and changes nothing, where a support
   /// holds what would move, an edge has no length, or surfaces would overlap.
   void set_state(const std::vector<RodState>& rods, std::optional<double> time);
-  MatrixX9 directors(int rod) const;        ///< per edge
-  MatrixX2 curvatures(int rod) const;       ///< per stencil, of the smooth rod [1/m]
-  VectorX twists(int rod) const;            ///< per stencil [rad/m]
-  VectorX tensions(int rod) const;          ///< per edge, in the middle of the last step if by the midpoint rule [N]
-  double spring_tension(int spring) const;  ///< positive where it pulls; its damper's part included [N]
-  double joint_angle(int joint) const;      ///< of what turns, from how it is drawn, whole turns counted [rad]
-  double joint_rate(int joint) const;       ///< [rad/s]
-  double joint_torque(int joint) const;     ///< on what turns: of its motor, its stiffness and its damping [N m]
-  VectorX spins(int rod) const;             ///< per edge, angular velocity about the tangent [rad/s]
+  MatrixX9 directors(int rod) const;         ///< per edge
+  MatrixX2 curvatures(int rod) const;        ///< per stencil, of the smooth rod [1/m]
+  VectorX twists(int rod) const;             ///< per stencil [rad/m]
+  VectorX tensions(int rod) const;           ///< per edge, in the middle of the last step if by the midpoint rule [N]
+  double spring_tension(int spring) const;   ///< positive where it pulls; its damper's part included [N]
+  double tendon_length(int tendon) const;    ///< from its first guide to its last [m]
+  MatrixX3 tendon_points(int tendon) const;  ///< where its guides are [m]
+  double joint_angle(int joint) const;       ///< of what turns, from how it is drawn, whole turns counted [rad]
+  double joint_rate(int joint) const;        ///< [rad/s]
+  double joint_torque(int joint) const;      ///< on what turns: of its motor, its stiffness and its damping [N m]
+  VectorX spins(int rod) const;              ///< per edge, angular velocity about the tangent [rad/s]
   Energy energy() const;
   /// Of one rod: kinetic, stretch, bend, twist, gravity and their sum; what surrounds a joint belongs to the rods whose
   /// edges meet there. All rods together have what the scene has, but for loads, contact and the energy balance.

@@ -20,6 +20,8 @@ constexpr Words<LoadKind, 4> kLoadKinds{{{"force", LoadKind::force},
                                          {"distributed", LoadKind::distributed},
                                          {"pressure", LoadKind::pressure}}};
 
+constexpr Words<GuidePlace, 3> kGuidePlaces{
+    {{"start", GuidePlace::start}, {"middle", GuidePlace::middle}, {"end", GuidePlace::end}}};
 constexpr Words<Bending, 2> kBendings{{{"angle", Bending::angle}, {"tangent", Bending::tangent}}};
 constexpr Words<ContactLaw, 4> kContactLaws{{{"imcv2", ContactLaw::imcv2},
                                              {"imcv1", ContactLaw::imcv1},
@@ -175,6 +177,18 @@ void register_springs(py::module_& module) {
       .def_readwrite("damping", &SpringDescription::damping);
 }
 
+void register_tendons(py::module_& module) {
+  py::class_<TendonDescription>(module, "TendonDescription", "A tendon that runs through guides on edges.")
+      .def(py::init([](const std::vector<std::tuple<int, int, std::string>>& guides, const MatrixX2& offsets,
+                       double tension) {
+             TendonDescription tendon{.guides = {}, .offsets = offsets, .tension = tension};
+             for (const auto& [rod, edge, place] : guides)
+               tendon.guides.push_back({rod, edge, from_word(kGuidePlaces, place)});
+             return tendon;
+           }),
+           py::arg("guides"), py::arg("offsets"), py::arg("tension"));
+}
+
 }  // namespace
 
 void register_model(py::module_& module) {
@@ -182,6 +196,7 @@ void register_model(py::module_& module) {
   register_joints_and_supports(module);
   register_loads(module);
   register_springs(module);
+  register_tendons(module);
   register_contact(module);
   register_fluid(module);
   py::class_<SceneDescription> scene(module, "SceneDescription", "What the scene layer hands to the engine.");
@@ -195,6 +210,7 @@ void register_model(py::module_& module) {
       .def_readwrite("supports", &SceneDescription::supports)
       .def_readwrite("loads", &SceneDescription::loads)
       .def_readwrite("springs", &SceneDescription::springs)
+      .def_readwrite("tendons", &SceneDescription::tendons)
       .def_readwrite("has_custom_force", &SceneDescription::has_custom_force)
       .def_readwrite("custom_implicit", &SceneDescription::custom_implicit)
       .def_readwrite("custom_moments", &SceneDescription::custom_moments)

@@ -33,6 +33,7 @@ void register_gradients(py::module_& module) {
       .def_readonly("joint_rest_angle", &ParameterGradient::joint_rest_angle)
       .def_readonly("joint_damping", &ParameterGradient::joint_damping)
       .def_readonly("joint_moment", &ParameterGradient::joint_moment)
+      .def_readonly("tendon_tension", &ParameterGradient::tendon_tension)
       .def_readonly("fluid_viscosity", &ParameterGradient::fluid_viscosity)
       .def_readonly("friction", &ParameterGradient::friction)
       .def_readonly("slip_tolerance", &ParameterGradient::slip_tolerance)
@@ -442,6 +443,12 @@ void define_readouts(WorldClass& world) {
   world.def(
       "spring_tension", [](const GuardedWorld& self, int spring) { return self.reading().spring_tension(spring); },
       py::arg("spring"));
+  world.def(
+      "tendon_length", [](const GuardedWorld& self, int tendon) { return self.reading().tendon_length(tendon); },
+      py::arg("tendon"));
+  world.def(
+      "tendon_points", [](const GuardedWorld& self, int tendon) { return self.reading().tendon_points(tendon); },
+      py::arg("tendon"));
   world.def(
       "joint_angle", [](const GuardedWorld& self, int joint) { return self.reading().joint_angle(joint); },
       py::arg("joint"));

@@ -36,6 +36,7 @@ from withe.parts.handles import (
     Rod,
     Spring,
     Support,
+    Tendon,
 )
 from withe.parts.materials import Circle, Material, Rectangle, Stiffness, Tube
 from withe.recording.record import Record
@@ -84,6 +85,7 @@ __all__ = [
     "Statistics",
     "Stiffness",
     "Support",
+    "Tendon",
     "Tube",
     "__version__",
     "deployment",

@@ -52,6 +52,7 @@ __all__: list[str] = [
     "StraightRod",
     "SupportDescription",
     "Tape",
+    "TendonDescription",
     "Warnings",
     "World",
     "check_turns",
@@ -308,6 +309,19 @@ class SpringDescription:
     @stiffness.setter
     def stiffness(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
 
+class TendonDescription:
+    """
+    A tendon that runs through guides on edges.
+    """
+    def __init__(
+        self,
+        guides: collections.abc.Sequence[
+            tuple[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex, str]
+        ],
+        offsets: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 2]"],
+        tension: typing.SupportsFloat | typing.SupportsIndex,
+    ) -> None: ...
+
 class ObstacleDescription:
     """
     Something solid that does not move.
@@ -478,6 +492,10 @@ class SceneDescription:
     def supports(self) -> list[SupportDescription]: ...
     @supports.setter
     def supports(self, arg0: collections.abc.Sequence[SupportDescription]) -> None: ...
+    @property
+    def tendons(self) -> list[TendonDescription]: ...
+    @tendons.setter
+    def tendons(self, arg0: collections.abc.Sequence[TendonDescription]) -> None: ...
 
 class Options:
     """
@@ -613,6 +631,8 @@ class ParameterGradient:
     def spring_stiffness(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
     @property
     def stretch_stiffness(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    @property
+    def tendon_tension(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
     @property
     def twist_stiffness(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
     @property
@@ -1184,6 +1204,10 @@ class World:
         Supports that were released since rods have left them, and when [s].
         """
     def take_warnings(self) -> Warnings: ...
+    def tendon_length(self, tendon: typing.SupportsInt | typing.SupportsIndex) -> float: ...
+    def tendon_points(
+        self, tendon: typing.SupportsInt | typing.SupportsIndex
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
     def tensions(
         self, rod: typing.SupportsInt | typing.SupportsIndex
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...

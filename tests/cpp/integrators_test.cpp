@@ -182,6 +182,41 @@ TEST(Equations, MatrixIsExactWithMotorsSpringsAndDampersOfRevoluteJoints) {
         }
 }
 
+/// Along every rod there and back, at offsets that vary, and straight from the first rod's first edge to the last's
+/// last.
+void add_tendons(Model& model) {
+  SceneDescription& scene = model.description;
+  testing::RandomNumbers random(17);
+  const auto add = [&](const std::vector<TendonGuide>& guides, double tension) {
+    TendonDescription tendon{.guides = guides, .offsets = {}, .tension = tension};
+    tendon.offsets.resize(static_cast<Eigen::Index>(guides.size()), 2);
+    for (auto row : tendon.offsets.rowwise()) row = Vector2(0.3, -0.2).transpose() + 0.2 * random.vector(2).transpose();
+    scene.tendons.push_back(std::move(tendon));
+  };
+  const auto last_edge = [&](std::size_t rod) { return static_cast<int>(scene.rods[rod].rest_lengths.size()) - 1; };
+  for (std::size_t r = 0; r < scene.rods.size(); ++r) {
+    const int rod = static_cast<int>(r), last = last_edge(r);
+    std::vector<TendonGuide> guides = {{rod, 0, GuidePlace::start}};
+    for (int e = 0; e <= last; ++e) guides.push_back({rod, e});
+    guides.push_back({rod, last, GuidePlace::end});
+    add(guides, 7.0);
+    std::reverse(guides.begin(), guides.end());
+    add(guides, 4.0);
+  }
+  const std::size_t end = scene.rods.size() - 1;
+  add({{0, 0}, {static_cast<int>(end), last_edge(end)}}, 5.0);
+  add({{0, 0, GuidePlace::start}, {static_cast<int>(end), last_edge(end), GuidePlace::end}}, 5.0);
+}
+
+TEST(Equations, MatrixIsExactWithTendonsAlongRodsAndStraightAcross) {
+  for (Scheme scheme : kSchemes)
+    for (Case c : moving_cases({})) {
+      add_tendons(c.model);
+      expect_matrix_is_exact(c, scheme, 0.3);
+      expect_matrix_is_exact(c, scheme, 0.3, true);
+    }
+}
+
 void expect_exact_under_loads(bool planar) {
   for (Scheme scheme : kSchemes) {
     SceneBuilder builder;

@@ -49,6 +49,9 @@ class Drawn:
         damping = 0.0 if integrator == "fourth_order" else 0.5
         ends = self.arm.node(3), self.arm.node(9)
         self.spring = scene.add_spring(*ends, stiffness=20.0, rest_length=0.1, damping=damping)
+        self.tension = 0.4 * (radius / 1.5e-2) ** 4
+        offset = (0.0, radius) if planar else (0.6 * radius, 0.8 * radius)
+        self.tendon = scene.add_tendon(self.arm, offset=offset, tension=self.tension)
         self.simulation = scene.build(integrator=integrator, planar=planar or None, **TIGHT, **options)
 
     def vectors(self, random, count):
@@ -100,6 +103,7 @@ def settings(drawn, random):
     yield (drawn.mass, "mass"), 1.0, lambda h: sim.set(drawn.mass, mass=0.01 + h), 3e-6
     for word, value, size in (("stiffness", 20.0, 1e-2), ("rest_length", 0.1, 1e-4)):
         yield (drawn.spring, word), 1.0, lambda h, w=word, v=value: sim.set(drawn.spring, **{w: v + h}), size
+    yield (drawn.tendon, "tension"), 1.0, lambda h: sim.set(drawn.tendon, tension=drawn.tension + h), 1e-3
     if drawn.damping is not None:
         for word, value in drawn.HINGE.items():
             yield (drawn.hinge, word), 1.0, lambda h, w=word, v=value: sim.set(drawn.hinge, **{w: v + h}), 2e-2 * value

@@ -131,6 +131,9 @@ def add_supports_and_loads(scene, r, flat, a, b, varying, clamped):
         scene.add_mass(a.node(1), 1e-3, name="mass")
     if r.random() < 0.3:
         scene.add_drag(0.05, name="drag")
+    if r.random() < 0.3:
+        guides = r.choice([a, b, [a.start, a.edge(0), b.edge(-1), b.end]])
+        scene.add_tendon(guides, offset=(2e-3, 0.0 if flat else 1e-3), tension=r.uniform(0.0, 0.2), name="tendon")
     if varying and r.random() < 0.15:
         scene.add_custom_force(Wind())
     if varying and r.random() < 0.15:

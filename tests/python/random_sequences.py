@@ -82,6 +82,7 @@ def set_part(simulation, r):
     part, word, value = r.choice(
         [("mass", "mass", r.uniform(0, 0.01)), ("drag", "drag", r.uniform(0, 0.2)), ("force", "force", vector(r, 0.01)),
          ("fluid", "viscosity", r.uniform(0.1, 1)), ("force", "force", Wave(vector(r, 0.01), 40.0)),
+         ("tendon", "tension", r.uniform(0, 0.3)),
          ("joint", r.choice(["stiffness", "damping", "rest_angle", "moment"]), r.uniform(0, 0.01))]
     )  # fmt: skip
     simulation.set(part, **{word: value})

@@ -48,6 +48,7 @@ EXAMPLES = {
     "snake.py": (["--periods", "3"], r"Crawls at ([.\d]+) mm/s", 27.8, 28.7),
     "soft_limb.py": ([], r"tip ([.\d]+) mm off on the mean", 0.3, 0.7),
     "tapered_arm.py": ([], r"tapered: clearance off by ([.\d]+) mm", 0.0, 1.0),
+    "tendon_arm.py": (["--points", "4"], r"mm, ([.\d]+) mm off theory", 0.0, 0.05),
     "throwing_tip.py": ([], r"within ([.\d]+) mm of each point", 0.0, 1.0),
     "tie_knot.py": (["--knots", "trefoil", "--nodes", "80"], r"trefoil: tied (\d) of 1", 1, 1),
     "write_word.py": (["--nodes", "200", "--ways", "exact"], r"exact: ([.\d]+) mm off on the mean", 0.0, 2.5),

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.batch.lanes import Lanes, output
-from withe.parts.handles import Hand, Joint, NodeHandle, Obstacle, Rod, Spring, Support
+from withe.parts.handles import Hand, Joint, NodeHandle, Obstacle, Rod, Spring, Support, Tendon
 from withe.simulation.readouts import Energy, Momentum, Reaction, RodEnergy, Statistics
 
 __all__ = ["Reading"]
@@ -105,6 +105,14 @@ class Reading:
     def spring_tension(self, spring: Spring | str) -> FloatArray:
         """Axial force of a spring and its damper, pulling is positive, shape (n,) [N]."""
         return self._lanes.gathered(lambda s: s.spring_tension(spring))  # type: ignore[no-any-return]
+
+    def tendon_length(self, tendon: Tendon | str) -> FloatArray:
+        """From its first guide to its last, along a tendon, shape (n,) [m]."""
+        return self._lanes.gathered(lambda s: s.tendon_length(tendon))  # type: ignore[no-any-return]
+
+    def tendon_points(self, tendon: Tendon | str) -> FloatArray:
+        """Where the guides of a tendon are, shape (n, guides, 3) [m]."""
+        return self._lanes.gathered(lambda s: s.tendon_points(tendon))  # type: ignore[no-any-return]
 
     def joint_angle(self, joint: Joint | str) -> FloatArray:
         """By how much the second rod of a revolute joint has turned since it was drawn, shape (n,) [rad]."""

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from withe.common.outlines import Named, ObstacleOutline, RodOutline, SpringOutline
+from withe.common.outlines import Named, ObstacleOutline, RodOutline, SpringOutline, TendonOutline
 from withe.common.short_repr import ShortRepr
 
 __all__ = ["ENERGIES", "EnergyHistory", "Frames", "edges_to_nodes", "stencils_to_nodes"]
@@ -60,6 +60,10 @@ class Frames(Protocol):
 
     @property
     def springs(self) -> tuple[SpringOutline, ...]:
+        """In the order of the scene."""
+
+    @property
+    def tendons(self) -> tuple[TendonOutline, ...]:
         """In the order of the scene."""
 
     def positions(self, rod: Named | None = None) -> FloatArray:

@@ -1,14 +1,15 @@
-"""What pictures and files need to know of rods, obstacles and springs besides their motion."""
+"""What pictures and files need to know of rods, obstacles, springs and tendons besides their motion."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Named", "ObstacleOutline", "RodOutline", "SpringOutline", "index_of"]
+__all__ = ["Named", "ObstacleOutline", "RodOutline", "SpringOutline", "TendonOutline", "index_of"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -90,6 +91,43 @@ class SpringOutline:
 
     name: str
     rows: tuple[int, int]
+
+
+@dataclass(frozen=True)
+class TendonOutline:
+    """What pictures and read-outs need to know of a tendon besides the motion of its rods.
+
+    Attributes
+    ----------
+    name : str
+    guides : tuple of (int, int, float)
+        Of each guide: rod, among those of the scene, edge of the rod, and place along it, from 0 to 1.
+    offsets : ndarray of shape (guides, 2) [m]
+        Along the directors of its edge.
+    """
+
+    name: str
+    guides: tuple[tuple[int, int, float], ...]
+    offsets: FloatArray
+
+    def points(self, positions: Mapping[int, FloatArray], directors: Mapping[int, FloatArray]) -> FloatArray:
+        """Where its guides are, from nodes and directors of its rods.
+
+        Parameters
+        ----------
+        positions : mapping of int to ndarray of shape (..., nodes, 3) [m]
+            Of each rod with a guide.
+        directors : mapping of int to ndarray of shape (..., edges, 3, 3)
+
+        Returns
+        -------
+        ndarray of shape (..., guides, 3) [m]
+        """
+        points = []
+        for (rod, edge, share), offset in zip(self.guides, self.offsets, strict=True):
+            tail, head = (positions[rod][..., node % positions[rod].shape[-2], :] for node in (edge, edge + 1))
+            points.append((1.0 - share) * tail + share * head + offset @ directors[rod][..., edge, :2, :])
+        return np.stack(points, axis=-2)
 
 
 def index_of(outlines: tuple[RodOutline, ...] | tuple[ObstacleOutline, ...], handle: Named, what: str) -> int:

@@ -19,6 +19,7 @@ from withe.parts.kinds import (
     RodPart,
     SpringPart,
     SupportPart,
+    TendonPart,
     handle_of,
 )
 
@@ -33,6 +34,7 @@ _WORDS: dict[type[Any], str] = {
     LoadPart: "load",
     MassPart: "mass",
     SpringPart: "spring",
+    TendonPart: "tendon",
     DragPart: "drag",
     FluidPart: "fluid",
     CustomForcePart: "custom force",
@@ -134,7 +136,8 @@ class Directory:
             return handle_of(part, self.scene_id, self.layout)
         place = parse_place(name)
         if place is not None and place[1] == "edge":
-            return self.rods[self.rod(place[0]).index].edge(place[2])
+            rod, edge = self.edge(name, "name")
+            return self.rods[rod].edge(edge)
         (index, node), _ = self.node(name, "name")
         return self.rods[index].node(node)
 
@@ -160,6 +163,17 @@ class Directory:
         else:
             node = found.node(place[2])
         return (rod.index, node.index), node.name
+
+    def edge(self, handle: Handle | str, what: str = "edge") -> tuple[int, int]:
+        """The edge that a handle or a name such as "arm.edge(3)" stands for: rod, edge of the rod."""
+        name = self._name(handle, what)
+        place = parse_place(name)
+        if place is None or place[1] != "edge" or isinstance(handle, NodeHandle):
+            raise ValueError(f"{what} must be an edge of a rod, such as arm.edge(3), got {name!r:.80}")
+        rod = self.parts.get(place[0])
+        if not isinstance(rod, RodPart):
+            raise ValueError(f"{what} {name!r:.80} is not in the scene: it has no rod {place[0]!r:.80}")
+        return rod.index, Rod(self.scene_id, rod.name, self.layout, rod.index).edge(place[2]).index
 
     def row(self, node: Pass) -> int:
         """The row of a node in the positions of the scene."""

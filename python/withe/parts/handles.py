@@ -31,6 +31,7 @@ __all__ = [
     "RodPlace",
     "Spring",
     "Support",
+    "Tendon",
     "parse_place",
 ]
 
@@ -159,6 +160,11 @@ class Mass(Handle):
 @dataclass(frozen=True)
 class Spring(Handle):
     """A spring, with a damper beside it, between two nodes."""
+
+
+@dataclass(frozen=True)
+class Tendon(Handle):
+    """A tendon that runs through guides on rods."""
 
 
 @dataclass(frozen=True)

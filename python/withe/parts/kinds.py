@@ -25,6 +25,7 @@ from withe.parts.handles import (
     Rod,
     Spring,
     Support,
+    Tendon,
 )
 from withe.parts.parameters import RodParameters
 from withe.parts.sections import SectionProperties
@@ -40,6 +41,8 @@ __all__ = [
     "FluidPart",
     "FrictionModel",
     "Grasp",
+    "Guide",
+    "GuidePlace",
     "JoinPart",
     "LoadPart",
     "MassPart",
@@ -51,6 +54,7 @@ __all__ = [
     "RodPart",
     "SpringPart",
     "SupportPart",
+    "TendonPart",
     "handle_of",
 ]
 
@@ -64,6 +68,8 @@ Overlap = Literal["error", "separate"]
 FluidModel = Literal["stokeslets", "resistive"]
 LoadKind = Literal["force", "moment", "load", "pressure"]
 SupportKind = Literal["pin", "clamp", "hold_edge", "spinning_clamp", "spinning_edge", "hand"]
+GuidePlace = Literal["start", "middle", "end"]
+Guide = tuple[int, int, GuidePlace]  # of a tendon: rod, edge of the rod, where along it
 LOAD_KINDS: tuple[str, ...] = get_args(LoadKind)
 SUPPORT_KINDS: tuple[str, ...] = get_args(SupportKind)
 
@@ -194,6 +200,16 @@ class SpringPart:
 
 
 @dataclass(frozen=True, eq=False)
+class TendonPart:
+    """A tendon through guides on edges and ends of rods."""
+
+    name: str
+    guides: tuple[Guide, ...]
+    offsets: FloatArray  # of each guide along d1 and d2 of its edge, (guides, 2) [m]
+    tension: float  # [N]
+
+
+@dataclass(frozen=True, eq=False)
 class DragPart:
     """Viscous drag along rods; None: all of them."""
 
@@ -279,6 +295,7 @@ Part = (
     | LoadPart
     | MassPart
     | SpringPart
+    | TendonPart
     | DragPart
     | FluidPart
     | CustomForcePart
@@ -291,6 +308,7 @@ _HANDLES: dict[type[Any], type[Handle]] = {
     LoadPart: Load,
     MassPart: Mass,
     SpringPart: Spring,
+    TendonPart: Tendon,
     DragPart: Drag,
     FluidPart: Fluid,
     CustomForcePart: CustomForce,

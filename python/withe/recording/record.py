@@ -17,7 +17,7 @@ import numpy.typing as npt
 from withe import io, view
 from withe.common import validation
 from withe.common.frames import ENERGIES, EnergyHistory
-from withe.common.outlines import Named, ObstacleOutline, RodOutline, SpringOutline, index_of
+from withe.common.outlines import Named, ObstacleOutline, RodOutline, SpringOutline, TendonOutline, index_of
 
 __all__ = ["ROD_READOUTS", "EnergyHistory", "Record", "RunGradient"]
 
@@ -70,11 +70,13 @@ class Record:
         extras: Iterable[str] = (),
         obstacles: Iterable[ObstacleOutline] = (),
         springs: Iterable[SpringOutline] = (),
+        tendons: Iterable[TendonOutline] = (),
         derivatives: RunGradient | None = None,
     ) -> None:
         self._derivatives = derivatives
         self._rods = tuple(rods)
         self._springs = tuple(springs)
+        self._tendons = tuple(tendons)
         self._obstacles = tuple(obstacles)
         self._arrays = dict(arrays)
         self._extras = tuple(extras)
@@ -166,6 +168,13 @@ class Record:
         for spring in self._springs:
             if len(spring.rows) != 2 or not all(0 <= row < nodes for row in spring.rows):
                 raise ValueError(f"rows of spring {spring.name!r} must be two in 0..{nodes - 1}")
+        for tendon in self._tendons:
+            on_rods = all(
+                0 <= rod < len(self._rods) and 0 <= edge < self._rods[rod].edges and 0.0 <= share <= 1.0
+                for rod, edge, share in tendon.guides
+            )
+            if len(tendon.guides) < 2 or not on_rods or tendon.offsets.shape != (len(tendon.guides), 2):
+                raise ValueError(f"tendon {tendon.name!r} must have guides on edges, and an offset for each")
         for name in ENERGIES:
             self._array(f"energy_{name}", (frames,))
         for index, name in enumerate(self._extras):
@@ -206,6 +215,11 @@ class Record:
     def springs(self) -> tuple[SpringOutline, ...]:
         """Springs between nodes, in the order of the scene."""
         return self._springs
+
+    @property
+    def tendons(self) -> tuple[TendonOutline, ...]:
+        """Tendons through guides on rods, in the order of the scene."""
+        return self._tendons
 
     @property
     def units(self) -> dict[str, str]:
@@ -342,6 +356,10 @@ class Record:
                 for each in self._obstacles
             ],
             "springs": [{"name": each.name, "rows": list(each.rows)} for each in self._springs],
+            "tendons": [
+                {"name": each.name, "guides": [list(guide) for guide in each.guides], "offsets": each.offsets.tolist()}
+                for each in self._tendons
+            ],
         }
         arrays = dict(self._arrays)
         for index, rod in enumerate(self._rods):
@@ -382,9 +400,17 @@ class Record:
                 SpringOutline(str(each["name"]), (int(each["rows"][0]), int(each["rows"][1])))
                 for each in header.get("springs", [])  # likewise
             ]
+            tendons = [
+                TendonOutline(
+                    str(each["name"]),
+                    tuple((int(rod), int(edge), float(share)) for rod, edge, share in each["guides"]),
+                    np.array(each["offsets"], float),
+                )
+                for each in header.get("tendons", [])  # likewise
+            ]
             if "energy_spring" not in arrays:  # as in files from before there were springs
                 arrays["energy_spring"] = np.zeros(len(arrays["times"]))
-            return cls(rods, arrays, [str(name) for name in header["extras"]], obstacles, springs)
+            return cls(rods, arrays, [str(name) for name in header["extras"]], obstacles, springs, tendons)
         except (KeyError, IndexError, TypeError, ValueError) as error:
             raise ValueError(f"{path} is a damaged record: {error}") from error
 

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from withe.common import validation
 from withe.common.frames import ENERGIES
-from withe.common.outlines import ObstacleOutline, RodOutline, SpringOutline
+from withe.common.outlines import ObstacleOutline, RodOutline, SpringOutline, TendonOutline
 from withe.recording.record import ROD_READOUTS, Record, RunGradient
 
 __all__ = ["Recorder", "present"]
@@ -112,6 +112,8 @@ class Recorder(Generic[S]):
         Whose positions to record.
     springs : iterable of SpringOutline
         To be drawn between their nodes.
+    tendons : iterable of TendonOutline
+        To be drawn through their guides.
 
     Raises
     ------
@@ -125,10 +127,12 @@ class Recorder(Generic[S]):
         extra: Mapping[str, Callable[[S], npt.ArrayLike]] | None = None,
         obstacles: Iterable[ObstacleOutline] = (),
         springs: Iterable[SpringOutline] = (),
+        tendons: Iterable[TendonOutline] = (),
     ) -> None:
         self._simulation = simulation
         self._obstacles = tuple(obstacles)
         self._springs = tuple(springs)
+        self._tendons = tuple(tendons)
         self._extra = dict(extra or {})
         for name, function in self._extra.items():
             if not isinstance(name, str):
@@ -184,7 +188,7 @@ class Recorder(Generic[S]):
             arrays = {name: column.values(self._frames) for name, column in self._columns.items()}
         else:
             arrays = {name: values[None][:0].copy() for name, values in self._frame().items()}
-        return Record(self._rods, arrays, self._extra, self._obstacles, self._springs, self.derivatives)
+        return Record(self._rods, arrays, self._extra, self._obstacles, self._springs, self._tendons, self.derivatives)
 
 
 def _numbers(name: str, value: npt.ArrayLike) -> npt.NDArray[Any]:
@@ -200,10 +204,13 @@ def _numbers(name: str, value: npt.ArrayLike) -> npt.NDArray[Any]:
 
 
 def present(
-    simulation: Moving, obstacles: Iterable[ObstacleOutline] = (), springs: Iterable[SpringOutline] = ()
+    simulation: Moving,
+    obstacles: Iterable[ObstacleOutline] = (),
+    springs: Iterable[SpringOutline] = (),
+    tendons: Iterable[TendonOutline] = (),
 ) -> Record:
     """A record of one frame: the present state of a simulation."""
-    recorder = Recorder(simulation, None, obstacles, springs)
+    recorder = Recorder(simulation, None, obstacles, springs, tendons)
     recorder.capture()
     return recorder.record
 

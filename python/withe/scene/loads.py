@@ -12,9 +12,10 @@ from withe.common import validation
 from withe.common.keywords import keyword_hints
 from withe.parts.directory import Directory
 from withe.parts.fluid import make_fluid
-from withe.parts.handles import CustomForce, Drag, Fluid, Mass, NodeHandle, Rod, Spring
+from withe.parts.handles import CustomForce, Drag, Fluid, Mass, NodeHandle, Rod, Spring, Tendon
 from withe.parts.kinds import CustomForcePart, DragPart, FluidModel, MassPart
 from withe.parts.springs import make_spring
+from withe.parts.tendons import Guides, make_tendon
 
 __all__ = ["Loads"]
 
@@ -23,7 +24,7 @@ FloatArray = npt.NDArray[np.float64]
 
 @keyword_hints
 class Loads:
-    """Masses, springs, drag, custom forces and the fluid of a scene: methods of `Scene` that need its parts alone."""
+    """Masses, springs, tendons, drag, custom forces and the fluid: methods of `Scene` that need its parts alone."""
 
     _directory: Directory
 
@@ -82,6 +83,59 @@ class Loads:
         return cast(
             Spring, self._directory.add(make_spring(self._directory, a, b, stiffness, rest_length, damping, name))
         )
+
+    def add_tendon(
+        self,
+        guides: Guides,
+        *,
+        offset: npt.ArrayLike,
+        tension: float = 0.0,
+        name: str | None = None,
+    ) -> Tendon:
+        """Add a tendon that runs through guides on rods, without friction and without mass.
+
+        Its guides sit at their own offsets from the centreline, along the material directors of an edge, and turn with
+        it; at the end of a rod that is clamped, or rigid with a joint, with what holds it. From one guide to the next
+        the tendon runs straight; at the first and the last it is fixed. It pulls with the same tension T all along, so
+        that its forces are minus the gradient of T times its length [Rucker and Webster 2011, IEEE Trans. Robot. 27]:
+        straight beside a slender rod, at the offset h, it bends that with the moment T h. What it pulls at is the rods
+        alone: forces and moments of a whole tendon are in balance, as are those of a motor that sits at the base.
+        Nothing touches it, and it is never slack.
+
+        Parameters
+        ----------
+        guides : Rod, str, or iterable of EdgeHandle, NodeHandle or str
+            Of a rod: from its start through the middle of every edge to its end. Else edges, in the middle of each,
+            and ends of rods, in the order in which the tendon runs through them: disks of a robot, say.
+        offset : array_like of shape (2,) or (guides, 2) [m]
+            Of all guides, or of each, along d1 and d2.
+        tension : float [N]
+        name : str
+
+        Returns
+        -------
+        Tendon
+            `Simulation.set` changes its tension; `Simulation.tendon_length` and `tendon_points` read it. What it does
+            is in `energy().loads`, as the work of loads is.
+
+        Raises
+        ------
+        ValueError
+            Fewer than two guides, two in a row at one point, an inner node, a number that is not finite, or a tension
+            below zero.
+
+        Examples
+        --------
+        A tendon 6 mm beside the centreline, and one through four disks:
+
+        >>> tendon = scene.add_tendon(arm, offset=(6e-3, 0), tension=0.0, name="tendon")
+        >>> disks = [arm.start, arm.edge(9), arm.edge(19), arm.end]
+        >>> scene.add_tendon(disks, offset=(0, 6e-3), name="other")
+        Tendon(name='other')
+        >>> simulation = scene.build()
+        >>> simulation.set(tendon, tension=0.01)
+        """
+        return cast(Tendon, self._directory.add(make_tendon(self._directory, guides, offset, tension, name)))
 
     def add_drag(self, coefficient: float, *, rods: Iterable[Rod | str] | None = None, name: str | None = None) -> Drag:
         """Add viscous drag: a force per length against the velocity. Drags on one rod add up.

@@ -23,6 +23,7 @@ from withe.parts.kinds import (
     Part,
     RodPart,
     SpringPart,
+    TendonPart,
 )
 from withe.parts.parameters import ACTING_WORDS, NATURAL_WORDS
 from withe.parts.springs import SPRING_WORDS
@@ -352,7 +353,7 @@ class Ledger:
         elif isinstance(call.part, LoadPart) and call.part.name in epoch.session.settings.functions:
             return
         elif (
-            isinstance(call.part, LoadPart | MassPart)
+            isinstance(call.part, LoadPart | MassPart | TendonPart)
             or (isinstance(call.part, SpringPart) and word in SPRING_WORDS)
             or (isinstance(call.part, JoinPart) and word in JOINT_WORDS)
             or (isinstance(call.part, ObstaclePart) and word == "rolling_friction")
@@ -399,7 +400,7 @@ def _has_gradient(call: _Call, word: str) -> bool:
         return word in SCENE_WORDS
     if isinstance(call.part, FluidPart):
         return word == "viscosity"
-    return isinstance(call.part, RodPart | MassPart | SpringPart | JoinPart | DragPart)
+    return isinstance(call.part, RodPart | MassPart | SpringPart | TendonPart | JoinPart | DragPart)
 
 
 def _by_drag(epoch: _Epoch, part: DragPart, found: Any, *, initial: bool) -> float:

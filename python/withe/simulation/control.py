@@ -127,10 +127,10 @@ class Control:
             twist_stiffness, line_density, viscous_time, drag (numbers, or one an edge), natural_curvature,
             natural_twist, natural_stretch (natural over drawn length; see `set_natural_stretch`). Of a load: force,
             moment, load or pressure, constant or a function of time. Of a mass: mass. Of a spring: stiffness,
-            rest_length, damping. Of a revolute joint: stiffness, rest_angle, damping, moment, as `Scene.join` has them.
-            Of a drag: drag. Of a fluid: viscosity, and the regularization [m] of Stokeslets. Of an obstacle: friction,
-            as `Scene.add_floor` takes it, rolling_friction and restitution. Of two bodies: friction, as
-            `Scene.set_friction` takes it. Of a support: position, rotation, as `move` takes them, and the
+            rest_length, damping. Of a tendon: tension. Of a revolute joint: stiffness, rest_angle, damping, moment, as
+            `Scene.join` has them. Of a drag: drag. Of a fluid: viscosity, and the regularization [m] of Stokeslets. Of
+            an obstacle: friction, as `Scene.add_floor` takes it, rolling_friction and restitution. Of two bodies:
+            friction, as `Scene.set_friction` takes it. Of a support: position, rotation, as `move` takes them, and the
             friction of a ring. Of the scene: gravity, friction and restitution between rods, the slip_tolerance of
             friction, and the contact_stiffness [N/m], or None for one that follows the forces. See `set_restitution`
             and `set_contact_stiffness` for two bodies.

@@ -16,6 +16,7 @@ from withe.simulation.gradients import RunDerivatives
 from withe.simulation.obstacles import obstacle_outlines
 from withe.simulation.springs import spring_outlines
 from withe.simulation.stepping import Stepping
+from withe.simulation.tendons import tendon_outlines
 
 __all__ = ["Run"]
 
@@ -66,7 +67,13 @@ class Run(Generic[S]):
         self._until = until
         self._stepping = stepping
         directory = stepping.session.directory
-        self._recorder = Recorder(simulation, record, obstacle_outlines(directory), spring_outlines(directory))
+        self._recorder = Recorder(
+            simulation,
+            record,
+            obstacle_outlines(directory),
+            spring_outlines(directory),
+            tendon_outlines(directory),
+        )
         self._start = stepping.time
         self._ended = False
         self._differentiable = validation.truth(differentiable, "differentiable")

@@ -9,8 +9,8 @@ import numpy.typing as npt
 
 from withe.knots import link
 from withe.parts.contacts import contact_table
-from withe.parts.handles import Hand, Joint, NodeHandle, Obstacle, Rod, Spring, Support
-from withe.parts.kinds import ObstaclePart, RodPart, SpringPart
+from withe.parts.handles import Hand, Joint, NodeHandle, Obstacle, Rod, Spring, Support, Tendon
+from withe.parts.kinds import ObstaclePart, RodPart, SpringPart, TendonPart
 from withe.simulation.hands import (
     Deflection,
     HeldPose,
@@ -25,6 +25,7 @@ from withe.simulation.readouts import Energy, Momentum, Plan, Reaction, RodEnerg
 from withe.simulation.session import Session
 from withe.simulation.springs import spring_tension
 from withe.simulation.supports import find_support
+from withe.simulation.tendons import tendon_length, tendon_points
 
 __all__ = ["Measurements"]
 
@@ -110,6 +111,29 @@ class Measurements:
             Not a spring of this scene.
         """
         return spring_tension(self._session, self._session.directory.find(spring, SpringPart, "spring"))
+
+    def tendon_length(self, tendon: Tendon | str) -> float:
+        """From its first guide to its last, along a tendon [m]: what a motor that shortens it has to take in.
+
+        Forces are minus the gradient of the tension times this. Half an edge at a free end is straight, as in all of
+        the rod's energy: of an arc what is taken in is short by 1 / (2 edges) of itself there.
+
+        Raises
+        ------
+        ValueError
+            Not a tendon of this scene.
+        """
+        return tendon_length(self._session, self._session.directory.find(tendon, TendonPart, "tendon"))
+
+    def tendon_points(self, tendon: Tendon | str) -> FloatArray:
+        """Where the guides of a tendon are, shape (guides, 3) [m].
+
+        Raises
+        ------
+        ValueError
+            Not a tendon of this scene.
+        """
+        return tendon_points(self._session, self._session.directory.find(tendon, TendonPart, "tendon"))
 
     def joint_angle(self, joint: Joint | str) -> float:
         """By how much the second rod of a revolute joint has turned about its axis since it was drawn [rad].

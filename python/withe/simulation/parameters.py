@@ -9,7 +9,7 @@ import numpy as np
 from withe.common import validation
 from withe.parts.contacts import touching
 from withe.parts.description import added_mass, drag
-from withe.parts.handles import Drag, Fluid, Joint, Load, Mass, Obstacle, Rod, Spring, Support
+from withe.parts.handles import Drag, Fluid, Joint, Load, Mass, Obstacle, Rod, Spring, Support, Tendon
 from withe.parts.joints import JOINT_WORDS
 from withe.parts.kinds import (
     DragPart,
@@ -22,6 +22,7 @@ from withe.parts.kinds import (
     RodPart,
     SpringPart,
     SupportPart,
+    TendonPart,
 )
 from withe.parts.parameters import NATURAL_WORDS, ROD_WORDS, in_order_of_setting
 from withe.parts.rods import curvature_given, stretch_array, twist_array
@@ -42,6 +43,7 @@ from withe.simulation.surfaces import (
     set_pair_friction,
     set_scene,
 )
+from withe.simulation.tendons import set_tendon, tendon_tension
 
 __all__ = ["Settable", "get_value", "set_values"]
 
@@ -50,6 +52,7 @@ Settable = (
     | Load
     | Mass
     | Spring
+    | Tendon
     | Joint
     | Drag
     | Fluid
@@ -131,6 +134,9 @@ def _set_values(session: Session, part: Part | None, values: dict[str, Any]) -> 
     elif isinstance(part, SpringPart):
         _only(values, SPRING_WORDS, f"spring {part.name!r}")
         set_spring(session, part, values)
+    elif isinstance(part, TendonPart):
+        _only(values, ("tension",), f"tendon {part.name!r}")
+        set_tendon(session, part, values["tension"])
     elif isinstance(part, JoinPart) and part.axis is not None:
         _only(values, JOINT_WORDS, f"joint {part.name!r}")
         set_joint(session, part, values)
@@ -176,6 +182,8 @@ def get_value(session: Session, target: Settable | Support | str, word: str | No
         return session.settings.masses[part.name]
     elif isinstance(part, SpringPart) and word in SPRING_WORDS:
         return spring_value(session, part, word)
+    elif isinstance(part, TendonPart) and word == "tension":
+        return tendon_tension(session, part)
     elif isinstance(part, JoinPart) and part.axis is not None and word in JOINT_WORDS:
         return joint_value(session, part, word)
     elif isinstance(part, DragPart) and word == "drag":
@@ -250,6 +258,7 @@ def _words_of(part: Part) -> tuple[str, ...]:
     words: dict[type[Any], tuple[str, ...]] = {
         MassPart: ("mass",),
         SpringPart: SPRING_WORDS,
+        TendonPart: ("tension",),
         DragPart: ("drag",),
         FluidPart: _FLUID,
         ObstaclePart: (*OBSTACLE_WORDS, "position", "turn"),
@@ -259,9 +268,9 @@ def _words_of(part: Part) -> tuple[str, ...]:
 
 _SETTABLE = (
     "set takes rods (youngs_modulus, natural_curvature, ...), loads (force, moment, load), masses (mass), "
-    "springs (stiffness, rest_length, damping), revolute joints (stiffness, rest_angle, damping, moment), "
-    "drags (drag), fluids (viscosity, regularization), obstacles (friction, rolling_friction, restitution), supports "
-    "(position, rotation; of rings friction), and None for the scene "
+    "springs (stiffness, rest_length, damping), tendons (tension), revolute joints (stiffness, rest_angle, damping, "
+    "moment), drags (drag), fluids (viscosity, regularization), obstacles (friction, rolling_friction, restitution), "
+    "supports (position, rotation; of rings friction), and None for the scene "
     "(gravity, friction, slip_tolerance, restitution, contact_stiffness)"
 )
 

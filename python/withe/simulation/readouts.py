@@ -25,7 +25,7 @@ class Energy:
     ----------
     kinetic, stretch, bend, twist, gravity, contact, spring
     loads
-        Minus the work done by loads, motors of joints and custom forces since the start.
+        Minus the work done by loads, motors of joints, tendons and custom forces since the start.
     total
         Sum of the above.
     work

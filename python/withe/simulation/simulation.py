@@ -36,6 +36,7 @@ from withe.simulation.state_space import StateSpace
 from withe.simulation.states import restore_frame
 from withe.simulation.stepping import Stepping
 from withe.simulation.surfaces import find_friction_fields
+from withe.simulation.tendons import tendon_outlines
 
 __all__ = ["Simulation"]
 
@@ -420,4 +421,4 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
 
     def _frame(self) -> Record:
         directory = self._session.directory
-        return present(self, obstacle_outlines(directory), spring_outlines(directory))
+        return present(self, obstacle_outlines(directory), spring_outlines(directory), tendon_outlines(directory))

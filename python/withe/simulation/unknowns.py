@@ -12,7 +12,7 @@ import numpy.typing as npt
 from withe import _core
 from withe.parts.contacts import Body, BodyPair, touching
 from withe.parts.friction import as_given, by_given, obstacle_friction, own_friction, pair_between
-from withe.parts.handles import Drag, Fluid, Joint, Load, Mass, NodeHandle, Obstacle, Rod, Spring, Support
+from withe.parts.handles import Drag, Fluid, Joint, Load, Mass, NodeHandle, Obstacle, Rod, Spring, Support, Tendon
 from withe.parts.joints import JOINT_WORDS
 from withe.parts.kinds import (
     DragPart,
@@ -25,6 +25,7 @@ from withe.parts.kinds import (
     RodPart,
     SpringPart,
     SupportPart,
+    TendonPart,
 )
 from withe.parts.parameters import ACTING_WORDS, NATURAL_WORDS, ROD_WORDS, RodParameters
 from withe.parts.springs import SPRING_WORDS
@@ -33,6 +34,7 @@ from withe.simulation.joints import joint_index
 from withe.simulation.loads import load_rows
 from withe.simulation.motion import POSE_WORDS
 from withe.simulation.session import Session
+from withe.simulation.tendons import tendon_index
 
 __all__ = [
     "INITIAL_WORDS",
@@ -58,7 +60,10 @@ __all__ = [
 
 FloatArray = npt.NDArray[np.float64]
 Unknown = (
-    tuple[Rod | Load | Mass | Drag | Fluid | Spring | Joint | Support | Obstacle | str | tuple[Body, Body], str] | str
+    tuple[
+        Rod | Load | Mass | Drag | Fluid | Spring | Tendon | Joint | Support | Obstacle | str | tuple[Body, Body], str
+    ]
+    | str
 )
 """What to differentiate by: a part and a word of `set`, two bodies and "friction", or a word of the scene."""
 
@@ -152,6 +157,9 @@ def reader_of(session: Session, part: Part | BodyPair, word: str) -> Reader:
     if isinstance(part, SpringPart) and word in SPRING_WORDS:
         spring = session.scene.all(SpringPart).index(part)
         return lambda g: float(getattr(g.parameters, f"spring_{word}")[spring])
+    if isinstance(part, TendonPart) and word == "tension":
+        tendon = tendon_index(session, part)
+        return lambda g: float(g.parameters.tendon_tension[tendon])
     if isinstance(part, JoinPart) and part.axis is not None and word in JOINT_WORDS:
         joint = joint_index(session, part)
         return lambda g: float(getattr(g.parameters, f"joint_{word}")[joint])

@@ -13,6 +13,7 @@ from withe.common.frames import Frames
 from withe.common.keywords import keyword_hints
 from withe.common.outlines import ObstacleOutline, RodOutline
 from withe.view import scenery
+from withe.view.tendons import tendon_points
 
 __all__ = ["plot"]
 
@@ -24,7 +25,7 @@ def plot(record: Frames, *, shapes: int = 6) -> Any:
     """Draw the shapes of the rods at several times, and the energies over time.
 
     Obstacles near the rods are drawn too: in two dimensions planes as lines, spheres and capsules as outlines, in three
-    see-through. Those that move, and springs, are drawn at the same times as the rods, in the same colours.
+    see-through. Those that move, springs and tendons are drawn at the same times as the rods, in the same colours.
 
     Parameters
     ----------
@@ -124,6 +125,9 @@ def _plot_shapes(figure: Any, place: Any, record: Frames, count: int) -> Any:
             normal = np.eye(3)[2 if three else 3 - sum(shown)]
             points = scenery.zigzag(ends[frame], scenery.spring_width(ends), normal)
             axes.plot(*(points[:, shown] * factor).T, color=scale.to_rgba(times[frame]), linewidth=0.9)
+        for tendon in record.tendons:
+            points = tendon_points(record, tendon)[frame][:, shown] * factor
+            axes.plot(*points.T, color=scale.to_rgba(times[frame]), linewidth=0.9)
     nodes = positions.reshape(-1, 3)
     around = []
     for obstacle in record.obstacles:

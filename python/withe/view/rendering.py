@@ -20,6 +20,7 @@ from withe.view.graphics import render_window
 from withe.view.pinhole import Pinhole, check_pinhole, look_through, towards
 from withe.view.springs import SpringLines
 from withe.view.surfaces import Surface
+from withe.view.tendons import TendonLines
 
 __all__ = ["Stage"]
 
@@ -121,6 +122,7 @@ class Stage:
         self._add_shadow(pyvista)
         self._add_rods(pyvista, color_by)
         self._springs = SpringLines(pyvista, self.plotter, record, direction)
+        self._tendons = TendonLines(pyvista, self.plotter, record)
         self._ghosts: list[tuple[FloatArray, FloatArray]] = []
         for place in range(len(ghosts)):
             self._add_ghost(pyvista, [*ghosts, frame], place)
@@ -158,6 +160,7 @@ class Stage:
             self._obstacle_points += [surface + way] if surface is not None else []
         positions = self._mixed(self._positions, before, after, share)
         self._springs.show(positions)
+        self._tendons.show(before, after, share)
         for index, rod in enumerate(self._record.rods):
             nodes = positions[rod.rows]
             points, normals = self._surfaces[index].mesh(

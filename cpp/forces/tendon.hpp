@@ -1,0 +1,76 @@
+#pragma once
+/// A tendon runs without friction through guides on rods and has the same tension T [N] all along [Rucker and Webster
+/// 2011, IEEE Trans. Robot. 27]. A guide is at p = x + r with r = a d1 + b d2, x a place on an edge and (a, b) [m] an
+/// offset along the edge's material directors; at a rod's end that is rigid with a joint or a clamp it is on that. The
+/// tendon's forces are minus the gradient of T L, with its length L, a sum over pieces from one guide to the next:
+///   L = |p' - p|,   straight; or, between neighbours of one rod, with r = r' - r, s = t + t', p = s . r, B = p / |s|,
+///   L^2 = (l + A)^2 + r^2 - B^2,   A = 4 B / 3 - p / 6,
+/// l from the middle of an edge to that of the next, or to the wall. That is what a tendon beside the smooth rod has
+/// there: where edges turn by phi towards it, A is -h phi but for phi^5, B the chord -2 h sin(phi / 2), and r^2 - B^2
+/// is what twist and winding add. p' - p would be shorter by l phi^2 / 8, no less than h phi on coarse meshes.
+///
+/// Forces are those of a step between two configurations, as means (of A, B, p, 1 / |s|, vectors, L), which for both
+/// the same are the gradient. With a = l + A, b = 4 a / 3 - B and m = b / |s| - a / 6,
+///   on arms -+ (T / L) (r + m s),   on tangents (T / L) (m r - b p s / (|s| |s0| |s1|)),   along edges (T / L) a / 2
+/// are a discrete gradient, whose work is T times what the length changes by; straight, T D / L on arms. Moments are in
+/// balance, and in energy-momentum steps what carries vectors makes of its moment what works just that over its finite
+/// turn, see `MovingEdge` and `HingeArm`.
+///
+/// What carries a vector v with a force f on it has the moment m = v x f, and
+///   d^2 (v . f) = (f . w)(v . w) - (f . v) |w|^2 + m . d(w)
+/// as it turns by w. An edge turns by w = t x de / l + t (d theta + spin . de), so that
+///   m . d(w) = - 2 (m . (t x de)) (t . de) / l^2 + (m - (m . t) t) . de (d theta + spin . de) / l
+///              - (m . t) (spin . de)(bow . de).
+
+#include "elasticity/discrete_elements.hpp"
+
+namespace withe {
+
+/// What a guide sits on.
+struct GuideSeat {
+  int edge = 0;
+  double share = 0.5;  ///< along the edge, 0 at its tail
+  int half = -1;       ///< of the stencil between the edge and a frame: on what is attached there, not on the edge
+  double sign = 1.0;   ///< of the tangent along the tendon
+  Vector2 offset;      ///< along d1, d2; in a plane (normal x tangent, nothing) [m]
+};
+
+/// Where unknowns of what carries a guide are among those of its segment; -1: has none.
+struct GuideUnknowns {
+  int tail = -1, angle = -1, head = -1;   ///< of an edge
+  int node = -1, frame = -1, hinge = -1;  ///< of what is attached to a frame
+};
+struct SegmentUnknowns {
+  int size = 0, dofs[kMaxLocal];  ///< behind its size -1
+  GuideUnknowns guide[2];
+};
+
+/// A piece of a tendon from one guide to the next.
+struct TendonSegment {
+  int tendon = 0;
+  bool smooth = false;  ///< between neighbours of one rod
+  GuideSeat seat[2];
+  SegmentUnknowns unknowns;
+};
+
+/// All segments of all tendons, tendon by tendon.
+std::vector<TendonSegment> tendon_segments(const Model& model);
+
+/// Minus the forces of a segment's tension, and their derivatives, at q.
+void tendon_local(const Model& model, const TendonSegment& segment, double tension, const VectorX& q,
+                  const Configuration& c, bool with_matrix, Local& out);
+/// The same over an energy-momentum step; derivatives are by its middle. Rows of frames are moments.
+void discrete_tendon_local(const Model& model, const TendonSegment& segment, double tension, const DiscreteStep& step,
+                           bool with_matrix, Local& out);
+
+/// The moment on what carries a guide [N m], and the axis in space of the hinge that it turns about.
+Vector3 guide_moment(const Model& model, const TendonSegment& segment, int end, double tension, const VectorX& q,
+                     const Configuration& c);
+Vector3 guide_hinge_axis(const Model& model, const TendonSegment& segment, int end, const Configuration& c);
+
+/// L [m].
+double segment_length(const Model& model, const TendonSegment& segment, const VectorX& q, const Configuration& c);
+/// Where the guides of a tendon are, in the axes of space [m].
+MatrixX3 guide_points(const Model& model, int tendon, const VectorX& q, const Configuration& c);
+
+}  // namespace withe

@@ -1,0 +1,97 @@
+"""Tendons through guides on rods, and how the engine is told of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+import numpy.typing as npt
+
+from withe import _core
+from withe.common import validation
+from withe.parts.directory import Directory
+from withe.parts.handles import EdgeHandle, Handle, NodeHandle, Rod, parse_place
+from withe.parts.kinds import Guide, GuidePlace, RodPart, TendonPart
+
+__all__ = ["SHARES", "Guides", "checked_tension", "describe_tendons", "make_tendon"]
+
+FloatArray = npt.NDArray[np.float64]
+Guides = Rod | str | Iterable[EdgeHandle | NodeHandle | str]
+
+SHARES: dict[GuidePlace, float] = {"start": 0.0, "middle": 0.5, "end": 1.0}
+"""Where along its edge a guide is."""
+
+
+def make_tendon(
+    directory: Directory, guides: Guides, offset: npt.ArrayLike, tension: float, name: str | None
+) -> TendonPart:
+    """A tendon, checked; see `Scene.add_tendon`. Not yet in the directory."""
+    name = directory.new_name(name, "tendon")
+    places = _places(directory, guides, name)
+    if len(places) < 2:
+        raise ValueError(f"tendon {name!r} must have at least two guides, got {len(places)}")
+    given = validation.number_array(offset, f"offset of tendon {name!r}", (2,), (len(places), 2))
+    part = TendonPart(name, places, np.array(np.broadcast_to(given, (len(places), 2))), checked_tension(name, tension))
+    points = _drawn(directory, part)
+    for index, length in enumerate(np.linalg.norm(np.diff(points, axis=0), axis=1)):
+        if length <= 1e-12 * np.abs(points).max():
+            raise ValueError(
+                f"guides {index} and {index + 1} of tendon {name!r} must be apart, or it has no direction to pull in: "
+                f"both are at {points[index]}"
+            )
+    return part
+
+
+def checked_tension(name: str, value: float) -> float:
+    """A tension, which must be finite and not negative: a tendon pulls."""
+    return validation.non_negative(value, f"tension of tendon {name!r}")
+
+
+def describe_tendons(directory: Directory) -> list[_core.TendonDescription]:
+    """The tendons of a scene as the engine takes them."""
+    return [
+        _core.TendonDescription(list(part.guides), part.offsets, part.tension) for part in directory.all(TendonPart)
+    ]
+
+
+def _places(directory: Directory, guides: Guides, name: str) -> tuple[Guide, ...]:
+    if isinstance(guides, NodeHandle | EdgeHandle) or (isinstance(guides, str) and parse_place(guides) is not None):
+        raise ValueError(f"guides of tendon {name!r} must be a rod or several edges, got {guides!r:.80} alone")
+    if isinstance(guides, Handle | str):
+        return _along(directory.rod(guides, f"guides of tendon {name!r}"))
+    if not isinstance(guides, Iterable):
+        raise ValueError(
+            f"guides of tendon {name!r} must be a rod or edges such as arm.edge(3), got {type(guides).__name__}"
+        )
+    return tuple(_place(directory, guide, f"guide of tendon {name!r}") for guide in guides)
+
+
+def _along(rod: RodPart) -> tuple[Guide, ...]:
+    edges: list[Guide] = [(rod.index, edge, "middle") for edge in range(len(rod.lengths))]
+    if rod.closed:
+        return (*edges, edges[0])
+    return ((rod.index, 0, "start"), *edges, (rod.index, len(edges) - 1, "end"))
+
+
+def _place(directory: Directory, guide: EdgeHandle | NodeHandle | str, what: str) -> Guide:
+    place = parse_place(guide) if isinstance(guide, str) else None
+    if not (isinstance(guide, NodeHandle) or (place is not None and place[1] == "node")):
+        return (*directory.edge(guide, what), "middle")
+    (index, node), node_name = directory.node(guide, what)
+    rod = next(part for part in directory.all(RodPart) if part.index == index)
+    if rod.closed or node not in (0, len(rod.lengths)):
+        raise ValueError(f"{what} must be an edge, or an end of a rod, got {node_name!r}")
+    return (index, 0, "start") if node == 0 else (index, node - 1, "end")
+
+
+def _drawn(directory: Directory, part: TendonPart) -> FloatArray:
+    """Where the guides are drawn, shape (guides, 3) [m]."""
+    rods = directory.all(RodPart)
+    points = []
+    for (index, edge, place), offset in zip(part.guides, part.offsets, strict=True):
+        rod = next(rod for rod in rods if rod.index == index)
+        d1, t = rod.directors[edge], rod.tangents[edge]
+        ends = rod.points[[edge, (edge + 1) % len(rod.points)]]
+        share = SHARES[place]
+        points.append((1.0 - share) * ends[0] + share * ends[1] + offset[0] * d1 + offset[1] * np.cross(t, d1))
+    return np.array(points)
