@@ -376,7 +376,7 @@ void World::Implementation::orient_frame(int f, const Matrix3& free) {
     }
 }
 
-/// Forces on unknowns of frames and of hinges, `dofs`, of half stencils, tendons and joints, and their
+/// Forces on unknowns of frames and of hinges, `dofs`, of half stencils, tendons, moments and joints, and their
 /// derivatives.
 void World::Implementation::add_frame_forces(const std::vector<int>& dofs, VectorX& g, Eigen::MatrixXd& H) const {
   const auto place_of = [&](int dof) {
@@ -416,6 +416,13 @@ void World::Implementation::add_frame_forces(const std::vector<int>& dofs, Vecto
     if (segment.seat[0].half < 0 && segment.seat[1].half < 0) continue;
     tendon_local(model, segment, parameters.tendon_tension[segment.tendon], state.q, c, true, local);
     add(segment.unknowns.dofs, segment.unknowns.size, true);
+  }
+  for (const LoadPiece& piece : resolve_loads(model).pieces) {
+    if (piece.shape != LoadShape::frame_moment || piece.load < 0) continue;
+    int own[kMaxLocal];
+    const int count = load_dofs(model, piece, own);
+    load_local(model, state, state.q, c, piece, parameters.loads.row(piece.load), local);
+    add(own, count, false);  // whose derivatives at rest are antisymmetric
   }
   for (int j = 0; j < static_cast<int>(model.joint_angles.size()); ++j) {
     const JointAngle& joint = model.joint_angles[at(j)];

@@ -88,7 +88,7 @@ def test_arcs_have_the_curvature_of_theory_to_fourth_order_in_the_turn_of_an_edg
 
 @pytest.mark.parametrize("planar", [True, False])
 @pytest.mark.parametrize("place", ["start", "middle", "end"])
-@pytest.mark.parametrize("pulled", ["tendon"])
+@pytest.mark.parametrize("pulled", ["tendon", "moment", "follower"])
 def test_a_clamp_takes_hold_of_a_bent_rod_without_moving_it(pulled, place, planar):
     """Where a moment acts, or a tendon ends, the half edge between is bent as the rod is, which takes nothing."""
     scene = rods.weightless()
