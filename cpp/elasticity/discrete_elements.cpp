@@ -315,11 +315,11 @@ Eigen::Matrix<double, 7, 3> discrete_held_spin(const Model& model, const TurnCoe
   return out;
 }
 
-Eigen::Matrix<double, kMaxStencil, 3> discrete_half_spin(const Model& model, const TurnCoefficients& elastic,
-                                                         const DiscreteStep& step, int stencil) {
+Eigen::Matrix<double, kMaxLocal, 3> discrete_half_spin(const Model& model, const TurnCoefficients& elastic,
+                                                       const DiscreteStep& step, int stencil) {
   const FrameStencil& s = model.half[at(stencil)];
   const AttachedStep attached = attached_frame(model, step, stencil);
-  Eigen::Matrix<double, kMaxStencil, 3> out = Eigen::Matrix<double, kMaxStencil, 3>::Zero();
+  Eigen::Matrix<double, kMaxLocal, 3> out = Eigen::Matrix<double, kMaxLocal, 3>::Zero();
   out.topRows<7>() = discrete_held_spin(model, elastic, step, s.edge, attached);
   if (model.planar()) {
     const double by_turn = 0.5 * planar_attached_forces(elastic, step, s.edge, attached).frame_frame;
@@ -327,7 +327,7 @@ Eigen::Matrix<double, kMaxStencil, 3> discrete_half_spin(const Model& model, con
     return out;
   }
   Local unused;
-  clear(unused, kMaxStencil, true);
+  clear(unused, kMaxLocal, true);
   const AttachedMoments a = put_attached_edge(elastic, step, s.edge, attached, true, unused);
   const Mat3<double>& by_spin = attached.first ? a.m.by_a : a.m.by_b;
   for (int i = 0; i < 3; ++i)

@@ -67,7 +67,7 @@ Eigen::Matrix<double, 7, 3> discrete_held_spin(const Model& model, const TurnCoe
                                                const DiscreteStep& step, int edge, const AttachedStep& hold);
 /// Likewise, of the rows of a half stencil, as what is attached to its frame turns against it: no hinge's axis does.
 /// In a plane tail, head and frame, by the normal.
-Eigen::Matrix<double, kMaxStencil, 3> discrete_half_spin(const Model& model, const TurnCoefficients& elastic,
-                                                         const DiscreteStep& step, int stencil);
+Eigen::Matrix<double, kMaxLocal, 3> discrete_half_spin(const Model& model, const TurnCoefficients& elastic,
+                                                       const DiscreteStep& step, int stencil);
 
 }  // namespace withe

@@ -9,15 +9,17 @@
 
 namespace withe {
 
-constexpr int kMaxStencil = 11;  ///< unknowns of a stencil
-constexpr int kMaxLocal = 14;    ///< of any element: a tendon between edges that share no node has the most
+constexpr int kMaxLocal = 11;
 
-/// Numbers of one stencil. The Hessian is full and symmetric.
-struct Local {
+/// Numbers of one stencil, or of another element with that many unknowns at most.
+template <int size>
+struct LocalOf {
   double energy;
-  double gradient[kMaxLocal];
-  double hessian[kMaxLocal][kMaxLocal];
+  double gradient[size];
+  double hessian[size][size];  ///< full
 };
+/// Of a stencil; the Hessian is symmetric.
+using Local = LocalOf<kMaxLocal>;
 
 /// Stiffnesses and natural strains of every stencil, as they act in one evaluation.
 struct ElasticCoefficients {

@@ -179,7 +179,7 @@ void add_matrix(const Model& model, const TendonSegment& segment, double tension
 
 template <int width>
 void add_local(const Model& model, const TendonSegment& segment, double tension, const VectorX& q,
-               const Configuration& c, bool with_matrix, Local& out) {
+               const Configuration& c, bool with_matrix, TendonLocal& out) {
   const Segment now = segment_at(model, segment, q, c);
   out.energy = tension * now.length;
   Work<width> work(with_matrix);
@@ -206,7 +206,7 @@ void add_local(const Model& model, const TendonSegment& segment, double tension,
 }  // namespace
 
 void tendon_local(const Model& model, const TendonSegment& segment, double tension, const VectorX& q,
-                  const Configuration& c, bool with_matrix, Local& out) {
+                  const Configuration& c, bool with_matrix, TendonLocal& out) {
   if (segment.smooth)
     add_local<kSmooth>(model, segment, tension, q, c, with_matrix, out);
   else

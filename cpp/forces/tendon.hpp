@@ -26,6 +26,10 @@
 
 namespace withe {
 
+/// Two edges that share no node have most unknowns.
+constexpr int kTendonUnknowns = 14;
+using TendonLocal = LocalOf<kTendonUnknowns>;
+
 /// What a guide sits on.
 struct GuideSeat {
   int edge = 0;
@@ -41,7 +45,7 @@ struct GuideUnknowns {
   int node = -1, frame = -1, hinge = -1;  ///< of what is attached to a frame
 };
 struct SegmentUnknowns {
-  int size = 0, dofs[kMaxLocal];  ///< behind its size -1
+  int size = 0, dofs[kTendonUnknowns];  ///< behind its size -1
   GuideUnknowns guide[2];
 };
 
@@ -58,10 +62,10 @@ std::vector<TendonSegment> tendon_segments(const Model& model);
 
 /// Minus the forces of a segment's tension, and their derivatives, at q.
 void tendon_local(const Model& model, const TendonSegment& segment, double tension, const VectorX& q,
-                  const Configuration& c, bool with_matrix, Local& out);
+                  const Configuration& c, bool with_matrix, TendonLocal& out);
 /// The same over an energy-momentum step; derivatives are by its middle. Rows of frames are moments.
 void discrete_tendon_local(const Model& model, const TendonSegment& segment, double tension, const DiscreteStep& step,
-                           bool with_matrix, Local& out);
+                           bool with_matrix, TendonLocal& out);
 
 /// The moment on what carries a guide [N m], and the axis in space of the hinge that it turns about.
 Vector3 guide_moment(const Model& model, const TendonSegment& segment, int end, double tension, const VectorX& q,

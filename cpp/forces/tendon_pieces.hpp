@@ -68,7 +68,8 @@ struct Links {
 };
 
 template <int width>
-void put(const Model& model, const TendonSegment& segment, const Work<width>& work, bool with_matrix, Local& out) {
+void put(const Model& model, const TendonSegment& segment, const Work<width>& work, bool with_matrix,
+         TendonLocal& out) {
   const Links links(model, segment);
   const int size = segment.unknowns.size;
   std::fill(std::begin(out.gradient), std::end(out.gradient), 0.0);
@@ -77,7 +78,7 @@ void put(const Model& model, const TendonSegment& segment, const Work<width>& wo
     for (int i = 0; i < count; ++i) out.gradient[unknown + i] += factor * work.gradient(coordinate + i);
   }
   if (!with_matrix) return;
-  double by_unknowns[width][kMaxLocal];  // rows by coordinates
+  double by_unknowns[width][kTendonUnknowns];  // rows by coordinates
   for (int r = 0; r < width; ++r) {
     std::fill(by_unknowns[r], by_unknowns[r] + size, 0.0);
     for (int a = 0; a < links.count; ++a) {
@@ -85,7 +86,7 @@ void put(const Model& model, const TendonSegment& segment, const Work<width>& wo
       for (int i = 0; i < count; ++i) by_unknowns[r][unknown + i] += factor * work.hessian(r, coordinate + i);
     }
   }
-  std::fill(&out.hessian[0][0], &out.hessian[0][0] + kMaxLocal * kMaxLocal, 0.0);
+  std::fill(&out.hessian[0][0], &out.hessian[0][0] + kTendonUnknowns * kTendonUnknowns, 0.0);
   for (int a = 0; a < links.count; ++a) {
     const auto& [unknown, coordinate, count, factor] = links.link[a];
     for (int i = 0; i < count; ++i)

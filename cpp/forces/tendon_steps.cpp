@@ -71,7 +71,7 @@ struct WorkingTurn {
 
 template <int width>
 void add_discrete(const Model& model, const TendonSegment& segment, double tension, const DiscreteStep& step,
-                  bool with_matrix, Local& out) {
+                  bool with_matrix, TendonLocal& out) {
   const Segment before = segment_at_start(model, segment, step),
                 after = segment_at(model, segment, step.end_q, step.end);
   out.energy = 0.5 * tension * (before.length + after.length);
@@ -117,7 +117,7 @@ void add_discrete(const Model& model, const TendonSegment& segment, double tensi
 }  // namespace
 
 void discrete_tendon_local(const Model& model, const TendonSegment& segment, double tension, const DiscreteStep& step,
-                           bool with_matrix, Local& out) {
+                           bool with_matrix, TendonLocal& out) {
   if (segment.smooth)
     add_discrete<kSmooth>(model, segment, tension, step, with_matrix, out);
   else

@@ -12,10 +12,10 @@ void add_attachment(const StepProblem& problem, const StepData& data, const Asse
   double rows[kMaxLocal] = {};
   gather(assembler.half, h, discrete.rows(), rows);
   const auto add = [&](const DiscreteStep& way, const Configuration& c, const VectorX& q) {
-    const Eigen::Matrix<double, kMaxStencil, 3> by_spin =
+    const Eigen::Matrix<double, kMaxLocal, 3> by_spin =
         discrete_half_spin(model, half_coefficients(problem.elastic, h), way, h);
     by.attachment.row(h) +=
-        Eigen::Map<const Eigen::Matrix<double, 1, kMaxStencil>>(rows) * by_spin * attached_axes(model, c, q, h);
+        Eigen::Map<const Eigen::Matrix<double, 1, kMaxLocal>>(rows) * by_spin * attached_axes(model, c, q, h);
   };
   add(discrete.forth(), data.end_configuration, data.end);
   add(discrete.backwards(), problem.start_configuration, problem.start->q);

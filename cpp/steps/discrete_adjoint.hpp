@@ -78,17 +78,17 @@ class DiscreteAdjoint {
     return cayley_spin(step.end_q.segment<3>(dof)).transpose().inverse() * Eigen::Map<const Vector3>(by);
   }
 
-  using LocalVector = std::array<double, kMaxLocal>;
   /// q1 = 2 z - q0, and matrices of steps are twice derivatives by their ends. Returns those by the start and by the
   /// end.
-  template <class Evaluate>
-  std::pair<LocalVector, LocalVector> add_ends(const ElementTable& table, int element, const double* rows,
-                                               const Angles& angles, const Evaluate& evaluate) {
-    Local by_end, by_start;
+  template <int size = kMaxLocal, class Evaluate>
+  std::pair<std::array<double, size>, std::array<double, size>> add_ends(const ElementTable& table, int element,
+                                                                         const double* rows, const Angles& angles,
+                                                                         const Evaluate& evaluate) {
+    LocalOf<size> by_end, by_start;
     evaluate(forth_, by_end);
     evaluate(backwards_, by_start);
     const int* dofs = table.dofs(element);
-    LocalVector end{}, start{};
+    std::array<double, size> end{}, start{};
     for (std::size_t c = 0; c < static_cast<std::size_t>(table.width()); ++c) {
       for (int r = 0; r < table.width(); ++r) {
         end[c] += 0.5 * rows[r] * by_end.hessian[r][c];

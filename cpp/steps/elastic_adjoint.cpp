@@ -183,7 +183,7 @@ void add_half_turns(const StepProblem& problem, const StepData& data, int h, con
   Vector3 spin = Vector3::Zero(), start = spin, end = spin;
   const auto& rows = part.rows();
   for (int i = 0; i < count; ++i) {
-    for (int r = 0; r < (planar ? 5 : kMaxStencil); ++r) spin(i) += rows[r] * local.hessian[r][first + i];
+    for (int r = 0; r < (planar ? 5 : kMaxLocal); ++r) spin(i) += rows[r] * local.hessian[r][first + i];
     for (int s = 0; viscous && s < part.middle.count; ++s) {
       const double factor = kv.half_stiffness(h, s) * part.along(s);
       if (!middle) {

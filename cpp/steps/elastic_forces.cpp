@@ -216,8 +216,7 @@ void ElasticForces::add_discrete_gradient(const StepProblem& problem, StepData& 
     discrete_half_local(model, half_coefficients(problem.elastic, h), step, h, with_matrix, local);
     if (problem.exact && with_matrix && !model.planar()) {
       // Inertia turns the rows of frames, from derivatives by a Cayley vector to moments; these are moments already.
-      using FrameRows = Eigen::Matrix<double, 3, kMaxStencil, Eigen::RowMajor>;
-      Eigen::Map<FrameRows, 0, Eigen::OuterStride<kMaxLocal>> rows(&local.hessian[7][0]);
+      Eigen::Map<Eigen::Matrix<double, 3, kMaxLocal, Eigen::RowMajor>> rows(&local.hessian[7][0]);
       const int frame = model.frame_dof[at(model.half[at(h)].frame)];
       rows = (cayley_spin(data.z.segment<3>(frame)).transpose() * rows).eval();
     }

@@ -49,7 +49,7 @@ TendonForces::TendonForces(const Model& model) : segments_(tendon_segments(model
   for (const TendonSegment& segment : segments_) {
     dofs.insert(dofs.end(), std::begin(segment.unknowns.dofs), std::end(segment.unknowns.dofs));
   }
-  table_ = ElementTable(kMaxLocal, std::move(dofs));
+  table_ = ElementTable(kTendonUnknowns, std::move(dofs));
 }
 
 std::string TendonForces::note() const {
@@ -57,7 +57,7 @@ std::string TendonForces::note() const {
 }
 
 void TendonForces::evaluate(const StepProblem& problem, const StepData& data, int segment, double tension,
-                            bool with_matrix, Local& out) const {
+                            bool with_matrix, TendonLocal& out) const {
   const Model& model = problem.model;
   const TendonSegment& of = segments_[at(segment)];
   if (!problem.conserves_energy())
@@ -71,13 +71,13 @@ void TendonForces::evaluate(const StepProblem& problem, const StepData& data, in
   if (!problem.exact || !with_matrix || model.planar()) return;
   // Inertia turns the rows of frames, from derivatives by a Cayley vector to moments; these are moments already.
   for_each_frame(of, [&](int place) {
-    Eigen::Map<Eigen::Matrix<double, 3, kMaxLocal, Eigen::RowMajor>> rows(&out.hessian[place][0]);
+    Eigen::Map<Eigen::Matrix<double, 3, kTendonUnknowns, Eigen::RowMajor>> rows(&out.hessian[place][0]);
     rows = (cayley_spin(data.z.segment<3>(of.unknowns.dofs[place])).transpose() * rows).eval();
   });
 }
 
 void TendonForces::add(const StepProblem& problem, StepData& data, const Assembler&, std::span<double> values) const {
-  Local local;
+  TendonLocal local;
   for (int s = 0; s < table_.count(); ++s) {
     const double tension = problem.parameters->tendon_tension[segments_[at(s)].tendon];
     if (tension == 0.0) continue;
@@ -86,7 +86,7 @@ void TendonForces::add(const StepProblem& problem, StepData& data, const Assembl
     data.potential += local.energy;
     if (!problem.conserves_energy()) continue;
     const int* dofs = table_.dofs(s);
-    for (int i = 0; i < kMaxLocal; ++i)
+    for (int i = 0; i < kTendonUnknowns; ++i)
       if (dofs[i] >= 0) data.elastic_rows[dofs[i]] += local.gradient[i];
   }
 }
@@ -97,8 +97,8 @@ void TendonForces::add_adjoint(const StepProblem& problem, const StepData& data,
   std::optional<DiscreteAdjoint> discrete;
   if (problem.conserves_energy()) discrete.emplace(problem, data, adjoint);
   for (int s = 0; s < table_.count(); ++s) {
-    double rows[kMaxLocal];
-    Local local;
+    double rows[kTendonUnknowns];
+    TendonLocal local;
     gather(table_, s, adjoint.rows, rows);
     if (discrete) {
       // Rows of frames are moments.
@@ -109,7 +109,7 @@ void TendonForces::add_adjoint(const StepProblem& problem, const StepData& data,
     }
     evaluate(problem, data, s, 1.0, false, local);
     double& by_tension = adjoint.coefficients.tendon_tension[segments_[at(s)].tendon];
-    for (int i = 0; i < kMaxLocal; ++i) by_tension += rows[i] * local.gradient[i];
+    for (int i = 0; i < kTendonUnknowns; ++i) by_tension += rows[i] * local.gradient[i];
     if (problem.parameters->tendon_tension[segments_[at(s)].tendon] == 0.0) continue;
     if (discrete)
       add_discrete_adjoint(problem, data, s, *discrete, adjoint);
@@ -120,12 +120,12 @@ void TendonForces::add_adjoint(const StepProblem& problem, const StepData& data,
 
 /// By how frames that carry guides are turned beyond their unknowns, and what is attached to them.
 void TendonForces::add_frame_adjoint(const StepProblem& problem, const StepData& data, int segment,
-                                     const double (&rows)[kMaxLocal], StepAdjoint& adjoint) const {
+                                     const double (&rows)[kTendonUnknowns], StepAdjoint& adjoint) const {
   const Model& model = problem.model;
   const TendonSegment& of = segments_[at(segment)];
   const SegmentUnknowns& unknowns = of.unknowns;
   const double tension = problem.parameters->tendon_tension[of.tendon];
-  Local local;
+  TendonLocal local;
   tendon_local(model, of, tension, data.z, data.configuration, true, local);
   for (int k = 0; k < 2; ++k) {
     const GuideUnknowns& u = unknowns.guide[k];
@@ -156,11 +156,11 @@ void TendonForces::add_discrete_adjoint(const StepProblem& problem, const StepDa
   const TendonSegment& of = segments_[at(segment)];
   const SegmentUnknowns& unknowns = of.unknowns;
   const double tension = problem.parameters->tendon_tension[of.tendon];
-  double rows[kMaxLocal];
+  double rows[kTendonUnknowns];
   gather(table_, segment, discrete.rows(), rows);
-  const auto [start, end] = discrete.add_ends(
+  const auto [start, end] = discrete.add_ends<kTendonUnknowns>(
       table_, segment, rows, angles_of(of, unknowns),
-      [&](const DiscreteStep& way, Local& out) { discrete_tendon_local(model, of, tension, way, true, out); });
+      [&](const DiscreteStep& way, TendonLocal& out) { discrete_tendon_local(model, of, tension, way, true, out); });
   for (int k = 0; k < 2; ++k) {
     const GuideUnknowns& u = unknowns.guide[k];
     if (u.frame < 0) continue;
@@ -210,7 +210,7 @@ void TendonForces::add_rounding(const StepProblem& problem, StepData& data) cons
 
 void TendonForces::add_applied(const StepProblem& problem, const StepData& data, const Assembler&,
                                VectorX& force) const {
-  Local local;
+  TendonLocal local;
   for (int s = 0; s < table_.count(); ++s) {
     evaluate(problem, data, s, problem.parameters->tendon_tension[segments_[at(s)].tendon], false, local);
     const int* dofs = table_.dofs(s);
@@ -219,7 +219,7 @@ void TendonForces::add_applied(const StepProblem& problem, const StepData& data,
         Eigen::Map<Vector3> row(local.gradient + place);  // a moment
         row = (cayley_spin(data.z.segment<3>(dofs[place])).transpose() * row).eval();
       });
-    for (int i = 0; i < kMaxLocal; ++i)
+    for (int i = 0; i < kTendonUnknowns; ++i)
       if (dofs[i] >= 0) force[dofs[i]] -= local.gradient[i];
   }
 }

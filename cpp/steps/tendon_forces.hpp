@@ -24,10 +24,10 @@ class TendonForces final : public Term {
 
  private:
   void evaluate(const StepProblem& problem, const StepData& data, int segment, double tension, bool with_matrix,
-                Local& out) const;
+                TendonLocal& out) const;
 
-  void add_frame_adjoint(const StepProblem& problem, const StepData& data, int segment, const double (&rows)[kMaxLocal],
-                         StepAdjoint& adjoint) const;
+  void add_frame_adjoint(const StepProblem& problem, const StepData& data, int segment,
+                         const double (&rows)[kTendonUnknowns], StepAdjoint& adjoint) const;
   void add_discrete_adjoint(const StepProblem& problem, const StepData& data, int segment, DiscreteAdjoint& discrete,
                             StepAdjoint& adjoint) const;
 

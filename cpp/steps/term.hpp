@@ -60,8 +60,9 @@ class Term {
 };
 
 /// Adds what acts on one element to the rows, and to the matrix where one is wanted.
-inline void add_element(const ElementTable& table, int element, const Local& local, StepData& data,
-                        std::span<double> values) {
+template <int size>
+void add_element(const ElementTable& table, int element, const LocalOf<size>& local, StepData& data,
+                 std::span<double> values) {
   table.add_gradient(element, local.gradient, 1.0, data.gradient, data.row_magnitude);
   if (!values.empty()) table.add_hessian(element, local.hessian, 1.0, values);
 }
@@ -76,7 +77,8 @@ inline double work_of(const ElementTable& table, int element, const Local& local
 }
 
 /// What multiplies the rows of one element.
-inline void gather(const ElementTable& table, int element, const VectorX& rows, double (&out)[kMaxLocal]) {
+template <int size>
+void gather(const ElementTable& table, int element, const VectorX& rows, double (&out)[size]) {
   const int* dofs = table.dofs(element);
   for (int i = 0; i < table.width(); ++i) out[i] = dofs[i] >= 0 ? rows[dofs[i]] : 0.0;
 }

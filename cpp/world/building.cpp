@@ -402,27 +402,28 @@ void World::Implementation::add_frame_forces(const std::vector<int>& dofs, Vecto
         if (place[j] >= 0) H(place[i], place[j]) += local.hessian[row + i][row + j];
     }
   }
-  const auto add = [&](const int* own, int count, bool with_matrix) {
-    int place[kMaxLocal];
+  const auto add = [&](const int* own, int count, const auto& of, bool with_matrix) {
+    int place[kTendonUnknowns];
     for (int i = 0; i < count; ++i) place[i] = place_of(own[i]);
     for (int i = 0; i < count; ++i) {
       if (place[i] < 0) continue;
-      g(place[i]) += local.gradient[i];
+      g(place[i]) += of.gradient[i];
       for (int k = 0; with_matrix && k < count; ++k)
-        if (place[k] >= 0) H(place[i], place[k]) += local.hessian[i][k];
+        if (place[k] >= 0) H(place[i], place[k]) += of.hessian[i][k];
     }
   };
   for (const TendonSegment& segment : tendon_segments(model)) {
     if (segment.seat[0].half < 0 && segment.seat[1].half < 0) continue;
-    tendon_local(model, segment, parameters.tendon_tension[segment.tendon], state.q, c, true, local);
-    add(segment.unknowns.dofs, segment.unknowns.size, true);
+    TendonLocal pulled;
+    tendon_local(model, segment, parameters.tendon_tension[segment.tendon], state.q, c, true, pulled);
+    add(segment.unknowns.dofs, segment.unknowns.size, pulled, true);
   }
   for (const LoadPiece& piece : resolve_loads(model).pieces) {
     if (piece.shape != LoadShape::frame_moment || piece.load < 0) continue;
     int own[kMaxLocal];
     const int count = load_dofs(model, piece, own);
     load_local(model, state, state.q, c, piece, parameters.loads.row(piece.load), local);
-    add(own, count, false);  // whose derivatives at rest are antisymmetric
+    add(own, count, local, false);  // whose derivatives at rest are antisymmetric
   }
   for (int j = 0; j < static_cast<int>(model.joint_angles.size()); ++j) {
     const JointAngle& joint = model.joint_angles[at(j)];
