@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <tuple>
 #include <utility>
 
@@ -163,43 +164,38 @@ std::vector<TendonSegment> tendon_segments(const Model& model) {
 namespace {
 
 template <int width>
-void add_matrix(const Model& model, const TendonSegment& segment, double tension, const Segment& now, const VectorX& q,
-                const Configuration& c, Work<width>& work) {
-  const Changes<width> by(model, segment, now, q, c);
-  const Pull<width> pull(tension, now, now, &by);  // derivatives by one of two that are the same: half of all
-  work.hessian.noalias() += 2.0 * (by.arms.transpose() * pull.by_g);
-  if constexpr (width == kSmooth)
-    work.hessian.noalias() += 2.0 * (by.sum.transpose() * pull.by_y) + 4.0 * (by.span.transpose() * pull.by_axial);
-  for (int k = 0; k < 2; ++k) {
-    const Carried carried = carried_by(now, k, pull);
-    work.own(k) += segment.seat[k].half < 0 ? edge_curvature(now.guide[k].frame, by.turn[k], carried, pull.axial)
-                                            : frame_curvature(model, segment.seat[k], by.turn[k], carried, q, c);
-  }
-}
-
-template <int width>
 void add_local(const Model& model, const TendonSegment& segment, double tension, const VectorX& q,
                const Configuration& c, bool with_matrix, TendonLocal& out) {
   const Segment now = segment_at(model, segment, q, c);
   out.energy = tension * now.length;
+  std::optional<Changes<width>> by;
+  if (with_matrix) by.emplace(model, segment, now, q, c);
+  const Pull<width> pull(tension, now, now, by ? &*by : nullptr);
   Work<width> work(with_matrix);
-  const Pull<width> pull(tension, now, now, nullptr);
   for (int k = 0; k < 2; ++k) {
     const GuideSeat& seat = segment.seat[k];
-    const Vector3 m = carried_by(now, k, pull).moment;
+    const EdgeFrame<double>& e = now.guide[k].frame;
+    const Carried carried = carried_by(now, k, pull);
+    const Vector3& m = carried.moment;
     auto rows = work.gradient.template segment<kTurns>(kTurns * k);
     if (seat.half >= 0) {
       rows = turn_of(model, segment, k, now.guide[k], q, c).transpose() * m;
     } else {
-      const EdgeFrame<double>& e = now.guide[k].frame;
       const Vector3 t = to_eigen(e.tangent);
       const double about = m.dot(t);
       rows.template head<3>() = e.inverse_length * m.cross(t) + about * to_eigen(e.spin) + pull.axial * t;
       rows(3) = about;
     }
     if constexpr (width == kStraight) work.gradient.template segment<3>(kSmooth + 3 * k) = direction(k) * pull.g;
+    if (!by) continue;
+    work.own(k) += seat.half < 0 ? edge_curvature(e, by->turn[k], carried, pull.axial)
+                                 : frame_curvature(model, seat, by->turn[k], carried, q, c);
   }
-  if (with_matrix && now.length > 0.0) add_matrix(model, segment, tension, now, q, c, work);
+  if (by) {  // those of a pull are by one of two that are the same: half of all
+    work.hessian.noalias() += 2.0 * (by->arms.transpose() * pull.by_g);
+    if constexpr (width == kSmooth)
+      work.hessian.noalias() += 2.0 * (by->sum.transpose() * pull.by_y) + 4.0 * (by->span.transpose() * pull.by_axial);
+  }
   put(model, segment, work, with_matrix, out);
 }
 

@@ -190,11 +190,7 @@ void ElasticForces::add_discrete_gradient(const StepProblem& problem, StepData& 
   const Model& model = problem.model;
   const bool with_matrix = !values.empty();
   data.change = 2.0 * (data.z - problem.start->q);
-  const DiscreteStep step{.start = problem.start_configuration,
-                          .middle = data.configuration,
-                          .end = data.end_configuration,
-                          .end_q = data.end,
-                          .change = data.change};
+  const DiscreteStep step = discrete_step(problem, data);
   Local local;
   set_mean_axial_forces(problem, data);
   const StencilKernels& kernels = stencil_kernels();

@@ -185,11 +185,7 @@ HandForces::Grip HandForces::grip_over(const StepProblem& problem, const StepDat
 HandForces::Turn HandForces::put_discrete_turn(const StepProblem& problem, const StepData& data, const Held& held,
                                                bool with_matrix, Local& local) const {
   const Grip grip = grip_over(problem, data, held);
-  const DiscreteStep step{.start = problem.start_configuration,
-                          .middle = data.configuration,
-                          .end = data.end_configuration,
-                          .end_q = data.end,
-                          .change = data.change};
+  const DiscreteStep step = discrete_step(problem, data);
   const int edge = model_.supports[at(held.support)].touched[at(held.touched)].edge;
   return {discrete_held_local(model_, grip.elastic, step, edge, grip.attached, with_matrix, local), 0.0};
 }

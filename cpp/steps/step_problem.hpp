@@ -11,6 +11,7 @@
 ///   surfaces that press: along the mean of the ways between them, see contact/pressing.cpp.
 
 #include "contact/contact_linearisation.hpp"
+#include "elasticity/discrete_elements.hpp"
 #include "elasticity/elements.hpp"
 #include "forces/custom_forces.hpp"
 #include "forces/loads.hpp"
@@ -134,5 +135,14 @@ struct StepData {
   std::vector<Wrench> hands;           ///< per support: of those that yield on the rod, about the origin
   std::vector<TurningSlopes> turning;  ///< per edge, of an exact matrix in space
 };
+
+/// The step of an evaluation under the energy-momentum rule, from whose data it refers to.
+inline DiscreteStep discrete_step(const StepProblem& problem, const StepData& data) {
+  return {.start = problem.start_configuration,
+          .middle = data.configuration,
+          .end = data.end_configuration,
+          .end_q = data.end,
+          .change = data.change};
+}
 
 }  // namespace withe

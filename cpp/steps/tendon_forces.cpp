@@ -11,10 +11,10 @@ namespace withe {
 namespace {
 
 /// Angles of directors among the unknowns of a segment, in space.
-Angles angles_of(const TendonSegment& segment, const SegmentUnknowns& unknowns) {
+Angles angles_of(const TendonSegment& segment) {
   Angles out;
   for (int k = 0; k < 2; ++k) {
-    const int place = unknowns.guide[k].angle;
+    const int place = segment.unknowns.guide[k].angle;
     if (place < 0 || (out.count == 1 && out.place[0] == place)) continue;
     out.place[out.count] = place;
     out.edge[out.count++] = segment.seat[k].edge;
@@ -46,9 +46,8 @@ void check_differentiable(const StepProblem& problem, const TendonSegment& segme
 
 TendonForces::TendonForces(const Model& model) : segments_(tendon_segments(model)) {
   std::vector<int> dofs;
-  for (const TendonSegment& segment : segments_) {
+  for (const TendonSegment& segment : segments_)
     dofs.insert(dofs.end(), std::begin(segment.unknowns.dofs), std::end(segment.unknowns.dofs));
-  }
   table_ = ElementTable(kTendonUnknowns, std::move(dofs));
 }
 
@@ -62,12 +61,7 @@ void TendonForces::evaluate(const StepProblem& problem, const StepData& data, in
   const TendonSegment& of = segments_[at(segment)];
   if (!problem.conserves_energy())
     return tendon_local(model, of, tension, data.z, data.configuration, with_matrix, out);
-  const DiscreteStep step{.start = problem.start_configuration,
-                          .middle = data.configuration,
-                          .end = data.end_configuration,
-                          .end_q = data.end,
-                          .change = data.change};
-  discrete_tendon_local(model, of, tension, step, with_matrix, out);
+  discrete_tendon_local(model, of, tension, discrete_step(problem, data), with_matrix, out);
   if (!problem.exact || !with_matrix || model.planar()) return;
   // Inertia turns the rows of frames, from derivatives by a Cayley vector to moments; these are moments already.
   for_each_frame(of, [&](int place) {
@@ -159,7 +153,7 @@ void TendonForces::add_discrete_adjoint(const StepProblem& problem, const StepDa
   double rows[kTendonUnknowns];
   gather(table_, segment, discrete.rows(), rows);
   const auto [start, end] = discrete.add_ends<kTendonUnknowns>(
-      table_, segment, rows, angles_of(of, unknowns),
+      table_, segment, rows, angles_of(of),
       [&](const DiscreteStep& way, TendonLocal& out) { discrete_tendon_local(model, of, tension, way, true, out); });
   for (int k = 0; k < 2; ++k) {
     const GuideUnknowns& u = unknowns.guide[k];

@@ -154,10 +154,10 @@ int checked_tendon(const Model& model, int tendon) {
 
 double World::tendon_length(int tendon) const {
   const Implementation& self = *implementation_;
+  const int wanted = checked_tendon(self.model, tendon);
   double length = 0.0;
   for (const TendonSegment& segment : tendon_segments(self.model))
-    if (segment.tendon == checked_tendon(self.model, tendon))
-      length += segment_length(self.model, segment, self.state.q, self.configuration());
+    if (segment.tendon == wanted) length += segment_length(self.model, segment, self.state.q, self.configuration());
   return length;
 }
 

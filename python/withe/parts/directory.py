@@ -154,15 +154,12 @@ class Directory:
             place = parse_place(name)
         if place is None or place[1] != "node" or isinstance(handle, EdgeHandle):
             raise ValueError(f"{what} must be a node of a rod, such as arm.end or arm.node(3), got {name!r:.80}")
-        rod = self.parts.get(place[0])
-        if not isinstance(rod, RodPart):
-            raise ValueError(f"{what} {name!r:.80} is not in the scene: it has no rod {place[0]!r:.80}")
-        found = Rod(self.scene_id, rod.name, self.layout, rod.index)
+        found = self._rod_of(place[0], name, what)
         if isinstance(handle, str) and name.endswith((".start", ".end")):
             node = found.start if place[2] == 0 else found.end
         else:
             node = found.node(place[2])
-        return (rod.index, node.index), node.name
+        return (found.index, node.index), node.name
 
     def edge(self, handle: Handle | str, what: str = "edge") -> tuple[int, int]:
         """The edge that a handle or a name such as "arm.edge(3)" stands for: rod, edge of the rod."""
@@ -170,10 +167,15 @@ class Directory:
         place = parse_place(name)
         if place is None or place[1] != "edge" or isinstance(handle, NodeHandle):
             raise ValueError(f"{what} must be an edge of a rod, such as arm.edge(3), got {name!r:.80}")
-        rod = self.parts.get(place[0])
-        if not isinstance(rod, RodPart):
-            raise ValueError(f"{what} {name!r:.80} is not in the scene: it has no rod {place[0]!r:.80}")
-        return rod.index, Rod(self.scene_id, rod.name, self.layout, rod.index).edge(place[2]).index
+        rod = self._rod_of(place[0], name, what)
+        return rod.index, rod.edge(place[2]).index
+
+    def _rod_of(self, rod: str, name: str, what: str) -> Rod:
+        """The rod of the node or edge of a name."""
+        part = self.parts.get(rod)
+        if not isinstance(part, RodPart):
+            raise ValueError(f"{what} {name!r:.80} is not in the scene: it has no rod {rod!r:.80}")
+        return Rod(self.scene_id, part.name, self.layout, part.index)
 
     def row(self, node: Pass) -> int:
         """The row of a node in the positions of the scene."""

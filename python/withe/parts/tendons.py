@@ -9,16 +9,17 @@ import numpy.typing as npt
 
 from withe import _core
 from withe.common import validation
+from withe.common.outlines import TendonOutline
 from withe.parts.directory import Directory
 from withe.parts.handles import EdgeHandle, Handle, NodeHandle, Rod, parse_place
 from withe.parts.kinds import Guide, GuidePlace, RodPart, TendonPart
 
-__all__ = ["SHARES", "Guides", "checked_tension", "describe_tendons", "make_tendon"]
+__all__ = ["Guides", "checked_tension", "describe_tendons", "make_tendon", "outline_of"]
 
 FloatArray = npt.NDArray[np.float64]
 Guides = Rod | str | Iterable[EdgeHandle | NodeHandle | str]
 
-SHARES: dict[GuidePlace, float] = {"start": 0.0, "middle": 0.5, "end": 1.0}
+_SHARES: dict[GuidePlace, float] = {"start": 0.0, "middle": 0.5, "end": 1.0}
 """Where along its edge a guide is."""
 
 
@@ -45,6 +46,12 @@ def make_tendon(
 def checked_tension(name: str, value: float) -> float:
     """A tension, which must be finite and not negative: a tendon pulls."""
     return validation.non_negative(value, f"tension of tendon {name!r}")
+
+
+def outline_of(part: TendonPart) -> TendonOutline:
+    """What pictures and files keep of a tendon."""
+    guides = tuple((rod, edge, _SHARES[place]) for rod, edge, place in part.guides)
+    return TendonOutline(part.name, guides, part.offsets)
 
 
 def describe_tendons(directory: Directory) -> list[_core.TendonDescription]:
@@ -86,12 +93,9 @@ def _place(directory: Directory, guide: EdgeHandle | NodeHandle | str, what: str
 
 def _drawn(directory: Directory, part: TendonPart) -> FloatArray:
     """Where the guides are drawn, shape (guides, 3) [m]."""
-    rods = directory.all(RodPart)
-    points = []
-    for (index, edge, place), offset in zip(part.guides, part.offsets, strict=True):
-        rod = next(rod for rod in rods if rod.index == index)
-        d1, t = rod.directors[edge], rod.tangents[edge]
-        ends = rod.points[[edge, (edge + 1) % len(rod.points)]]
-        share = SHARES[place]
-        points.append((1.0 - share) * ends[0] + share * ends[1] + offset[0] * d1 + offset[1] * np.cross(t, d1))
-    return np.array(points)
+    rods = {rod.index: rod for rod in directory.all(RodPart)}
+    frames = {
+        index: np.stack([rod.directors, np.cross(rod.tangents, rod.directors), rod.tangents], axis=1)
+        for index, rod in rods.items()
+    }
+    return outline_of(part).points({index: rod.points for index, rod in rods.items()}, frames)

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from withe.common.outlines import TendonOutline
 from withe.parts.directory import Directory
 from withe.parts.kinds import TendonPart
-from withe.parts.tendons import SHARES, checked_tension
+from withe.parts.tendons import checked_tension, outline_of
 from withe.simulation.session import Session
 
 __all__ = ["set_tendon", "tendon_index", "tendon_length", "tendon_outlines", "tendon_points", "tendon_tension"]
@@ -45,7 +45,4 @@ def tendon_points(session: Session, part: TendonPart) -> FloatArray:
 
 def tendon_outlines(directory: Directory) -> list[TendonOutline]:
     """What records keep of tendons."""
-    return [
-        TendonOutline(part.name, tuple((rod, edge, SHARES[place]) for rod, edge, place in part.guides), part.offsets)
-        for part in directory.all(TendonPart)
-    ]
+    return [outline_of(part) for part in directory.all(TendonPart)]

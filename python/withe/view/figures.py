@@ -114,6 +114,7 @@ def _plot_shapes(figure: Any, place: Any, record: Frames, count: int) -> Any:
     late = colors.LinearSegmentedColormap.from_list("ink", colormaps["YlGnBu"](np.linspace(0.3, 1.0, 64)))
     end = times[-1] if times[-1] > times[0] else times[0] + 1.0
     scale = cm.ScalarMappable(colors.Normalize(times[0], end), late)
+    tendons = [tendon_points(record, tendon) for tendon in record.tendons]
     for frame in frames:
         for rod in record.rods:
             points = positions[frame, rod.rows][:, shown] * factor
@@ -125,9 +126,8 @@ def _plot_shapes(figure: Any, place: Any, record: Frames, count: int) -> Any:
             normal = np.eye(3)[2 if three else 3 - sum(shown)]
             points = scenery.zigzag(ends[frame], scenery.spring_width(ends), normal)
             axes.plot(*(points[:, shown] * factor).T, color=scale.to_rgba(times[frame]), linewidth=0.9)
-        for tendon in record.tendons:
-            points = tendon_points(record, tendon)[frame][:, shown] * factor
-            axes.plot(*points.T, color=scale.to_rgba(times[frame]), linewidth=0.9)
+        for points in tendons:
+            axes.plot(*(points[frame][:, shown] * factor).T, color=scale.to_rgba(times[frame]), linewidth=0.9)
     nodes = positions.reshape(-1, 3)
     around = []
     for obstacle in record.obstacles:
