@@ -1,9 +1,5 @@
 // Reactions are rows of the residual of what supports hold, as `World::reaction` makes forces and moments of them.
 
-#include <algorithm>
-#include <cmath>
-#include <stdexcept>
-
 #include <Eigen/Geometry>
 
 #include "geometry/rotation.hpp"
@@ -11,27 +7,9 @@
 #include "model/edge_vectors.hpp"
 
 namespace withe {
-/// The moments of energy-momentum steps that turn a support are those that do its work over a finite turn.
-void StepGradient::check_reactions() const {
-  const Model& model = equations_.model();
-  if (step_->rule != StepRule::energy_momentum) return;
-  constexpr double kRest = 1e-12;  // [rad]: what rounding makes of angles of hands that rest
-  const auto turns = [&](int dof) { return std::abs(step_->end[dof] - step_->start.q[dof]) > kRest; };
-  for (const Support& s : model.supports) {
-    if (!s.active) continue;
-    const bool turned = model.planar() ? s.frame >= 0 && turns(model.frame_dof[at(s.frame)])
-                                       : std::any_of(s.edges.begin(), s.edges.end(),
-                                                     [&](int edge) { return turns(model.edge_dof[at(edge)]); });
-    if (turned)
-      throw std::invalid_argument(
-          "no gradient is known of reactions of supports that turn in energy-momentum steps: take integrator "
-          "'implicit_midpoint' with adaptive=False, or 'backward_euler'");
-  }
-}
 
 void StepGradient::add_reactions(const ReactionAdjoint& reactions, StepAdjoint& adjoint) {
   const SupportAdjoint& by = reactions.by;
-  check_reactions();
   const Model& model = equations_.model();
   by_rows_.setZero(model.dof_count);
   const auto row = [&](const MatrixX3& table, std::size_t s) {
@@ -47,7 +25,12 @@ void StepGradient::add_reactions(const ReactionAdjoint& reactions, StepAdjoint& 
       add_reaction(model.supports[s], row(by.forces, s), row(by.moments, s));
   }
   by_rows_ = equations_.assembler().held_part(by_rows_);
-  if (model.planar()) return;
+  if (model.planar()) {
+    for (const Support& support : model.supports)
+      if (support.active && support.frame >= 0)
+        add_held_inertia(model.frame_dof[at(support.frame)], adjoint.coefficients);
+    return;
+  }
   for (const Support& support : model.supports) {
     if (!support.active) continue;
     if (support.frame >= 0) add_frame_reaction(model.frame_dof[at(support.frame)], adjoint.coefficients);
@@ -135,11 +118,11 @@ void StepGradient::add_frame_reaction(int dof, CoefficientAdjoint& coefficients)
         (u - J * u).cwiseProduct(equations_.problem().held_acceleration.segment<3>(dof));
 }
 
-/// Reactions take the inertia of what is held as M (v1 - v0) / dt, for that of finite turns in the rows of midpoint
-/// steps. Either is prescribed, but for the mass.
+/// Reactions take the inertia of what is held as M (v1 - v0) / dt, for that of finite turns in the rows of the midpoint
+/// rules. Either is prescribed, but for the mass.
 void StepGradient::add_held_inertia(int angle, CoefficientAdjoint& coefficients) const {
   const double inertia = equations_.mass().rows[angle];
-  if (step_->rule != StepRule::midpoint || inertia == 0.0) return;
+  if (!equations_.problem().in_middle() || inertia == 0.0) return;
   coefficients.mass[angle] +=
       by_rows_[angle] * (equations_.problem().held_acceleration[angle] - data_.inertia[angle] / inertia);
 }

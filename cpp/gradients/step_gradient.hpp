@@ -99,7 +99,6 @@ class StepGradient {
   Vector3 add_angle_reaction(int edge, const Vector3& arm, const Vector3& by_moment, const VectorX& held);
   void add_frame_reaction(int dof, CoefficientAdjoint& coefficients);
   void add_held_inertia(int angle, CoefficientAdjoint& coefficients) const;
-  void check_reactions() const;
   void solve();
   void add_transport(const StateAdjoint& state, const StepAdjoint& adjoint, VectorX& start) const;
   void add_frames(const StateAdjoint& state, const StepAdjoint& adjoint, VectorX& start) const;

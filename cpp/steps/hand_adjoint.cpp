@@ -20,10 +20,6 @@ Vector3 rows_of_point(const Model& model, const VectorX& rows, const TouchedEdge
          touched.place * node_vector(model, rows, model.edge_head[at(touched.edge)]);
 }
 
-AttachedStep reversed(const AttachedStep& step) {
-  return {step.end, step.start, step.end_strain, step.start_strain, step.first};
-}
-
 }  // namespace
 
 /// From derivatives by where forces act to those by both ends of the step.
@@ -135,8 +131,7 @@ void HandForces::add_adjoint(const StepProblem& problem, const StepData& data, c
                              StepAdjoint& adjoint) const {
   require(rings_.count() == 0, "no gradient is known of a rod that slides through a ring");
   std::optional<DiscreteAdjoint> discrete;
-  if (problem.conserves_energy()) discrete.emplace(problem, data, adjoint);
-  Columns3 by_stiffness = Columns3::Zero(table_.count(), 3), by_natural = by_stiffness;
+  if (problem.conserves_energy()) discrete.emplace(problem, data, adjoint.rows, adjoint);
   double rows[kMaxLocal];
   for (int k = 0; k < table_.count(); ++k) {
     const Held& held = held_[at(k)];
@@ -148,29 +143,41 @@ void HandForces::add_adjoint(const StepProblem& problem, const StepData& data, c
       add_pose(problem, held.support, Vector3::Zero(), by_turn, adjoint);
       continue;
     }
-    const Grip grip = grip_over(problem, data, held);
-    const AttachedStep back = reversed(grip.attached);
-    discrete->add_turning(
-        table_, k, grip.elastic, model_.planar() ? Angles{} : Angles{1, {3, 0}, {touched.edge, 0}}, -1,
-        [&](const DiscreteStep& way, const TurnCoefficients& of, bool with_matrix, Local& out) {
-          discrete_held_local(model_, of, way, touched.edge, &way == &discrete->forth() ? grip.attached : back,
-                              with_matrix, out);
-        },
-        by_stiffness, by_natural);
-    add_turn_stiffness(model_,
-                       problem.start->hands[at(held.support)].rotation *
-                           problem.start->hands[at(held.support)].edges[at(held.touched)],
-                       touched.share, by_stiffness.row(k).transpose(), held.support,
-                       adjoint.coefficients.hand_stiffness);
     gather(table_, k, discrete->rows(), rows);
-    const Eigen::Map<const Eigen::VectorXd> multiplied(rows, table_.width());
-    const auto by_spin = [&](const DiscreteStep& way, const AttachedStep& attached) -> Vector3 {
-      return discrete_held_spin(model_, grip.elastic, way, touched.edge, attached).topRows(table_.width()).transpose() *
-             multiplied;
-    };
-    adjoint.hands_end.rotations.row(held.support) += by_spin(discrete->forth(), grip.attached).transpose();
-    adjoint.hands.rotations.row(held.support) += by_spin(discrete->backwards(), back).transpose();
+    add_discrete_turn_adjoint(problem, data, k, rows, *discrete, adjoint);
   }
+}
+
+/// Of rows^T times what the turn between an edge and what the hand has grasped does to the edge, over an
+/// energy-momentum step. Returns its derivatives by the edge's unknowns at the end.
+std::array<double, kMaxLocal> HandForces::add_discrete_turn_adjoint(const StepProblem& problem, const StepData& data,
+                                                                    int element, const double* rows,
+                                                                    DiscreteAdjoint& discrete,
+                                                                    StepAdjoint& adjoint) const {
+  const Held& held = held_[at(element)];
+  const TouchedEdge& touched = model_.supports[at(held.support)].touched[at(held.touched)];
+  const HandState& hand = problem.start->hands[at(held.support)];
+  const Grip grip = grip_over(problem, data, held);
+  const AttachedStep& forth = grip.attached;
+  const AttachedStep back{forth.end, forth.start, forth.end_strain, forth.start_strain, forth.first};
+  Columns3 by_stiffness = Columns3::Zero(table_.count(), 3), by_natural = by_stiffness;
+  const DiscreteAdjoint::Turning turning = discrete.add_turning(
+      table_, element, rows, grip.elastic, grip.elastic,
+      model_.planar() ? Angles{} : Angles{1, {3, 0}, {touched.edge, 0}}, -1,
+      [&](const DiscreteStep& way, const TurnCoefficients& of, bool with_matrix, Local& out) {
+        discrete_held_local(model_, of, way, touched.edge, &way == &discrete.forth() ? forth : back, with_matrix, out);
+      },
+      by_stiffness, by_natural);
+  add_turn_stiffness(model_, hand.rotation * hand.edges[at(held.touched)], touched.share,
+                     by_stiffness.row(element).transpose(), held.support, adjoint.coefficients.hand_stiffness);
+  const Eigen::Map<const Eigen::VectorXd> multiplied(rows, table_.width());
+  const auto by_spin = [&](const DiscreteStep& way, const AttachedStep& attached) -> Vector3 {
+    return discrete_held_spin(model_, grip.elastic, way, touched.edge, attached).topRows(table_.width()).transpose() *
+           multiplied;
+  };
+  adjoint.hands_end.rotations.row(held.support) += by_spin(discrete.forth(), forth).transpose();
+  adjoint.hands.rotations.row(held.support) += by_spin(discrete.backwards(), back).transpose();
+  return turning.end;
 }
 
 /// s1 = s + u - c u at q1, c |K u| being the limit where it is reached; else s stays.

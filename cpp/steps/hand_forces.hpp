@@ -1,11 +1,14 @@
 #pragma once
 /// Hands that yield, see forces/hand.hpp: each holds every edge that it touches by a share of its stiffness.
 
+#include <array>
 #include <vector>
 
 #include "steps/ring_forces.hpp"
 
 namespace withe {
+
+class DiscreteAdjoint;
 
 class HandForces final : public Term {
  public:
@@ -70,6 +73,12 @@ class HandForces final : public Term {
                          StepAdjoint& adjoint) const;
   void add_moment_adjoint(const StepProblem& problem, const StepData& data, int element, const Vector3& by_moment,
                           StepAdjoint& adjoint, VectorX& by_z) const;
+  std::array<double, kMaxLocal> add_discrete_turn_adjoint(const StepProblem& problem, const StepData& data, int element,
+                                                          const double* rows, DiscreteAdjoint& discrete,
+                                                          StepAdjoint& adjoint) const;
+  void add_discrete_moment_adjoint(const StepProblem& problem, const StepData& data, int element,
+                                   const Vector3& by_moment, DiscreteAdjoint& discrete, StepAdjoint& adjoint,
+                                   VectorX& by_z) const;
   void add_planar_moment_adjoint(const StepProblem& problem, const StepData& data, int element, double by,
                                  StepAdjoint& adjoint, VectorX& by_z) const;
   Vector3 add_turn_adjoint(const StepProblem& problem, const StepData& data, int element, const double* rows,

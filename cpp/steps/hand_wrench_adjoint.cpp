@@ -2,10 +2,12 @@
 //   F = sum f,    M = sum ((x - p) x f + m),
 // where -f = G C(K u), and m is by what E changes as what is grasped turns.
 
-#include <stdexcept>
+#include <array>
+#include <optional>
 
 #include <Eigen/Geometry>
 
+#include "steps/discrete_adjoint.hpp"
 #include "steps/hand_piece.hpp"
 
 namespace withe {
@@ -13,10 +15,8 @@ namespace withe {
 void HandForces::add_wrench_adjoint(const StepProblem& problem, const StepData& data, int support,
                                     const Vector3& by_force, const Vector3& by_moment, StepAdjoint& adjoint,
                                     VectorX& by_z) const {
-  if (problem.conserves_energy())
-    throw std::invalid_argument(
-        "no gradient is known of what a hand that yields holds with in energy-momentum steps: take integrator "
-        "'implicit_midpoint' with adaptive=False, or 'backward_euler'");
+  std::optional<DiscreteAdjoint> discrete;
+  if (problem.conserves_energy()) discrete.emplace(problem, data, VectorX::Zero(model_.dof_count), adjoint);
   const Vector3 about = end_pose(problem, support).position;
   Vector3 force = Vector3::Zero();
   for (int k = 0; k < table_.count(); ++k) {
@@ -27,7 +27,9 @@ void HandForces::add_wrench_adjoint(const StepProblem& problem, const StepData& 
     force -= pull;
     add_shift_adjoint(problem, data, k, by_pull, adjoint);
     add_to_point(model_, p.touched, p.by.transpose() * by_pull - pull.cross(by_moment), by_z);
-    if (model_.planar())
+    if (discrete)
+      add_discrete_moment_adjoint(problem, data, k, by_moment, *discrete, adjoint, by_z);
+    else if (model_.planar())
       add_planar_moment_adjoint(problem, data, k, by_moment.dot(model_.plane->normal), adjoint, by_z);
     else
       add_moment_adjoint(problem, data, k, by_moment, adjoint, by_z);
@@ -96,6 +98,40 @@ void HandForces::add_planar_moment_adjoint(const StepProblem& problem, const Ste
   add_turn_stiffness(model_, p.shift.grip, p.touched.share,
                      {-by * planar_bend(measure, kappa, 0.0, 1.0).slope, 0.0, 0.0}, support,
                      adjoint.coefficients.hand_stiffness);
+}
+
+/// The moment m on the edge over an energy-momentum step: b . m is what its rows make of b x e on its vector, e that in
+/// the middle, and of b . t on its angle; see MovingEdge. The hand feels the opposite moment.
+void HandForces::add_discrete_moment_adjoint(const StepProblem& problem, const StepData& data, int element,
+                                             const Vector3& by_moment, DiscreteAdjoint& discrete, StepAdjoint& adjoint,
+                                             VectorX& by_z) const {
+  const Held& held = held_[at(element)];
+  const TouchedEdge& touched = model_.supports[at(held.support)].touched[at(held.touched)];
+  const EdgeFrame<double>& edge = data.configuration.edge[at(touched.edge)];
+  const Grip grip = grip_over(problem, data, held);
+  const bool planar = model_.planar();
+  const int n = model_.dimension, head = planar ? 2 : 4;
+  const Vector3 t = to_eigen(edge.tangent),  // in a plane, in its axes
+      b = planar ? Vector3(0.0, 0.0, -by_moment.dot(model_.plane->normal)) : Vector3(-by_moment),
+                apart = b.cross(t) / edge.inverse_length;
+  double rows[kMaxLocal] = {};
+  for (int i = 0; i < n; ++i) rows[head + i] = apart[i];
+  if (!planar) rows[3] = b.dot(t);
+  const std::array<double, kMaxLocal> end = add_discrete_turn_adjoint(problem, data, element, rows, discrete, adjoint);
+  const int* dofs = table_.dofs(element);
+  for (int i = 0; i < table_.width(); ++i) by_z[dofs[i]] += 2.0 * end[at(i)];
+  if (!planar) adjoint.middle_turn[touched.edge] += 2.0 * end[3];
+  // The rows follow the edge in the middle.
+  Local local;
+  discrete_held_local(model_, grip.elastic, discrete.forth(), touched.edge, grip.attached, false, local);
+  Vector3 force = Vector3::Zero();
+  for (int i = 0; i < n; ++i) force[i] = local.gradient[head + i];
+  Vector3 by_edge = force.cross(b);
+  if (!planar) by_edge += local.gradient[3] * edge.inverse_length * (b - b.dot(t) * t);
+  for (int i = 0; i < n; ++i) {
+    by_z[dofs[head + i]] += by_edge[i];
+    by_z[dofs[i]] -= by_edge[i];
+  }
 }
 
 }  // namespace withe

@@ -320,21 +320,17 @@ void set_working_change(const StepProblem& problem, const StepData& data, const 
   for (int e = 0; e < model.edge_count; ++e) working[model.edge_dof[at(e)]] /= mean_along_middle(problem, data, e);
 }
 
-void set_working_rows(const StepProblem& problem, const StepData& data, const VectorX& change, VectorX& rows) {
-  const auto ratio = [](double turn, double angle) { return std::abs(angle) < 1e-8 ? 1.0 : turn / angle; };
+double finite_turn_work(const StepProblem& problem, const StepData& data, const VectorX& change,
+                        const VectorX& working) {
+  double work = 0.0;
+  const auto add = [&](int dof) { work += data.elastic_rows[dof] * (working[dof] - change[dof]); };
   for (const Support& s : problem.model.supports) {
     if (!s.active) continue;
-    if (problem.model.planar() && s.frame >= 0) {
-      const int dof = problem.model.frame_dof[at(s.frame)];
-      rows[dof] += data.elastic_rows[dof] * (ratio(finite_turn(change[dof]), change[dof]) - 1.0);
-    }
+    if (problem.model.planar() && s.frame >= 0) add(problem.model.frame_dof[at(s.frame)]);
     if (problem.model.planar()) continue;
-    for (int edge : s.edges) {
-      const int dof = problem.model.edge_dof[at(edge)];
-      const double turn = finite_turn(change[dof]) / mean_along_middle(problem, data, edge);
-      rows[dof] += data.elastic_rows[dof] * (ratio(turn, change[dof]) - 1.0);
-    }
+    for (int edge : s.edges) add(problem.model.edge_dof[at(edge)]);
   }
+  return work;
 }
 
 }  // namespace withe

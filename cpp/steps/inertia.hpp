@@ -39,8 +39,8 @@ void set_velocity_rates(const Model& model, const VectorX& change, double dt, Ve
 /// What forces of an energy-momentum step do their work over: its change of the unknowns, but for angles and frames,
 /// whose torques and moments are those about where they are in the middle.
 void set_working_change(const StepProblem& problem, const StepData& data, const VectorX& change, VectorX& working);
-/// Makes of the rows of angles, after an energy-momentum step, what does the work over `change` that their torques
-/// do.
-void set_working_rows(const StepProblem& problem, const StepData& data, const VectorX& change, VectorX& rows);
+/// Work of elastic torques on what supports hold over the working change, less that over `change` itself [J].
+double finite_turn_work(const StepProblem& problem, const StepData& data, const VectorX& change,
+                        const VectorX& working);
 
 }  // namespace withe

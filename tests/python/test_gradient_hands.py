@@ -289,7 +289,7 @@ class Wrench:
 
 @pytest.mark.parametrize("kind", ["yielding", "slipping"])
 @pytest.mark.parametrize("planar", [True, False])
-@pytest.mark.parametrize("integrator", ["backward_euler", "implicit_midpoint", "fourth_order"])
+@pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_gradient_of_what_a_yielding_hand_holds_with_is_that_of_differences(integrator, planar, kind):
     if (kind, integrator) == ("slipping", "fourth_order"):
         pytest.skip("it goes back in time within each step, which hands that slip do not allow")
@@ -359,8 +359,6 @@ def test_what_has_no_gradient_with_hands_says_what_to_do():
         equilibrium.gradient(np.zeros((NODES, 3)), [(held.arm, "youngs_modulus")])
     moving = Held("yielding", planar=True)
     record = moving.run(differentiable=True)
-    with pytest.raises(ValueError, match="yields holds with in energy-momentum steps"):
-        record.gradient({"reaction_forces": {moving.hand: np.ones((7, 3)) * np.arange(7)[:, None]}}, ["gravity"])
     with pytest.raises(ValueError, match="has no force_limit to differentiate by"):
         record.gradient({"positions": np.zeros((7, NODES, 3))}, [(moving.hand, "force_limit")])
     rigid = Held("rigid", planar=True)

@@ -91,3 +91,28 @@ def test_poses_of_runs_that_have_no_gradient_say_what_to_do():
         record.gradient(moments, [(wall, "position")])
     with pytest.raises(ValueError, match="a step has no derivative by the pose"):
         sim.step_jacobian([(wall, "position")])
+
+
+@pytest.mark.parametrize("moves", [False, True])
+@pytest.mark.parametrize("planar", [True, False])
+@pytest.mark.parametrize("integrator", ["energy_momentum", "backward_euler"])
+def test_gradient_of_a_reaction_moment_by_the_pose_that_a_run_began_with_is_that_of_differences(
+    integrator, planar, moves
+):
+    run = Run(integrator, planar=planar, support="frame", moves=moves)
+    wall = run.drawn.wall
+    weights = np.random.default_rng(3).normal(size=(6, 3))
+    weights[0] = 0.0
+    moments = {"moment": lambda simulation: simulation.reaction(wall).moment}
+    record = run(differentiable=True, record=moments)
+    found = record.gradient({"reaction_moments": {wall: weights}}, [(wall, "position"), (wall, "rotation")])
+    for gradient, name, axis, size in (
+        (found[0], "offset", np.array([0.6, 0.0 if planar else 0.3, 0.7]), 1e-5),
+        (found[1], "turn", np.array([0.0, 1.0, 0.0] if planar else [0.3, 0.5, -0.4]), 1e-4),
+    ):
+
+        def of(h, name=name, axis=axis):
+            return float((weights * run(record=moments, **{name: h * axis})["moment"]).sum())
+
+        wide, near = ((of(h) - of(-h)) / (2.0 * h) for h in (2.0 * size, size))
+        assert gradient @ axis == pytest.approx((4.0 * near - wide) / 3.0, rel=1e-6), name

@@ -247,8 +247,9 @@ class Ledger:
         }
         if self._poses and not by_moves:
             raise ValueError(
-                "no gradient by the pose of a support or an obstacle is known of reaction moments under the midpoint "
-                "rules: take integrator='energy_momentum' or 'backward_euler'"
+                "no gradient of reaction moments by the pose of a support or an obstacle is available with "
+                "integrator='implicit_midpoint', nor in space with hold='edge': take integrator='energy_momentum' or "
+                "'backward_euler', and hold='frame'"
             )
         for place in self._poses:
             self.sums[place] = np.zeros(3)

@@ -37,11 +37,17 @@ __all__ = [
 FloatArray = npt.NDArray[np.float64]
 
 _DRIVES = 1e-11  # share of the work over any motion, above which work over a neutral one is no rounding
-# Their reactions have the inertia of what turns by other rates than their equations do.
-_OF_FINITE_TURNS = ("implicit_midpoint", "fourth_order")
 
 Loss = npt.ArrayLike | Mapping[str, Any]
 """Derivatives of a scalar: by positions of every node, or by words of read-outs; see `Equilibrium.gradient`."""
+
+
+def _rates_differ(session: Session) -> bool:
+    """Whether reactions hold the inertia of what supports turn by other rates than the equations do."""
+    if session.options.integrator == "implicit_midpoint":
+        return True
+    held = any(part.kind == "hold_edge" for part in session.directory.all(SupportPart))
+    return held and not session.world.plan.planar
 
 
 def equilibrium_gradient(session: Session, by: Loss, wrt: Sequence[Unknown]) -> list[Any]:
@@ -167,7 +173,7 @@ class RunDerivatives:
             kept,
             [unknown_reader(self._session, unknown) for unknown in kept],
             drawn=list(drawn.values()),
-            by_moves=not ("reaction_moments" in by and self._session.options.integrator in _OF_FINITE_TURNS),
+            by_moves=not ("reaction_moments" in by and _rates_differ(self._session)),
         )
         initial = self._tape.gradient(
             [_core.MomentAdjoint(steps, each) for steps, each in zip(self._steps, adjoints, strict=True)],
