@@ -11,6 +11,7 @@
 #include "integrators/step_parts.hpp"
 #include "steps/elastic_forces.hpp"
 #include "steps/inertia.hpp"
+#include "steps/pressure_gains.hpp"
 
 namespace withe {
 namespace {
@@ -177,8 +178,7 @@ namespace {
 /// Whether the step to q1 may stay: no edge turns by much, and contact found what it met.
 bool acceptable(Equations& equations, const StepPlan& plan, const State& state, const VectorX& q1, StepWorkspace& work,
                 StepResult& result) {
-  if (plan.watched) equations.find_gains(q1, work.newton.data, work.gains);
-  result.largest_turn = plan.watched ? work.gains.turn.maxCoeff() : largest_turn(equations.model(), state.q, q1);
+  result.largest_turn = largest_turn(equations.model(), state.q, q1);
   if (!q1.allFinite() || !(result.largest_turn <= 1.5)) return false;
   // Inertia takes the tangent of half a turn, and is the same for another turn more; friction and twist are not.
   if (plan.rule == StepRule::energy_momentum && farthest_turn(equations.model(), state.q, q1) >= std::numbers::pi)
@@ -207,23 +207,6 @@ void find_end_velocity(const Equations& equations, const StepPlan& plan, const S
   equations.assembler().set_held_part(work.held_velocity, v1);
 }
 
-/// Adds what kinetic energies grow by beyond the work of inertia: of what is free, as what is held goes as it is told.
-void add_kinetic_gains(const Equations& equations, const State& state, StepWorkspace& work) {
-  ComponentGains& gains = work.gains;
-  if (!gains.any_whole()) return;
-  const Model& model = equations.model();
-  VectorX &grown = work.difference, &mean = work.assumed, &way = work.working;
-  way = work.velocity - state.v;
-  multiply(model, equations.mass(), way, grown);
-  mean = 0.5 * (state.v + work.velocity);
-  way = work.change;
-  equations.assembler().project(mean);
-  equations.assembler().project(way);
-  for (int i = 0; i < model.dof_count; ++i)
-    if (const int own = model.dof_component[at(i)]; gains.whole[at(own)])
-      gains.energy[own] += mean[i] * grown[i] - work.newton.data.inertia[i] * way[i];
-}
-
 /// What acted, and what was lost; full residuals become minus the reactions. Returns what friction and restitution
 /// took [J].
 double account(Equations& equations, const Parameters& parameters, const StepPlan& plan, const State& state,
@@ -242,7 +225,7 @@ double account(Equations& equations, const Parameters& parameters, const StepPla
   }
   if (!equations.model().constraints.empty()) {
     work.assumed = data.inertia;
-    if (conserves) set_working_rows(equations.problem(), data, work.change, data.full_residual);
+    if (conserves) result.support_work += finite_turn_work(equations.problem(), data, work.change, work.working);
     add_support_work(equations, state.v, work.velocity, plan.dt, held_time(plan, state), work, result);
   }
   return contact_loss;
@@ -296,7 +279,9 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   const double rate = 1.0 / dt;
   work.mean = rate * work.change;
   find_end_velocity(equations, plan, state, work);
-  if (plan.watched) add_kinetic_gains(equations, state, work);
+  if (euler && options.adaptive)
+    find_pressure_gains(equations.problem(), work.newton.data, equations.assembler(), work.velocity,
+                        work.pressure_gains);
   const double contact_loss = account(equations, parameters, plan, state, q1, work, result);
   VectorX& acceleration = work.mean;
   acceleration = rate * (work.velocity - state.v);

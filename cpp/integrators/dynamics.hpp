@@ -20,7 +20,6 @@ struct StepPlan {
   StepRule rule = StepRule::midpoint;
   double dt = 0;  ///< [s]
   int slot = 0;
-  bool watched = false;  ///< whether `StepWorkspace::gains` are wanted; not of energy-momentum steps
 };
 
 struct StepResult {
@@ -42,7 +41,7 @@ struct StepWorkspace {
   HeldTarget held;
   VectorX z, move, change, working, mean, velocity, held_velocity, held_acceleration, assumed, difference,
       whole_acceleration;
-  ComponentGains gains;
+  VectorX pressure_gains;  ///< per component, of a backward Euler step under `adaptive` [J]
   Configuration after;
   State from, next;  ///< explicit steps
 };

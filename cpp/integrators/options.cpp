@@ -9,12 +9,12 @@ EquationOptions equation_options(const Options& options) {
         return StepRule::statics;
       case Integrator::backward_euler:
         return StepRule::backward_euler;
-      case Integrator::energy_momentum:
-        return StepRule::energy_momentum;
+      case Integrator::implicit_midpoint:
+        return StepRule::midpoint;
       case Integrator::verlet:
         return StepRule::verlet;
       default:
-        return StepRule::midpoint;
+        return StepRule::energy_momentum;
     }
   }();
   return {.rule = rule, .static_duration = options.time_step, .solver = options.solver};

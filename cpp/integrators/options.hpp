@@ -16,10 +16,9 @@ enum class LineSearch {
 };
 
 struct Options {
-  Integrator integrator = Integrator::implicit_midpoint;
+  Integrator integrator = Integrator::energy_momentum;
   double time_step = 5e-3;          ///< [s]
   bool adaptive = true;             ///< halve on failure, grow back
-  bool energy_guard = true;         ///< with `adaptive`: steps that gain energy from nowhere are taken otherwise
   std::optional<double> tolerance;  ///< [m], error-controlled steps
   std::optional<double> duration;   ///< [s], over which `tolerance` holds; else 1 s
   std::optional<bool> planar;       ///< nothing: decide
@@ -29,6 +28,7 @@ struct Options {
   double step_tolerance = 1e-9;   ///< Newton step, relative to the length of the scene
   double force_tolerance = 1e-8;  ///< residual, relative to the forces in the scene
   int max_iterations = 40;        ///< per Newton solve
+  std::optional<long> max_steps;  ///< inner steps in one time step under `tolerance`; nothing: see `kMaxWork`
   int max_halvings = 12;          ///< smallest step is time_step / 2^max_halvings
   Without heuristics;             ///< all are used but for measurements
 };

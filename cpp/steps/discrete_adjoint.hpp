@@ -16,7 +16,7 @@ namespace withe {
 /// start are those by the end of the step backwards.
 class DiscreteAdjoint {
  public:
-  DiscreteAdjoint(const StepProblem& problem, const StepData& data, StepAdjoint& adjoint)
+  DiscreteAdjoint(const StepProblem& problem, const StepData& data, const VectorX& rows, StepAdjoint& adjoint)
       : problem_(problem),
         adjoint_(adjoint),
         back_(-data.change),
@@ -24,7 +24,7 @@ class DiscreteAdjoint {
         start_(problem.start_configuration),
         forth_{problem.start_configuration, data.configuration, data.end_configuration, data.end, data.change, false},
         backwards_{data.end_configuration, data.configuration, start_, back_q_, back_, false},
-        rows_(adjoint.rows) {
+        rows_(rows) {
     const Model& model = problem.model;
     for (int dof : model.frame_dof) {
       if (model.planar()) break;
@@ -43,13 +43,27 @@ class DiscreteAdjoint {
     }
   }
 
-  /// `evaluate(step, k, with_matrix, local)`, with stiffnesses and natural strains `k`; `frame`: -1, or whose unknowns
-  /// are among the element's.
+  /// `evaluate(step, k, with_matrix, local)`, with stiffnesses and natural strains `k`: those of elasticity, by which
+  /// derivatives are found, or those that are `acting`; `frame`: -1, or whose unknowns are among the element's.
+  /// Returns what rows^T makes of a unit moment on each of the mean strains.
   template <class Evaluate>
-  void add_turning(const ElementTable& table, int i, const TurnCoefficients& k, const Angles& angles, int frame,
-                   const Evaluate& evaluate, Columns3& by_stiffness, Columns3& by_natural) {
+  std::array<double, 3> add_turning(const ElementTable& table, int i, const TurnCoefficients& k,
+                                    const TurnCoefficients& acting, const Angles& angles, int frame,
+                                    const Evaluate& evaluate, Columns3& by_stiffness, Columns3& by_natural) {
     double rows[kMaxLocal];
     gather(table, i, rows_, rows);
+    return add_turning(table, i, rows, k, acting, angles, frame, evaluate, by_stiffness, by_natural).along;
+  }
+
+  /// Derivatives of rows^T times what one element adds.
+  struct Turning {
+    std::array<double, 3> along{};        ///< by unit moments on the mean strains
+    std::array<double, kMaxLocal> end{};  ///< by its unknowns at the end of the step
+  };
+  template <class Evaluate>
+  Turning add_turning(const ElementTable& table, int i, const double* rows, const TurnCoefficients& k,
+                      const TurnCoefficients& acting, const Angles& angles, int frame, const Evaluate& evaluate,
+                      Columns3& by_stiffness, Columns3& by_natural) {
     const auto work = [&](const TurnCoefficients& of) {
       Local local;
       evaluate(forth_, of, false, local);
@@ -57,19 +71,23 @@ class DiscreteAdjoint {
       for (int r = 0; r < table.width(); ++r) sum += rows[r] * local.gradient[r];
       return sum;
     };
+    Turning out;
     for (int s = 0; s < (problem_.model.planar() ? 1 : 3); ++s) {
       TurnCoefficients unit{k.measure, {}, k.natural};
       (s == 0 ? unit.stiffness.x : s == 1 ? unit.stiffness.y : unit.stiffness.z) = 1.0;
       const double now = work(unit);
       by_stiffness(i, s) += now;
       (s == 0 ? unit.natural.x : s == 1 ? unit.natural.y : unit.natural.z) += 1.0;
-      by_natural(i, s) += k.stiffness[s] * (work(unit) - now);
+      out.along[at(s)] = now - work(unit);
+      by_natural(i, s) -= k.stiffness[s] * out.along[at(s)];
     }
-    const auto [start, end] = add_ends(table, i, rows, angles,
-                                       [&](const DiscreteStep& step, Local& local) { evaluate(step, k, true, local); });
-    if (frame < 0 || problem_.model.planar()) return;
+    const auto [start, end] = add_ends(
+        table, i, rows, angles, [&](const DiscreteStep& step, Local& local) { evaluate(step, acting, true, local); });
+    out.end = end;
+    if (frame < 0 || problem_.model.planar()) return out;
     adjoint_.start_spin.row(frame) += by_spin(backwards_, frame, start.data() + 7).transpose();
     adjoint_.end_spin.row(frame) += by_spin(forth_, frame, end.data() + 7).transpose();
+    return out;
   }
 
   /// From derivatives by a frame's Cayley vector at the end of a step to those by its rotation vector there.
@@ -103,9 +121,10 @@ class DiscreteAdjoint {
     return {start, end};
   }
 
-  /// Of ordinary stencils in space, all at once: `axial` and `modulus` per edge, see StencilBatch.
-  void add_regular(const Assembler& assembler, const ElasticCoefficients& k, const VectorX& axial,
-                   const VectorX& modulus, Columns3& by_stiffness, Columns3& by_natural) {
+  /// Of ordinary stencils in space, all at once, with the coefficients that act; `axial` and `modulus` per edge, see
+  /// StencilBatch. Returns what rows^T makes of a unit moment on each of the mean strains.
+  Columns3 add_regular(const Assembler& assembler, const ElasticCoefficients& k, const VectorX& axial,
+                       const VectorX& modulus) {
     const Model& model = problem_.model;
     StencilBatch batch = kernel_batch(assembler, k.measure, forth_.middle, k.bend_natural, k.bend_stiffness);
     batch.geometric = axial.data();
@@ -124,13 +143,9 @@ class DiscreteAdjoint {
     VectorX end = VectorX::Zero(model.dof_count + kPadding), start = end;
     kernels.momentum_product(batch, forth, rows_.data(), end.data());
     kernels.momentum_product(batch, back, rows_.data(), start.data());
-    const Columns3 strain = 0.5 * (measured_strains(k.measure, forth_.start) + measured_strains(k.measure, forth_.end));
-    for (int b : assembler.regular.stencil) {
-      by_stiffness.row(b) += (strain.row(b) - k.bend_natural.row(b)).cwiseProduct(along.row(b));
-      by_natural.row(b) -= k.bend_stiffness.row(b).cwiseProduct(along.row(b));
-    }
     adjoint_.start += (start - end).head(model.dof_count);
     for (int e = 0; e < model.edge_count; ++e) add_turn(e, start[model.edge_dof[at(e)]], end[model.edge_dof[at(e)]]);
+    return along;
   }
 
   const DiscreteStep& forth() const { return forth_; }

@@ -5,90 +5,13 @@
 // number, so what multiplies rows^T is (s - n) times `along` = rows^T g, and so on.
 
 #include "geometry/rotation.hpp"
-#include "steps/regular_stencils.hpp"
+#include "steps/strain_adjoint.hpp"
 
 namespace withe {
 namespace {
 
-/// Coefficients of bending and twisting in a step, and derivatives by them.
-struct TurningNumbers {
-  const Columns3 &stiffness, &natural;
-  const VectorX& viscous_time;
-  Columns3 &by_stiffness, &by_natural;
-  VectorX& by_time;
-  double rate;  ///< 1 / h; without viscosity 0
-  bool elastic;
-
-  /// `along`: rows^T times the strain's gradient; `change`: of the strain from the start, as viscosity takes it.
-  void add(Eigen::Index i, int s, double along, double strain, double change) const {
-    if (elastic) {
-      by_stiffness(i, s) += (strain - natural(i, s)) * along;
-      by_natural(i, s) -= stiffness(i, s) * along;
-    }
-    if (rate == 0.0) return;
-    by_stiffness(i, s) += rate * viscous_time(i) * change * along;
-    by_time(i) += rate * stiffness(i, s) * change * along;
-  }
-};
-
-/// One stencil's part: its strains in the configurations that matter, and what its numbers are.
-class StencilAdjoint {
- public:
-  StencilAdjoint(const StepProblem& problem, const ElementTable& table, int element, StepAdjoint& adjoint)
-      : problem_(problem), table_(table), element_(element), adjoint_(adjoint) {
-    gather(table, element, adjoint.rows, rows_);
-  }
-
-  StrainGradients middle, start, end;
-
-  double along(int strain) const {
-    double sum = 0.0;
-    for (int i = 0; i < table_.width(); ++i) sum += rows_[i] * middle.gradient[strain][i];
-    return sum;
-  }
-  const double (&rows() const)[kMaxLocal] { return rows_; }
-
-  /// By how much a strain has changed, as viscosity takes it.
-  double change(int strain) const {
-    return problem_.in_middle() ? 0.5 * (end.strain[strain] - start.strain[strain])
-                                : middle.strain[strain] - start.strain[strain];
-  }
-
-  /// Adds what follows from the start's strain, and from that at q1 = 2 z - q0; `viscous`: kv.
-  void add_start(int strain, double viscous) {
-    const double factor = viscous * along(strain), share = problem_.in_middle() ? 0.5 : 1.0;
-    add_configuration(start.gradient[strain], -share * factor, 1.0, adjoint_.start_turn);
-    if (problem_.in_middle()) add_configuration(end.gradient[strain], share * factor, -1.0, adjoint_.end_turn);
-  }
-
-  /// `gradient` in a configuration that q0 counts `by_start` times in.
-  void add_configuration(const double* gradient, double factor, double by_start, VectorX& turn) {
-    const int* dofs = table_.dofs(element_);
-    for (int i = 0; i < table_.width(); ++i)
-      if (dofs[i] >= 0) adjoint_.start[dofs[i]] += factor * by_start * gradient[i];
-    for (int i = 0; i < angles.count; ++i) turn[angles.edge[i]] += factor * gradient[angles.place[i]];
-  }
-
-  void add_turning(const TurningNumbers& numbers, const Columns3& viscous_stiffness) {
-    for (int s = 0; s < middle.count; ++s) {
-      const bool viscous = numbers.rate != 0.0;
-      numbers.add(element_, s, along(s), middle.strain[s], viscous ? change(s) : 0.0);
-      if (viscous) add_start(s, viscous_stiffness(element_, s));
-    }
-  }
-
-  Angles angles;
-
- private:
-  const StepProblem& problem_;
-  const ElementTable& table_;
-  int element_;
-  StepAdjoint& adjoint_;
-  double rows_[kMaxLocal];
-};
-
 /// Of stretching: EA (eps - n) and kv times the change of eps act along an edge.
-void add_stretch(const StepProblem& problem, const StepData& data, bool elastic, StepAdjoint& adjoint) {
+void add_stretch(const StepProblem& problem, const StepData& data, StepAdjoint& adjoint) {
   const Model& model = problem.model;
   const ElasticCoefficients &k = problem.elastic, &kv = problem.viscous;
   const bool viscous = problem.viscous_acts(), middle = problem.in_middle();
@@ -101,12 +24,10 @@ void add_stretch(const StepProblem& problem, const StepData& data, bool elastic,
     double along = 0.0;
     for (int i = 0; i < model.dimension; ++i)
       along += data.configuration.edge[at(e)].tangent[i] * (adjoint.rows[head + i] - adjoint.rows[tail + i]);
-    if (elastic) {
-      const double now = strain(data.configuration);
-      by.stretch_stiffness(e) += (now - k.stretch_natural(e)) * along;
-      by.stretch_natural(e) -= k.stretch_stiffness(e) * along;
-      by.rest_length(e) -= k.stretch_stiffness(e) * (1.0 + now) / length * along;
-    }
+    const double now = strain(data.configuration);
+    by.stretch_stiffness(e) += (now - k.stretch_natural(e)) * along;
+    by.stretch_natural(e) -= k.stretch_stiffness(e) * along;
+    by.rest_length(e) -= k.stretch_stiffness(e) * (1.0 + now) / length * along;
     if (!viscous) continue;
     const Configuration &start = problem.start_configuration,
                         &end = middle ? data.end_configuration : data.configuration;
@@ -122,22 +43,6 @@ void add_stretch(const StepProblem& problem, const StepData& data, bool elastic,
       adjoint.start[tail + i] -= by_start;
     }
   }
-}
-
-/// Sum of factors times gradients of strains f (kappa1, kappa2, tau), which are `strain`, of ordinary stencils in
-/// space.
-VectorX strain_forces(const Model& model, const Assembler& assembler, const BendMeasure& measure,
-                      const Configuration& c, const Columns3& strain, const Columns3& factors) {
-  // Of the energy k (s - n)^2 / 2 with s - n = 1.
-  const Columns3 natural = strain.array() - 1.0;
-  const VectorX none = VectorX::Zero(model.edge_count);
-  VectorX out = VectorX::Zero(model.dof_count + kPadding), magnitude = out;
-  StencilBatch batch = kernel_batch(assembler, measure, c, natural, factors);
-  batch.force = none.data();
-  batch.residual = out.data();
-  batch.magnitude = magnitude.data();
-  stencil_kernels().bend(batch);
-  return out;
 }
 
 /// Of ordinary stencils in space, all at once: see StencilAdjoint.
@@ -177,9 +82,9 @@ void add_half_turns(const StepProblem& problem, const StepData& data, int h, con
   const ElasticCoefficients& kv = problem.viscous;
   const bool viscous = problem.viscous_acts(), middle = problem.in_middle(), planar = model.planar();
   const int frame = model.half[at(h)].frame, first = planar ? 4 : 7, count = model.frame_size();
-  const ElasticCoefficients& acting = problem.conserves_energy() ? data.viscous : acting_coefficients(problem, data);
   Local local;
-  half_local(model, data.z, half_coefficients(acting, h), data.configuration, h, true, local);
+  half_local(model, data.z, half_coefficients(acting_coefficients(problem, data), h), data.configuration, h, true,
+             local);
   Vector3 spin = Vector3::Zero(), start = spin, end = spin;
   const auto& rows = part.rows();
   for (int i = 0; i < count; ++i) {
@@ -226,19 +131,15 @@ void add_half_turns(const StepProblem& problem, const StepData& data, int h, con
 void ElasticForces::add_adjoint(const StepProblem& problem, const StepData& data, const Assembler& assembler,
                                 StepAdjoint& adjoint) const {
   const Model& model = problem.model;
-  if (problem.conserves_energy()) {
-    add_discrete_adjoint(problem, data, assembler, adjoint);
-    if (!problem.viscous_acts()) return;
-  }
-  const bool elastic = !problem.conserves_energy();
+  if (problem.conserves_energy()) return add_discrete_adjoint(problem, data, assembler, adjoint);
   const ElasticCoefficients &k = problem.elastic, &kv = problem.viscous;
   const bool viscous = problem.viscous_acts(), middle = problem.in_middle();
   const double rate = problem.moves() ? 1.0 / problem.interval : 0.0;
   CoefficientAdjoint& by = adjoint.coefficients;
-  add_stretch(problem, data, elastic, adjoint);
-  const TurningNumbers numbers{k.bend_stiffness,     k.bend_natural,  problem.parameters->bend_viscous_time,
-                               by.bend_stiffness,    by.bend_natural, by.bend_time,
-                               viscous ? rate : 0.0, elastic};
+  add_stretch(problem, data, adjoint);
+  const TurningNumbers numbers{k.bend_stiffness,    k.bend_natural,  problem.parameters->bend_viscous_time,
+                               by.bend_stiffness,   by.bend_natural, by.bend_time,
+                               viscous ? rate : 0.0};
   if (!model.planar()) add_regular(problem, data, assembler, numbers, adjoint);
   for_each_single_bend(model, assembler, [&](int b) {
     StencilAdjoint part(problem, assembler.bend, b, adjoint);
@@ -256,13 +157,12 @@ void ElasticForces::add_adjoint(const StepProblem& problem, const StepData& data
 void ElasticForces::add_half_adjoint(const StepProblem& problem, const StepData& data, const Assembler& assembler,
                                      StepAdjoint& adjoint) const {
   const Model& model = problem.model;
-  const bool elastic = !problem.conserves_energy();
   const ElasticCoefficients &k = problem.elastic, &kv = problem.viscous;
   const bool viscous = problem.viscous_acts(), middle = problem.in_middle();
   CoefficientAdjoint& by = adjoint.coefficients;
   const TurningNumbers numbers{
-      k.half_stiffness, k.half_natural, problem.parameters->half_viscous_time,  by.half_stiffness,
-      by.half_natural,  by.half_time,   viscous ? 1.0 / problem.interval : 0.0, elastic};
+      k.half_stiffness, k.half_natural, problem.parameters->half_viscous_time, by.half_stiffness,
+      by.half_natural,  by.half_time,   viscous ? 1.0 / problem.interval : 0.0};
   for (int h = 0; h < static_cast<int>(model.half.size()); ++h) {
     StencilAdjoint part(problem, assembler.half, h, adjoint);
     half_gradients(model, data.z, k.measure, data.configuration, h, part.middle);
@@ -272,7 +172,7 @@ void ElasticForces::add_half_adjoint(const StepProblem& problem, const StepData&
     }
     part.angles = half_angles(model, h);
     part.add_turning(numbers, kv.half_stiffness);
-    if (elastic || viscous) add_half_turns(problem, data, h, part, adjoint);
+    add_half_turns(problem, data, h, part, adjoint);
   }
 }
 

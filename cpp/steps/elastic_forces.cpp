@@ -1,5 +1,6 @@
 #include "steps/elastic_forces.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "elasticity/discrete_elements.hpp"
@@ -31,8 +32,8 @@ StencilBatch regular_batch(const ElasticCoefficients& k, StepData& data, const A
 }  // namespace
 
 const ElasticCoefficients& acting_coefficients(const StepProblem& problem, const StepData& data) {
-  if (!problem.viscous_acts() || problem.conserves_energy()) return problem.elastic;
-  return problem.in_middle() ? data.damped : problem.damped;
+  if (!problem.viscous_acts()) return problem.elastic;
+  return problem.rule == StepRule::midpoint ? data.damped : problem.damped;
 }
 
 void ElasticForces::begin(StepProblem& problem) {
@@ -46,20 +47,19 @@ void ElasticForces::begin(StepProblem& problem) {
   add_coefficients(problem.viscous, problem.damped);
 }
 
-/// Configurations; and rates of strain of a step under the midpoint rules, from its ends. The Jacobian takes those of
-/// its middle instead. Discrete gradients ask for no strains in the middle.
+/// Configurations; and rates of strain of a midpoint step, from its ends. The Jacobian takes those of its middle
+/// instead. Discrete gradients need no strains in the middle.
 void ElasticForces::find(const StepProblem& problem, StepData& data, Assembler&, bool) {
   const Model& model = problem.model;
-  const bool viscous = problem.viscous_acts() && problem.in_middle();
-  (problem.conserves_energy() && !viscous ? compute_frames : compute_configuration)(model, *problem.start, data.z,
-                                                                                    data.configuration);
+  const bool viscous = problem.viscous_acts() && problem.rule == StepRule::midpoint;
+  (problem.conserves_energy() ? compute_frames : compute_configuration)(model, *problem.start, data.z,
+                                                                        data.configuration);
   if (!problem.conserves_energy() && !viscous) return;
   problem.set_end(data.z, data.end);
   compute_configuration(model, *problem.start, data.end, data.end_configuration);
   if (!viscous) return;
   data.viscous = problem.viscous;
   refer_viscous_to_ends(model, problem.start_configuration, data.configuration, data.end_configuration, data.viscous);
-  if (problem.conserves_energy()) return;
   data.damped = problem.elastic;
   add_coefficients(data.viscous, data.damped);
 }
@@ -70,7 +70,7 @@ void ElasticForces::add(const StepProblem& problem, StepData& data, const Assemb
     add_discrete_gradient(problem, data, assembler, values);
   else
     add_elastic(problem, acting_coefficients(problem, data), data, assembler, values, data.axial_force);
-  if (problem.exact && !values.empty() && problem.viscous_acts() && problem.in_middle())
+  if (problem.exact && !values.empty() && problem.viscous_acts() && problem.rule == StepRule::midpoint)
     add_rate_slopes(problem, data, assembler, values);
 }
 
@@ -152,6 +152,7 @@ void ElasticForces::add_rounding(const StepProblem& problem, StepData& data) con
 double ElasticForces::dissipated(const StepProblem& problem, const StepData& data, const Assembler& assembler,
                                  const VectorX& change) const {
   if (!problem.viscous_acts()) return 0.0;
+  if (problem.conserves_energy()) return discrete_dissipation(problem, data);
   const Model& model = problem.model;
   const ElasticCoefficients& viscous = problem.in_middle() ? data.viscous : problem.viscous;
   double work = 0.0;
@@ -171,14 +172,32 @@ double ElasticForces::dissipated(const StepProblem& problem, const StepData& dat
   return work;
 }
 
+/// Viscosity kv / h (s - s0) acts on the mean strain s of a step, h half of its length, and so by half of what the
+/// strain changes by: what it takes is kv / (2 h) (s1 - s0)^2.
+double ElasticForces::discrete_dissipation(const StepProblem& problem, const StepData& data) {
+  const Model& model = problem.model;
+  const ElasticCoefficients& viscous = problem.viscous;
+  const Configuration& end = data.end_configuration;
+  const VectorX stretched = (end.length - problem.start_configuration.length).cwiseQuotient(model.edge_length);
+  const auto turned = [&](const Columns3& strain, const Columns3& stiffness, const Columns3& start) {
+    double sum = 0.0;
+    for (Eigen::Index i = 0; i < strain.rows(); ++i)
+      sum += (measured(viscous.measure, strain.row(i)) - start.row(i)).cwiseAbs2().dot(stiffness.row(i));
+    return sum;
+  };
+  return 0.5 * (viscous.stretch_stiffness.cwiseProduct(model.edge_length).dot(stretched.cwiseAbs2()) +
+                turned(end.bend_strain, viscous.bend_stiffness, viscous.bend_natural) +
+                turned(end.half_strain, viscous.half_stiffness, viscous.half_natural));
+}
+
 /// Axial forces of the mean strain.
 void ElasticForces::set_mean_axial_forces(const StepProblem& problem, StepData& data) const {
   const int n = problem.model.edge_count;
   data.force.resize(n);
   data.modulus.resize(n);
   for (int e = 0; e < n; ++e) {
-    const MeanStretch mean =
-        mean_stretch(problem.model, problem.elastic, problem.start_configuration, data.end_configuration, e);
+    const MeanStretch mean = mean_stretch(problem.model, acting_coefficients(problem, data),
+                                          problem.start_configuration, data.end_configuration, e);
     data.force[e] = mean.force;
     data.modulus[e] = mean.modulus;
   }
@@ -188,6 +207,7 @@ void ElasticForces::set_mean_axial_forces(const StepProblem& problem, StepData& 
 void ElasticForces::add_discrete_gradient(const StepProblem& problem, StepData& data, const Assembler& assembler,
                                           std::span<double> values) const {
   const Model& model = problem.model;
+  const ElasticCoefficients& k = acting_coefficients(problem, data);
   const bool with_matrix = !values.empty();
   data.change = 2.0 * (data.z - problem.start->q);
   const DiscreteStep step = discrete_step(problem, data);
@@ -195,21 +215,21 @@ void ElasticForces::add_discrete_gradient(const StepProblem& problem, StepData& 
   set_mean_axial_forces(problem, data);
   const StencilKernels& kernels = stencil_kernels();
   (model.planar() ? kernels.planar_momentum_bend : kernels.momentum_bend)(
-      regular_batch(problem.elastic, data, assembler, values, data.axial_force),
+      regular_batch(k, data, assembler, values, data.axial_force),
       {.start_frames = frames_of(problem.start_configuration),
        .end_frames = frames_of(data.end_configuration),
        .start_strain = problem.start_configuration.bend_strain.data(),
        .end_strain = data.end_configuration.bend_strain.data()});
   for (int e : assembler.regular.other_edges) {
-    discrete_stretch_local(model, problem.elastic, step, e, with_matrix, data.axial_force, local);
+    discrete_stretch_local(model, k, step, e, with_matrix, data.axial_force, local);
     add_element(assembler.stretch, e, local, data, values);
   }
   for (int b : assembler.regular.other_bend) {
-    discrete_bend_local(model, bend_coefficients(problem.elastic, b), step, b, with_matrix, local);
+    discrete_bend_local(model, bend_coefficients(k, b), step, b, with_matrix, local);
     add_element(assembler.bend, b, local, data, values);
   }
   for (int h = 0; h < static_cast<int>(model.half.size()); ++h) {
-    discrete_half_local(model, half_coefficients(problem.elastic, h), step, h, with_matrix, local);
+    discrete_half_local(model, half_coefficients(k, h), step, h, with_matrix, local);
     if (problem.exact && with_matrix && !model.planar()) {
       // Inertia turns the rows of frames, from derivatives by a Cayley vector to moments; these are moments already.
       Eigen::Map<Eigen::Matrix<double, 3, kMaxLocal, Eigen::RowMajor>> rows(&local.hessian[7][0]);
@@ -219,7 +239,6 @@ void ElasticForces::add_discrete_gradient(const StepProblem& problem, StepData& 
     add_element(assembler.half, h, local, data, values);
   }
   data.elastic_rows = data.gradient.head(model.dof_count);
-  if (problem.viscous_acts()) add_elastic(problem, data.viscous, data, assembler, values, nullptr);
 }
 
 /// Under the midpoint rules the rate of a strain s is that between the ends, (s1 - s0) / dt, where the matrix has that
@@ -262,6 +281,24 @@ void ElasticForces::add_rate_slopes(const StepProblem& problem, StepData& data, 
     half_gradients(model, data.end, k.measure, data.end_configuration, h, end);
     add(assembler.half, h, &k.half_stiffness(h, 0), k.half_stiffness.rows());
   }
+}
+
+double largest_turn(const Model& model, const VectorX& q0, const VectorX& q1) {
+  double smallest = 1.0;  // square of the cosine, with its sign
+  for (int e = 0; e < model.edge_count; ++e) {
+    const int a = model.tail_dof[at(e)], b = model.head_dof[at(e)];
+    double before = 0.0, after = 0.0, across = 0.0;
+    for (int i = 0; i < model.dimension; ++i) {
+      const double start = q0(b + i) - q0(a + i), end = q1(b + i) - q1(a + i);
+      before += start * start;
+      after += end * end;
+      across += start * end;
+    }
+    const double square = across * std::abs(across) / (before * after);
+    if (!(square >= smallest)) smallest = square;
+  }
+  return std::isfinite(smallest) ? std::acos(std::copysign(std::sqrt(std::min(std::abs(smallest), 1.0)), smallest))
+                                 : INFINITY;
 }
 
 void predict_axial_force(const StepProblem& problem, const StepData& data, const VectorX& step, VectorX& out) {

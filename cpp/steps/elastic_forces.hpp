@@ -1,5 +1,6 @@
 #pragma once
-/// Stretching, bending and twisting, and what of them is viscous; in energy-momentum steps the discrete gradient.
+/// Stretching, bending and twisting, and their viscosity; in energy-momentum steps the discrete gradient of both:
+/// viscosity is elasticity towards the strain s0 at the start, k s + (kv / h) (s - s0), in every scheme.
 
 #include "steps/term.hpp"
 
@@ -23,13 +24,10 @@ class ElasticForces final : public Term {
                     const VectorX& v) const override;
   /// An axial strain rounds along its edge only.
   void add_rounding(const StepProblem& problem, StepData& data) const override;
-  void add_gains(const StepProblem& problem, StepData& data, const Assembler& assembler, const VectorX& end,
-                 ComponentGains& gains) const override;
 
  private:
-  void add_bend_gains(const StepProblem& problem, StepData& data, const Assembler& assembler, const VectorX& end,
-                      ComponentGains& gains) const;
   void set_axial_forces(const StepProblem& problem, const ElasticCoefficients& k, StepData& data) const;
+  static double discrete_dissipation(const StepProblem& problem, const StepData& data);
   void set_mean_axial_forces(const StepProblem& problem, StepData& data) const;
   void add_elastic(const StepProblem& problem, const ElasticCoefficients& k, StepData& data, const Assembler& assembler,
                    std::span<double> values, const double* axial_force) const;

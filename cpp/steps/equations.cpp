@@ -166,11 +166,6 @@ bool Equations::dissipates(const Parameters& parameters) const {
                      [&](const std::unique_ptr<Term>& term) { return term->dissipates(parameters); });
 }
 
-void Equations::find_gains(const VectorX& end, StepData& data, ComponentGains& gains) const {
-  gains.energy.setZero(model().component_count);
-  for (const std::unique_ptr<Term>& term : terms_.all) term->add_gains(problem_, data, assembler_, end, gains);
-}
-
 std::vector<std::string> Equations::notes() const {
   std::vector<std::string> notes;
   for (const std::unique_ptr<Term>& term : terms_.all)

@@ -95,9 +95,6 @@ class Equations {
 
   /// Whether anything but contact takes energy from the motion.
   bool dissipates(const Parameters& parameters) const;
-  /// What potential energies grow by over a step that ends at `end`, beyond the work of their forces. Spoils the
-  /// change and the configuration at the end of `data`.
-  void find_gains(const VectorX& end, StepData& data, ComponentGains& gains) const;
   /// What drag, viscosity, springs, joints and fluids take over `change`, with the forces of the last evaluation [J].
   double dissipated(const StepData& data, const VectorX& change) const;
   bool loaded() const {

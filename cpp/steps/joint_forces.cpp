@@ -116,19 +116,6 @@ void JointForces::add_rounding(const StepProblem& problem, StepData& data) const
   }
 }
 
-/// At the end of a step a stiffness does less than what its energy changes by; in the middle just that.
-void JointForces::add_gains(const StepProblem& problem, StepData& /*data*/, const Assembler& /*assembler*/,
-                            const VectorX& end, ComponentGains& gains) const {
-  if (problem.in_middle()) return;
-  for (int j = 0; j < table_.count(); ++j) {
-    const JointAngle& joint = problem.model.joint_angles[at(j)];
-    if (!joint.turns()) continue;
-    const double turned = joint.angle(end) - joint.angle(problem.start->q);
-    gains.energy[problem.model.component_of_node(joint.node)] -=
-        0.5 * problem.elastic.joint_stiffness[j] * turned * turned;
-  }
-}
-
 double JointForces::dissipated(const StepProblem& problem, const StepData& data, const Assembler&,
                                const VectorX& change) const {
   double work = 0.0;

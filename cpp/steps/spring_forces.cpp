@@ -121,21 +121,6 @@ void SpringForces::add_rounding(const StepProblem& problem, StepData& data) cons
   }
 }
 
-void SpringForces::add_gains(const StepProblem& problem, StepData& /*data*/, const Assembler& /*assembler*/,
-                             const VectorX& end, ComponentGains& gains) const {
-  for (int s = 0; s < table_.count(); ++s) {
-    Spring spring = spring_of(*problem.parameters, s);
-    spring.damping = 0.0;
-    const SpringStart<double> start = start_of(problem, s);
-    const Vec3d d1 = between(problem.model, end, s), change = d1 - start.d;
-    const Vec3d d = problem.in_middle() ? 0.5 * (start.d + d1) : d1;
-    const double l0 = length_of(start.d), l1 = length_of(d1);
-    const double grown = spring.stiffness * (l1 - l0) * (0.5 * (l0 + l1) - spring.rest_length);
-    gains.energy[problem.model.component_of_node(problem.model.description.springs[at(s)].nodes[0])] +=
-        grown - dot(pull(spring_force(spring, start, d)), change);
-  }
-}
-
 double SpringForces::dissipated(const StepProblem& problem, const StepData& data, const Assembler&,
                                 const VectorX& change) const {
   double work = 0.0;

@@ -18,8 +18,6 @@ class SpringForces final : public Term {
   void add_adjoint(const StepProblem& problem, const StepData& data, const Assembler& assembler,
                    StepAdjoint& adjoint) const override;
   void add_rounding(const StepProblem& problem, StepData& data) const override;
-  void add_gains(const StepProblem& problem, StepData& data, const Assembler& assembler, const VectorX& end,
-                 ComponentGains& gains) const override;
   double dissipated(const StepProblem& problem, const StepData& data, const Assembler& assembler,
                     const VectorX& change) const override;
 

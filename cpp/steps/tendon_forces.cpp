@@ -89,7 +89,7 @@ void TendonForces::add_adjoint(const StepProblem& problem, const StepData& data,
                                StepAdjoint& adjoint) const {
   for (const TendonSegment& segment : segments_) check_differentiable(problem, segment);
   std::optional<DiscreteAdjoint> discrete;
-  if (problem.conserves_energy()) discrete.emplace(problem, data, adjoint);
+  if (problem.conserves_energy()) discrete.emplace(problem, data, adjoint.rows, adjoint);
   for (int s = 0; s < table_.count(); ++s) {
     double rows[kTendonUnknowns];
     TendonLocal local;

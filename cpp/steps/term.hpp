@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "assembly/assembler.hpp"
-#include "steps/component_gains.hpp"
 #include "steps/step_adjoint.hpp"
 #include "steps/step_problem.hpp"
 
@@ -44,10 +43,6 @@ class Term {
   }
   /// Adds what rounding alone leaves of its rows in the last evaluation, beyond that of their magnitude, to data.floor.
   virtual void add_rounding(const StepProblem&, StepData&) const {}
-  /// Adds what its energy grows by over a step that ends at `end`, beyond the work of its forces in the last
-  /// evaluation. Spoils `data.end_configuration`.
-  virtual void add_gains(const StepProblem&, StepData& /*data*/, const Assembler&, const VectorX& /*end*/,
-                         ComponentGains&) const {}
   /// What is taken from the motion over `change` with the forces of the last evaluation [J].
   virtual double dissipated(const StepProblem&, const StepData&, const Assembler&, const VectorX& /*change*/) const {
     return 0.0;

@@ -110,7 +110,8 @@ World::Implementation::Implementation(const Implementation& other, Unbuilt /*unu
       step_warning(other.step_warning),
       impact_warning(other.impact_warning),
       branch_warning(other.branch_warning),
-      plane_warning(other.plane_warning) {
+      plane_warning(other.plane_warning),
+      drift_warning(other.drift_warning) {
   work.newton.counters = other.work.newton.counters;
   listen();
 }
@@ -150,7 +151,6 @@ void World::Implementation::drop_scratch() {
   spatial_twin.reset();
   static_gradient.reset();
   read_equations.reset();
-  fallback_equations.reset();
   const Counters counters = work.newton.counters;
   const double finest = work.newton.finest;
   work = StepWorkspace{};
@@ -254,7 +254,6 @@ void World::Implementation::remake_equations() {
   spatial_twin.reset();
   static_gradient.reset();
   read_equations.reset();
-  fallback_equations.reset();
   newton = std::make_unique<Newton>(model, options);
   equations = std::make_unique<Equations>(model, equation_options(options));
   forget_matrix();

@@ -13,13 +13,10 @@
 namespace withe {
 namespace {
 
-/// Share of the greatest energy that steps may gain from nowhere in all: where midpoint steps gain more,
-/// energy-momentum ones are as accurate or more so, and without any limit the former fail (see integrators/README.md).
-constexpr double kMostGain = 1e-3;
-// Energies are measured once in so many steps, and where too much seems to be gained; by how much the greatest fades
-// then; and what rounding leaves of the balance of a component that travels, over the energy of that, with room.
-constexpr int kMeasured = 8;
-constexpr double kFading = 1.0 - 1.0 / 128.0, kRounding = 1e-7;
+/// Share of the greatest kinetic energy by which the energy of midpoint steps may drift before a warning.
+constexpr double kMostDrift = 1e-2;
+/// Share of a component's kinetic and elastic energy that a backward Euler step may add.
+constexpr double kMostPressureGain = 1e-4;
 
 /// Of a part of each node's mass, part(node).
 template <class Part>
@@ -49,6 +46,16 @@ double stretch_energy(const Model& model, const ElasticCoefficients& k, const Co
   double energy = 0.0;
   for (int i = 0; i < model.edge_count; ++i) energy += stretch_energy_of(model, k, c, i);
   return energy;
+}
+
+/// What stays as it is, but for the error of the integrator [J].
+double balance_of(const Energy& e) { return e.total - e.work + e.dissipated; }
+
+/// Rounding error bound of a balance [J]. What rests has no energy but that of its weight.
+double rounding_of(const Energy& e, int unknowns) {
+  const double sum = e.kinetic + e.elastic() + e.contact + std::abs(e.gravity) + std::abs(e.loads) + std::abs(e.work) +
+                     std::abs(e.dissipated);
+  return std::numeric_limits<double>::epsilon() * unknowns * sum;
 }
 
 /// Kinetic, elastic, of springs and gravity's.
@@ -194,30 +201,13 @@ Energy World::Implementation::rod_energy(int rod) const {
   return e;
 }
 
-/// Plain midpoint pumps energy into stretching when edges turn far within a step, and backward Euler gains where it
-/// should lose, from edges under pressure that give way: whether the step just taken did so by too much in a component.
-bool World::Implementation::gains_energy() {
-  const bool euler = options.integrator == Integrator::backward_euler;
+/// Whether the backward Euler step just taken added too much to a component, of what that has now.
+bool World::Implementation::gains_under_pressure() {
+  const VectorX& gains = work.pressure_gains;
+  if ((gains.array() <= 0.0).all()) return false;
   ComponentEnergies& now = energy_scratch.components;
-  bool measured = false;
-  for (int i = 0; i < model.component_count; ++i) {
-    if (!gained.whole[at(i)]) continue;
-    const double gain = gained.energy[i];
-    double& scale = guard.scale[i];
-    const auto too_much = [&] { return gain > 1e-6 * scale && guard.excess[i] + gain > kMostGain * scale; };
-    if (steps_taken % kMeasured == 0 || too_much()) {
-      if (!measured) find_component_energies(state, now);
-      measured = true;
-      // What came from nowhere is no measure of what there is.
-      const double put_in = now.kinetic[i] + now.elastic[i] - std::max(gain, 0.0);
-      const double greatest = std::min(std::max(now.kinetic[i], 0.1 * now.elastic[i]), put_in);
-      scale = std::max({kFading * scale, greatest, kRounding * now.travelling[i]});
-      if (too_much()) return true;
-    }
-    // What was lost is no stock to gain from, but for a little, by which the midpoint rule's energy goes to and fro.
-    guard.excess[i] = std::max(guard.excess[i] + gain, euler ? 0.0 : -0.5 * kMostGain * scale);
-  }
-  return false;
+  find_component_energies(state, now);
+  return (gains.array() > kMostPressureGain * (now.kinetic + now.elastic).array()).any();
 }
 
 void World::Implementation::find_component_energies(const State& then, ComponentEnergies& out) const {
@@ -282,7 +272,7 @@ double World::Implementation::touching_energy(const State& then) {
   find_component_energies(then, energies);
   double sum = 0.0, mass = 0.0, travelling = 0.0;
   Vector3 momentum = Vector3::Zero();
-  const auto [which, obstacles] = equations_of_step().contact()->touching_components();
+  const auto [which, obstacles] = equations->contact()->touching_components();
   bool held = false;
   for (int i = 0; i < model.component_count; ++i) {
     if (!which[at(i)]) continue;
@@ -317,7 +307,7 @@ bool World::Implementation::contact_pumps(double dt) {
     // What other parts lose makes up for it, but what drag, viscosity and friction take does not.
     const Energy now = energy();
     const Energy then = energy_of(kept.state, kept.load_work, kept.support_work + kept.actuation_work, kept.dissipated);
-    gain = put_in + (now.total - now.work + now.dissipated) - (then.total - then.work + then.dissipated);
+    gain = put_in + balance_of(now) - balance_of(then);
     scale = std::max({scale, touching_energy(state) + now.contact, touching_energy(kept.state) + then.contact});
     if (too_much()) return true;
   }
@@ -325,11 +315,20 @@ bool World::Implementation::contact_pumps(double dt) {
   return false;
 }
 
-/// Refuses a step that the drawing allowed, but not what has come since: forces that press surfaces, other material.
-void World::Implementation::begin_explicit() {
-  const std::string longest = longest_explicit_step();
+/// Refuses an explicit step that the drawing allowed, but not what has come since: forces that press surfaces, other
+/// material.
+void World::Implementation::begin_energy_watch() {
+  const bool is_explicit = options.integrator == Integrator::verlet;
+  if (!is_explicit && options.integrator != Integrator::implicit_midpoint) return;
+  const std::string longest = is_explicit ? longest_explicit_step() : "";
   if (!longest.empty()) fail(NewtonResult{}, options.time_step, "the explicit scheme is not stable here" + longest);
-  alarm = energy();
+  first_energy = energy();
+  greatest_kinetic = first_energy->kinetic;
+}
+
+void World::Implementation::check_energy() {
+  if (options.integrator == Integrator::verlet) check_explicit();
+  if (options.integrator == Integrator::implicit_midpoint && first_energy && !drift_warning) check_drift();
 }
 
 /// What to say where the time step is above the stable one at the present state; else nothing.
@@ -344,16 +343,27 @@ std::string World::Implementation::longest_explicit_step() {
 /// An explicit scheme that is about to blow up gains energy long before it shows as NaN.
 void World::Implementation::check_explicit() {
   const Energy e = energy();
-  const double gain = (e.total - e.work + e.dissipated) - (alarm->total - alarm->work + alarm->dissipated);
-  const double scale = std::max({alarm->kinetic, std::abs(e.gravity - alarm->gravity), std::abs(e.loads - alarm->loads),
-                                 std::abs(e.work - alarm->work), alarm->elastic(), 1e-300});
-  // All that is summed: what rests has no energy but that of its weight, and rounding gains some of that.
-  const double sum = e.kinetic + e.elastic() + e.contact + std::abs(e.gravity) + std::abs(e.loads) + std::abs(e.work) +
-                     std::abs(e.dissipated);
-  const double rounding = std::numeric_limits<double>::epsilon() * model.dof_count * sum;
-  if (std::isfinite(e.total) && gain <= 0.5 * scale + rounding) return;
+  const double gain = balance_of(e) - balance_of(*first_energy);
+  const double scale = std::max({first_energy->kinetic, std::abs(e.gravity - first_energy->gravity),
+                                 std::abs(e.loads - first_energy->loads), std::abs(e.work - first_energy->work),
+                                 first_energy->elastic(), 1e-300});
+  if (std::isfinite(e.total) && gain <= 0.5 * scale + rounding_of(e, model.dof_count)) return;
   const std::string longest = std::isfinite(e.total) ? longest_explicit_step() : "";
   fail(NewtonResult{}, options.time_step, "the explicit scheme gains energy" + longest);
+}
+
+/// Midpoint steps conserve energy to second order only, and stretching of edges that turn far within a step not at all
+/// [Simo, Tarnow and Doblare 1995].
+void World::Implementation::check_drift() {
+  const Energy e = energy();
+  greatest_kinetic = std::max(greatest_kinetic, e.kinetic);
+  const double drift = balance_of(e) - balance_of(*first_energy);
+  if (std::abs(drift) <= kMostDrift * greatest_kinetic + rounding_of(e, model.dof_count)) return;
+  drift_warning = "integrator='implicit_midpoint' has " + std::string(drift > 0.0 ? "added " : "lost ") +
+                  text(std::abs(drift), 2) + " J, " + text(100.0 * std::abs(drift) / greatest_kinetic, 2) +
+                  " % of the greatest kinetic energy (time " + text(state.time, 6) + " s, time_step " +
+                  text(options.time_step) +
+                  " s). Use integrator='energy_momentum', which conserves energy at any time_step, or a shorter one.";
 }
 
 }  // namespace withe

@@ -44,15 +44,6 @@ Equations& World::Implementation::statics() {
 }
 
 /// Energy-momentum steps, which take over where plain midpoint gains energy.
-Equations& World::Implementation::fallback() {
-  if (!fallback_equations) {
-    Options conserving = options;
-    conserving.integrator = Integrator::energy_momentum;
-    fallback_equations = std::make_unique<Equations>(model, equation_options(conserving));
-  }
-  return *fallback_equations;
-}
-
 namespace {
 
 /// A place between two of a support, or beyond.

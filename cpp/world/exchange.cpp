@@ -157,17 +157,15 @@ void exchange(Archive& io, Moving& moving) {
 template <class Archive>
 void exchange(Archive& io, StepControl& control) {
   auto& [level, easy_steps, patience, grown, error_rate, mean_step, event_reserve, grid_origin, grid_steps, steps_taken,
-         guard, contact_guard, step_watch, alarm] = control;
+         contact_guard, step_watch, first_energy, greatest_kinetic] = control;
   io(level), io(easy_steps), io(patience), io(grown), io(error_rate), io(mean_step), io(event_reserve), io(grid_origin),
       io(grid_steps), io(steps_taken);
-  auto& [scale, excess, fallback_steps] = guard;
-  io(fallback_steps);
-  for (VectorX* v : {&scale, &excess}) exchange(io, *v);
   auto& [greatest, gained, put_in] = contact_guard;
   io(greatest), io(gained), io(put_in);
   auto& [change, motion, most, pull, moved, acceleration] = step_watch;
   for (VectorX* v : {&change, &motion, &most, &pull, &moved, &acceleration}) exchange(io, *v);
-  exchange(io, alarm);
+  exchange(io, first_energy);
+  io(greatest_kinetic);
 }
 
 template <class Archive>

@@ -126,15 +126,15 @@ void World::Implementation::check_resolution() {
 
 void Warnings::add(const Warnings& other) {
   for (std::string Warnings::* each :
-       {&Warnings::mesh, &Warnings::steps, &Warnings::impact, &Warnings::branch, &Warnings::plane})
+       {&Warnings::mesh, &Warnings::steps, &Warnings::impact, &Warnings::branch, &Warnings::plane, &Warnings::drift})
     if ((this->*each).empty()) this->*each = other.*each;
 }
 
 Warnings World::take_warnings() {
   const auto take = [](std::optional<std::string>& warning) { return warning ? std::exchange(*warning, {}) : ""; };
   Implementation& self = *implementation_;
-  return {take(self.mesh_warning), take(self.step_warning), take(self.impact_warning), take(self.branch_warning),
-          take(self.plane_warning)};
+  return {take(self.mesh_warning),   take(self.step_warning),  take(self.impact_warning),
+          take(self.branch_warning), take(self.plane_warning), take(self.drift_warning)};
 }
 
 /// What may help where steps do not converge, by what is the matter; one sentence.
@@ -157,6 +157,10 @@ std::string World::Implementation::what_to_try() const {
            "to rest beyond a jump";
   if (equations->contact() && equations->contact()->frictional())
     return "Try a smaller time_step, or a greater slip_tolerance of enable_contact";
+  if (options.integrator == Integrator::implicit_midpoint)
+    return "Try integrator='energy_momentum', which conserves energy at any time_step, or 'backward_euler', which "
+           "damps "
+           "what is too fast for the step";
   if (!parameters.viscous && options.integrator != Integrator::backward_euler)
     return "Try a smaller time_step, viscosity of the material, or integrator='backward_euler', which damps what is "
            "too "

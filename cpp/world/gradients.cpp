@@ -198,7 +198,7 @@ void World::Implementation::check_tape() {
 
 void World::Implementation::record_step(StepRule rule, double dt, bool begins) {
   const char* unknown = nullptr;
-  if (const Contact* contact = equations_of_step().contact()) {
+  if (const Contact* contact = equations->contact()) {
     if (contact->frictional() && !known_friction(description.contact.friction_law))
       unknown = kFriction;
     else if (loses_in_impacts(description.contact))

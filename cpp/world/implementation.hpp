@@ -53,9 +53,8 @@ struct World::Implementation : Running {
   Model model;
   std::unique_ptr<Newton> newton;
   std::unique_ptr<Equations> equations;
-  std::unique_ptr<Equations> fallback_equations;  ///< energy-momentum ones, made when plain midpoint gains energy
-  std::unique_ptr<Equations> static_equations;    ///< symmetric ones, made when first needed
-  std::unique_ptr<Implementation> spatial_twin;   ///< of a planar scene: see `buckles_out_of_plane`
+  std::unique_ptr<Equations> static_equations;            ///< symmetric ones, made when first needed
+  std::unique_ptr<Implementation> spatial_twin;           ///< of a planar scene: see `buckles_out_of_plane`
   mutable std::unique_ptr<StepGradient> static_gradient;  ///< made when first needed
   mutable std::unique_ptr<Equations> read_equations;      ///< symmetric ones, of which no matrix is yet to serve
   std::shared_ptr<Tape> tape;                             ///< of a run that is kept for gradients
@@ -70,11 +69,9 @@ struct World::Implementation : Running {
   GuessHistory marked_guesses;
   StepControl marked_control;
   Moving kept;                         ///< at the start of a step that may be taken back
-  EnergyGuard guard_before;            ///< likewise
   double turned = 0, held_turned = 0;  ///< of an edge, of a held frame in the last step at most [rad]
   /// Of steps that were cut for them, until one is accepted: `held_turned` over its most, way of an obstacle [m].
   double cut_turn = 0, cut_way = 0;
-  ComponentGains gained;                                    ///< in the last step, all of its parts
   std::vector<SupportMotion> motions_before, kept_motions;  ///< at the start of a time step, of a part of it
   Plan plan;
   bool plan_current = false;  ///< made when it is asked for
@@ -93,6 +90,7 @@ struct World::Implementation : Running {
   std::optional<std::string> impact_warning;  ///< likewise, of steps too long for an impact
   std::optional<std::string> branch_warning;  ///< likewise, of a static step that left its branch
   std::optional<std::string> plane_warning;   ///< likewise, of an equilibrium that is unstable out of its plane
+  std::optional<std::string> drift_warning;   ///< likewise, of an integrator that changes the energy
   std::vector<LeftRing> left_rings;           ///< not heard of yet
   NewtonResult last_newton;
 
@@ -203,7 +201,7 @@ struct World::Implementation : Running {
   Wrench hand_reaction(int hand, const VectorX& held) const;
 
   // stepping.cpp
-  enum class Attempt { failed, gained_energy, fell_back, inaccurate, hard, easy };
+  enum class Attempt { failed, gained_energy, inaccurate, hard, easy };
   /// Equal parts in which the rest of a time step, from a fraction of it on, is taken.
   struct Division {
     double from = 0.0;
@@ -216,6 +214,7 @@ struct World::Implementation : Running {
   } part;
   void advance(double duration);
   void advance_in_parts(double duration);
+  [[noreturn]] void fail_error_control(long tries, double duration, double base) const;
   bool may_cut() const;
   int levels_per_halving() const;
   void divide_rest(Division& division) const;
@@ -236,7 +235,6 @@ struct World::Implementation : Running {
   bool conserving() const;
   double force_time(double start, double dt) const;
   bool inner_step(double dt, int slot, double& error);
-  Equations& equations_of_step();
   StepRule rule_of_step() const;
   StepResult step_by_rule(double dt, int slot);
   void check_impacts(const ContactDescription& contact) const;
@@ -303,7 +301,6 @@ struct World::Implementation : Running {
   void settle_contact(Equations& system, const Boundary& boundary, StaticResult& r);
   void rest();
   Equations& statics();
-  Equations& fallback();
   void refresh_reactions();
 
   // contacts.cpp
@@ -333,14 +330,17 @@ struct World::Implementation : Running {
   /// What has been set since changed the energy of the present state by this [J].
   double work_of_settings() const;
   double elastic_energy() const;
-  bool watches_energy() const;
-  bool gains_energy();
+  bool gains_under_pressure();
   void find_component_energies(const State& then, ComponentEnergies& out) const;
   double touching_energy(const State& then);
   bool contact_pumps(double dt);
-  void begin_explicit();
+  /// Energies as they are now become those that the energy of steps is compared with, where a scheme does not conserve
+  /// it by itself.
+  void begin_energy_watch();
+  void check_energy();
   std::string longest_explicit_step();
   void check_explicit();
+  void check_drift();
 };
 
 /// Puts a node in space into a configuration vector.

@@ -15,8 +15,6 @@ Equations* World::Implementation::system(System which) {
   switch (which) {
     case System::scheme:
       return equations.get();
-    case System::fallback:
-      return fallback_equations.get();
     case System::statics:
       return static_equations.get();
   }
@@ -43,10 +41,8 @@ void World::Implementation::recall(const Lagged& past) {
   bool fits = true;
   for (const System which : kSystems) {
     const auto& memory = past.systems[at(which)];
-    if (!memory && which == System::fallback) fallback_equations.reset();
     if (!memory && which == System::statics) static_equations.reset();
     if (!memory) continue;
-    if (which == System::fallback) fallback();
     if (which == System::statics) statics();
     require(system(which) != nullptr, "equations of another scene");
     if (!system(which)->recall(*memory) && past.owner == which) fits = false;
@@ -83,8 +79,7 @@ void World::Implementation::return_to_mark() {
     forget_matrix();
     return;
   }
-  for (auto* made : {&fallback_equations, &static_equations})
-    if (*made && !(*made)->marked()) made->reset();
+  if (static_equations && !static_equations->marked()) static_equations.reset();
   work.newton.matrix = marked_matrix;
   work.newton.guesses = marked_guesses;
   for (const System which : kSystems) {

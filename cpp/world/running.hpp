@@ -70,14 +70,6 @@ struct NaturalRamp {
   Ramp<VectorX> twist, stretch;
 };
 
-/// Energy balance of the watch over the energy of plain midpoint and backward Euler steps, per connected component:
-/// what other parts of a scene do, and how all drift by, is no measure of what one may gain.
-struct EnergyGuard {
-  VectorX scale;           ///< greatest energy [J]; of no size before the first step
-  VectorX excess;          ///< out of nowhere so far [J]
-  int fallback_steps = 0;  ///< energy-momentum steps still to take in its place
-};
-
 /// Energy balance of the watch over what contact puts in where surfaces slide by much within a step.
 struct ContactGuard {
   double scale = 0;   ///< greatest energy so far, as it was looked at [J]
@@ -132,10 +124,11 @@ struct StepControl {
   double grid_origin = 0;    ///< time = grid_origin + grid_steps time_step after whole steps, free of summed rounding
   std::int64_t grid_steps = 0;
   std::int64_t steps_taken = 0;  ///< inner steps accepted since the scene was built
-  EnergyGuard guard;
   ContactGuard contact_guard;
   StepWatch step_watch;
-  std::optional<Energy> alarm;  ///< energies at the start, for the explicit scheme's alarm
+  /// Energies at the start, by which the energy of explicit and of midpoint steps is judged.
+  std::optional<Energy> first_energy;
+  double greatest_kinetic = 0;  ///< kinetic energy since then, at the steps that are looked at [J]
 };
 
 /// What was found last, for read-outs and for who does not ask again.
@@ -152,8 +145,8 @@ struct Found {
 struct Running : Settings, Moving, StepControl, Found {};
 
 /// Systems of equations that a scene may have.
-enum class System { scheme, fallback, statics };
-inline constexpr std::array<System, 3> kSystems{System::scheme, System::fallback, System::statics};
+enum class System { scheme, statics };
+inline constexpr std::array<System, 2> kSystems{System::scheme, System::statics};
 
 /// What solves leave for those to come: with it, a copy goes on with the same bits.
 struct Lagged {

@@ -315,7 +315,7 @@ void World::Implementation::forget_motion() {
   state.acceleration_current = false;
   predictor.clear();
   state.motion.known = 0;
-  alarm.reset();
+  first_energy.reset();
   reaction_current = false;
 }
 

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "common/check.hpp"
+#include "common/text.hpp"
 #include "world/implementation.hpp"
 
 namespace withe {
@@ -12,8 +13,10 @@ namespace {
 constexpr int kMostStiffenings = 4;
 // Easy steps before longer ones are tried, at most.
 constexpr int kMostPatience = 64;
-// Steps from one look at how well the mesh resolves the motion to the next, and at the energy of an explicit one.
-constexpr int kResolutionPeriod = 64, kAlarmPeriod = 16;
+// Inner steps times nodes that error control may take in one time step by default: about half a minute on one core.
+constexpr double kMaxWork = 3e7;
+// Steps from one look at how well the mesh resolves the motion to the next, and at the energy, which costs a step.
+constexpr int kResolutionPeriod = 64, kEnergyPeriod = 16;
 // What is held turns by no more than this in a step [rad]. Of a frame's turn by w the middle of its Cayley vector is
 // that by 2 atan(tan(w / 2) / 2), of an edge's angle that by w / 2: what is between twists by the difference, w^3 / 32.
 // In energy-momentum steps edges that turn by w have the rate 2 tan(w / 2) / dt. Parts of fourth-order steps twist
@@ -32,7 +35,7 @@ bool lessens(double now, double before) { return before == 0.0 || now < 0.9 * be
 void World::Implementation::advance(double duration) {
   const double base = state.time;
   account_for_settings();
-  if (options.integrator == Integrator::verlet && !alarm) begin_explicit();
+  if (!first_energy) begin_energy_watch();
   motions_before = motions;
   mark();
   if (!options.adaptive && !options.tolerance) level = 0;
@@ -51,8 +54,7 @@ void World::Implementation::advance(double duration) {
     }
     throw;
   }
-  // An energy costs as much as a step.
-  if (options.integrator == Integrator::verlet && steps_taken % kAlarmPeriod == 0) check_explicit();
+  if (steps_taken % kEnergyPeriod == 0) check_energy();
   if (steps_taken % kResolutionPeriod == 0) check_resolution();
 }
 
@@ -61,13 +63,14 @@ void World::Implementation::advance_in_parts(double duration) {
   Division division;
   divide_rest(division);
   cut_turn = cut_way = 0.0;
-  for (;;) {
+  const long max_steps = options.max_steps.value_or(std::lround(kMaxWork / model.node_count));
+  for (long tries = 0;; ++tries) {
     work.newton.poll();
+    if (options.tolerance && tries >= max_steps) fail_error_control(tries, duration, base);
     const double dt = duration * ((1.0 - division.from) / static_cast<double>(division.parts));
     part = {division.from == 0.0 && division.done == 0,
             division.from == 0.0 && division.parts == 1 && options.integrator != Integrator::fourth_order};
     const Attempt attempt = try_step(dt);
-    if (attempt == Attempt::fell_back) continue;
     if (attempt != Attempt::easy && attempt != Attempt::hard) {
       cut(attempt, division, dt);
       continue;
@@ -79,6 +82,14 @@ void World::Implementation::advance_in_parts(double duration) {
     if (finished) break;
     if (grown) divide_rest(division);
   }
+}
+
+void World::Implementation::fail_error_control(long tries, double duration, double base) const {
+  fail(NewtonResult{}, duration / std::exp2(static_cast<double>(level) / levels_per_halving()),
+       "error control has taken " + std::to_string(tries) + " inner steps for " +
+           text(100.0 * (state.time - base) / duration, 3) + " % of one time_step of " + text(duration) + " s",
+       "Undamped motion of high frequency needs steps as short as its period: use a larger tolerance, viscosity of the "
+       "material, integrator='backward_euler', or a greater max_steps");
 }
 
 /// Steps change by powers of two and rarely, or symmetry and energy suffer; under error control, whose error would
@@ -184,13 +195,11 @@ bool World::Implementation::may_grow(double dt, double times) const {
 /// One step of dt, taken back where it gains energy from nowhere or is not accurate enough.
 World::Implementation::Attempt World::Implementation::try_step(double dt) {
   const bool fourth = options.integrator == Integrator::fourth_order;
-  const bool euler = options.integrator == Integrator::backward_euler;
-  const bool asks = options.adaptive && options.energy_guard, guarded = watches_energy();
+  const bool euler = options.adaptive && options.integrator == Integrator::backward_euler;
   const bool watched = options.adaptive && equations->contact() && options.integrator != Integrator::verlet;
-  const bool keeps = guarded || watched || options.tolerance || fourth || turns_rods();
+  const bool keeps = watched || euler || options.tolerance || fourth || turns_rods();
   if (keeps) kept = *this;
   if (tape) taped = tape->count();
-  if (guarded) guard_before = guard;
   const double allowed = allowed_error(dt);
   work.newton.finest = 0.01 * allowed;  // so that what Newton leaves is no part of the error
   double error = 0.0;
@@ -210,30 +219,24 @@ World::Implementation::Attempt World::Implementation::try_step(double dt) {
     take_back();
     return Attempt::inaccurate;
   }
-  Contact* contact = watched ? equations_of_step().contact() : nullptr;
+  Contact* contact = watched ? equations->contact() : nullptr;
   const double held_turn =
       options.adaptive && conserving() ? held_turned / (fourth ? kMostHeldTurnOfPart : kMostHeldTurn) : 0.0;
   const double way = contact && !obstacle_motions.empty() ? farthest_obstacle(kept.state) : 0.0;
   const bool unresolved =
       (held_turn > 1.0 && lessens(held_turn, cut_turn)) ||
       (contact && ((contact->unresolved(dt) && lessens(way, cut_way)) || contact->missed(kept.state.q)));
-  const bool gains = !unresolved && guarded && gains_energy(),
-             pumped = !unresolved && !gains && watched && asks && contact_pumps(dt);
   if (unresolved && may_cut()) {
     cut_turn = held_turn;
     cut_way = way;
     take_back();
     return Attempt::inaccurate;
   }
-  if (gains || pumped) {
+  if (!unresolved && ((euler && gains_under_pressure()) || (watched && contact_pumps(dt)))) {
     take_back();
-    if (guarded) guard = guard_before;
-    if (euler || !guarded) return Attempt::gained_energy;
-    // The same step again, and a while of them, without the flaw.
-    guard.fallback_steps = 256;
-    return Attempt::fell_back;
+    return Attempt::gained_energy;
   }
-  watch_step(dt, equations_of_step());
+  watch_step(dt, *equations);
   commit_step();
   if (options.tolerance) account_for_error(error, dt);
   if (event || 2.5 * held_turn > 1.0 || (contact && contact->unresolved(2.0 * dt))) return Attempt::hard;
@@ -263,11 +266,9 @@ void World::Implementation::commit_step() {
   cut_turn = cut_way = 0.0;
   statistics.steps += 1;
   steps_taken += 1;
-  statistics.largest_turn = std::max(statistics.largest_turn, turned);
-  if (guard.fallback_steps > 0) {
-    --guard.fallback_steps;
+  if (options.integrator != Integrator::verlet && rule_of_step() == StepRule::energy_momentum)
     statistics.energy_momentum_steps += 1;
-  }
+  statistics.largest_turn = std::max(statistics.largest_turn, turned);
   retire_ramps();
 }
 
@@ -285,10 +286,6 @@ double World::Implementation::force_time(double start, double dt) const {
 /// One step of the scheme; changes nothing where it does not converge.
 bool World::Implementation::scheme_step(double dt, double& error) {
   turned = held_turned = 0.0;
-  gained.energy.setZero(model.component_count);
-  gained.whole.assign(at(model.component_count), 0);
-  for (VectorX* v : {&guard.scale, &guard.excess})
-    if (v->size() != model.component_count) v->setZero(model.component_count);
   return options.integrator == Integrator::fourth_order ? composed_step(dt, error) : inner_step(dt, 0, error);
 }
 
@@ -338,7 +335,7 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
   if (ramped) apply_ramps(middle, configuration(), actuation);
   kept_motions = motions;
   aim_supports(end);
-  Equations& system = equations_of_step();
+  Equations& system = *equations;
   aim_obstacles(system, end);
   aim_hands(system);
   const auto undo = [&] {
@@ -377,11 +374,6 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
   turned = std::max(turned, r.largest_turn);
   held_turned = std::max(held_turned, work.held.turn);
   if (rule_of_step() == StepRule::energy_momentum) held_turned = std::max(held_turned, work.held.spin);
-  if (watches_energy()) {
-    gained.energy += work.gains.energy;
-    for (std::size_t i = 0; i < gained.whole.size(); ++i)
-      gained.whole[i] = static_cast<char>(gained.whole[i] || work.gains.whole[i]);
-  }
   load_work += r.load_work;
   dissipated += r.dissipated;
   support_work += r.support_work;
@@ -394,36 +386,21 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
   return true;
 }
 
-/// Whether what steps gain from nowhere is found.
-bool World::Implementation::watches_energy() const {
-  return options.adaptive && options.energy_guard && guard.fallback_steps == 0 &&
-         options.integrator != Integrator::energy_momentum && options.integrator != Integrator::verlet &&
-         options.integrator != Integrator::statics;
-}
-
-Equations& World::Implementation::equations_of_step() { return guard.fallback_steps > 0 ? fallback() : *equations; }
-
 StepRule World::Implementation::rule_of_step() const {
-  if (guard.fallback_steps > 0) return StepRule::energy_momentum;
   switch (options.integrator) {
-    case Integrator::energy_momentum:
-      return StepRule::energy_momentum;
+    case Integrator::implicit_midpoint:
+      return StepRule::midpoint;
     case Integrator::backward_euler:
       return StepRule::backward_euler;
     default:
-      return StepRule::midpoint;
+      return StepRule::energy_momentum;
   }
 }
 
 StepResult World::Implementation::step_by_rule(double dt, int slot) {
-  Equations& system = equations_of_step();
-  update_custom_force(system);
-  if (options.integrator == Integrator::verlet) return verlet_step(system, parameters, dt, state, work);
-  const StepPlan own{rule_of_step(), dt, slot, watches_energy()};
-  const bool euler = own.rule == StepRule::backward_euler;
-  work.gains.small_turn = euler ? 0.3 : 0.01;
-  if (own.watched) work.gains.small_gain = (euler ? 1e-3 : 1e-6) * guard.scale;
-  return implicit_step(system, *newton, options, parameters, own, state, predictor, work);
+  update_custom_force(*equations);
+  if (options.integrator == Integrator::verlet) return verlet_step(*equations, parameters, dt, state, work);
+  return implicit_step(*equations, *newton, options, parameters, {rule_of_step(), dt, slot}, state, predictor, work);
 }
 
 /// The explicit scheme loses nothing in impacts.

@@ -39,8 +39,8 @@ struct Statistics {
   long evaluations = 0;  ///< of the residual, with or without its matrix
   long factorizations = 0;
   double largest_turn = 0;  ///< of an edge in one step [rad]; plain midpoint loses energy balance above about 0.1
-  long branch_changes = 0;  ///< equilibria that were found on another branch
-  long energy_momentum_steps = 0;  ///< taken in place of midpoint steps that gained energy
+  long energy_momentum_steps = 0;  ///< inner steps by that rule, those of fourth order included
+  long branch_changes = 0;         ///< equilibria that were found on another branch
   double assembly_time = 0, solve_time = 0, fluid_time = 0, total_time = 0;  ///< [s]
 };
 
@@ -82,6 +82,7 @@ struct Warnings {
   std::string impact;  ///< they are too long for one
   std::string branch;  ///< a static step has left it
   std::string plane;   ///< an equilibrium in it is not stable against motions out of it
+  std::string drift;   ///< the integrator changes the energy
 
   /// Takes what is not said yet from others.
   void add(const Warnings& other);

@@ -49,7 +49,6 @@ void register_integrators(py::module_& module) {
   options.def(py::init<>())
       .def_readwrite("time_step", &Options::time_step)
       .def_readwrite("adaptive", &Options::adaptive)
-      .def_readwrite("energy_guard", &Options::energy_guard)
       .def_readwrite("tolerance", &Options::tolerance)
       .def_readwrite("duration", &Options::duration)
       .def_readwrite("planar", &Options::planar)
@@ -57,7 +56,8 @@ void register_integrators(py::module_& module) {
       .def_readwrite("step_tolerance", &Options::step_tolerance)
       .def_readwrite("force_tolerance", &Options::force_tolerance)
       .def_readwrite("max_iterations", &Options::max_iterations)
-      .def_readwrite("max_halvings", &Options::max_halvings);
+      .def_readwrite("max_halvings", &Options::max_halvings)
+      .def_readwrite("max_steps", &Options::max_steps);
   def_word(options, "integrator", &Options::integrator, kIntegrators);
   def_word(options, "solver", &Options::solver, kSolvers);
   def_word(options, "line_search", &Options::line_search, kLineSearches);

@@ -111,6 +111,7 @@ void register_results(py::module_& module) {
       .def_readonly("steps", &Warnings::steps)
       .def_readonly("impact", &Warnings::impact)
       .def_readonly("branch", &Warnings::branch)
+      .def_readonly("drift", &Warnings::drift)
       .def_readonly("plane", &Warnings::plane);
   py::class_<Linearisation>(module, "Linearisation", "Equations linearised about the present configuration.")
       .def_property_readonly("geometric", [](const Linearisation& self) { return self.geometric; })
@@ -142,8 +143,8 @@ void register_results(py::module_& module) {
       .def_readonly("evaluations", &Statistics::evaluations)
       .def_readonly("factorizations", &Statistics::factorizations)
       .def_readonly("largest_turn", &Statistics::largest_turn)
-      .def_readonly("branch_changes", &Statistics::branch_changes)
       .def_readonly("energy_momentum_steps", &Statistics::energy_momentum_steps)
+      .def_readonly("branch_changes", &Statistics::branch_changes)
       .def_readonly("assembly_time", &Statistics::assembly_time)
       .def_readonly("solve_time", &Statistics::solve_time)
       .def_readonly("fluid_time", &Statistics::fluid_time)

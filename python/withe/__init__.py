@@ -18,6 +18,7 @@ from withe.errors import (
     CoarseMeshWarning,
     CoarseStepWarning,
     ConvergenceError,
+    EnergyDriftWarning,
     OutOfPlaneWarning,
     RingLeftWarning,
 )
@@ -58,6 +59,7 @@ __all__ = [
     "Drag",
     "EdgeHandle",
     "Energy",
+    "EnergyDriftWarning",
     "Equilibrium",
     "Fluid",
     "FrictionMap",

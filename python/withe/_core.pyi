@@ -530,7 +530,6 @@ class Options:
         "continuation_secant",
     )
     adaptive: bool
-    energy_guard: bool
     integrator: str
     line_search: str
     mixed: bool
@@ -554,6 +553,10 @@ class Options:
     def max_iterations(self) -> int: ...
     @max_iterations.setter
     def max_iterations(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    @property
+    def max_steps(self) -> int | None: ...
+    @max_steps.setter
+    def max_steps(self, arg0: typing.SupportsInt | typing.SupportsIndex | None) -> None: ...
     @property
     def step_tolerance(self) -> float: ...
     @step_tolerance.setter
@@ -804,6 +807,8 @@ class Warnings:
     """
     @property
     def branch(self) -> str: ...
+    @property
+    def drift(self) -> str: ...
     @property
     def impact(self) -> str: ...
     @property

@@ -7,6 +7,7 @@ __all__ = [
     "CoarseMeshWarning",
     "CoarseStepWarning",
     "ConvergenceError",
+    "EnergyDriftWarning",
     "OutOfPlaneWarning",
     "RingLeftWarning",
 ]
@@ -41,6 +42,15 @@ class CoarseStepWarning(UserWarning):
     take up most of their motion and damp out; in a step in which a rod comes down by more than the distance tolerance
     of contact, and bending goes farther than from a node to the next, all of it is sent off again, as if it were rigid.
     Given once a simulation too; not under backward Euler, nor where obstacles have a restitution below 1.
+    """
+
+
+class EnergyDriftWarning(UserWarning):
+    """The energy of implicit midpoint steps has changed by more than 1 % of the greatest kinetic energy.
+
+    The midpoint rule conserves energy to second order in the time step, and not where edges turn by more than about
+    0.1 rad in a step. The engine compares ``energy().total - energy().work + energy().dissipated`` with its first value
+    every 16 steps, and warns once a simulation. `integrator="energy_momentum"` conserves energy at any time step.
     """
 
 

@@ -63,7 +63,7 @@ def test_viscous_bar_creeps_to_its_length_in_its_viscous_time():
 
 
 @pytest.mark.filterwarnings("ignore::withe.CoarseStepWarning")
-@pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum", "backward_euler"])
+@pytest.mark.parametrize("integrator", ["energy_momentum", "backward_euler"])
 @pytest.mark.parametrize("turn", [0.05, 0.3, 0.6])
 @pytest.mark.parametrize("planar", [True, False])
 def test_viscosity_only_ever_takes_energy_however_far_a_step_turns(integrator, turn, planar):

@@ -65,7 +65,7 @@ def test_grasp_and_release_anywhere_at_any_time_change_nothing(yields, shape):
         before.check(kept=before.energies[-1])
 
 
-@pytest.mark.parametrize("integrator", ["static", "backward_euler", "implicit_midpoint", "energy_momentum"])
+@pytest.mark.parametrize("integrator", ["static", "backward_euler", "energy_momentum"])
 def test_a_rigid_hand_is_a_clamp_that_holds_the_edge(integrator):
     turn, shift = rods.rotation((0.3, 1.0, -0.2), 0.7), np.array([0.1, -0.05, 0.2])
     answers = []
@@ -212,9 +212,11 @@ def test_momenta_grow_by_the_wrench(stiffness, closed):
 
 
 @pytest.mark.parametrize("stiffness", [None, (300.0, 3.0)], ids=["rigid", "yielding"])
-def test_what_hands_do_is_work_at_second_order(stiffness):
-    def error(step):
-        simulation, rod = rope(weight=2.0, time_step=step, adaptive=False)
+def test_what_hands_do_is_work(stiffness):
+    """To rounding in energy-momentum steps, at second order in midpoint ones."""
+
+    def error(step, integrator="implicit_midpoint"):
+        simulation, rod = rope(weight=2.0, time_step=step, adaptive=False, integrator=integrator)
         hand = simulation.grasp(rod, 0.41, 0.2, stiffness=stiffness)
         at, axes = hand.pose
         hand.move(
@@ -230,6 +232,7 @@ def test_what_hands_do_is_work_at_second_order(stiffness):
 
     steps = (2e-3, 1e-3, 5e-4)
     assert_order([error(step) for step in steps], 2.0)
+    assert max(error(step, "energy_momentum") for step in steps) < 1e-10
 
 
 def drawn_motion(number, planar):

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 import withe
-from impacts import CONSERVING, INTEGRATORS, Impact, draw, losses, run
+from impacts import CONSERVING, Impact, draw, losses, run
 
 IMPACTS = [draw(number) for number in range(30)]
 RUBBER = withe.Material(youngs_modulus=1e6, poisson_ratio=0.5, density=1200.0)
 FLYING = withe.Material(youngs_modulus=7e9, poisson_ratio=0.3, density=2700.0)
 
 
-@pytest.mark.parametrize("integrator", INTEGRATORS)
+@pytest.mark.parametrize("integrator", ["energy_momentum", "backward_euler"])
 @pytest.mark.parametrize("impact", IMPACTS, ids=lambda i: f"{i.number}-{i.kind}-{i.lay}")
 def test_an_impact_gives_back_no_more_than_it_took_and_leaves_what_slides(impact: Impact, integrator: Any) -> None:
     outcome = run(impact, integrator)

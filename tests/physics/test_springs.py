@@ -161,7 +161,7 @@ def test_backward_euler_only_loses():
         before = balance(simulation)
 
 
-def test_midpoint_steps_that_gain_energy_from_springs_are_taken_otherwise():
+def test_a_stiff_spring_that_turns_far_in_a_step_gains_no_energy():
     """Two rods that hardly turn, about each other on a stiff spring that turns far in each step."""
     scene = rods.weightless()
     parts = {"stiffness": rods.stiffness(stretch=1e4), "line_density": 1.0, "radius": 0.01, "nodes": 3}
@@ -175,8 +175,7 @@ def test_midpoint_steps_that_gain_energy_from_springs_are_taken_otherwise():
     scale = simulation.energy().total
     with pytest.warns(withe.CoarseStepWarning):
         simulation.step(400)
-    assert simulation.statistics.energy_momentum_steps > 0
-    assert balance(simulation) < before + 2e-3 * scale
+    assert balance(simulation) == pytest.approx(before, abs=1e-6 * scale)
 
 
 @pytest.mark.parametrize("integrator", SCHEMES)

@@ -322,31 +322,6 @@ def test_steps_that_were_cut_are_differentiated_as_they_ran():
     assert np.linalg.norm(by_gravity) > 0.0
 
 
-def test_steps_that_took_over_from_midpoint_ones_are_differentiated_as_they_ran():
-    drawn = Drawn(planar=False, joint=False, integrator="implicit_midpoint", radius=6e-3, time_step=0.01)
-    sim = drawn.simulation
-
-    def run(**options):
-        return sim.run(0.3, record_every=0.3, progress=False, **options)
-
-    start = sim.snapshot()
-    record = run(differentiable=True)
-    assert sim.statistics.energy_momentum_steps > 5
-    sim.restore(start)
-    weight = np.zeros((2, NODES, 3))
-    weight[-1] = np.random.default_rng(7).normal(size=(NODES, 3))
-    (by_gravity,) = record.gradient({"positions": weight}, ["gravity"])
-
-    def of():
-        return float((weight * run().positions()).sum())
-
-    def change(h):
-        sim.set(None, gravity=(0, 0, -9.81 + h))
-
-    wide, near = (difference(sim, of, change, size) for size in (2e-4, 1e-4))
-    assert by_gravity[2] == pytest.approx((4.0 * near - wide) / 3.0, rel=1e-5)
-
-
 def test_what_has_no_gradient_says_so():
     drawn = Drawn(planar=True, joint=False, integrator="implicit_midpoint", adaptive=False)
     sim, arm = drawn.simulation, drawn.arm

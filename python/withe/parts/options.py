@@ -34,7 +34,7 @@ class BuildOptions:
     force_tolerance: float
     max_iterations: int
     max_halvings: int | None
-    energy_guard: bool = True
+    max_steps: int | None = None
 
     def checked(self) -> BuildOptions:
         """The same as plain numbers, with the number of halvings that a tolerance asks for.
@@ -55,16 +55,18 @@ class BuildOptions:
             tolerance=None if self.tolerance is None else validation.positive(self.tolerance, "tolerance"),
             duration=None if self.duration is None else validation.positive(self.duration, "duration"),
             adaptive=validation.truth(self.adaptive, "adaptive"),
-            energy_guard=validation.truth(self.energy_guard, "energy_guard"),
             mixed=validation.truth(self.mixed, "mixed"),
             planar=None if self.planar is None else validation.truth(self.planar, "planar"),
             max_iterations=validation.integer(self.max_iterations, "max_iterations", 1, 10_000),
             max_halvings=self._halvings(),
+            max_steps=None if self.max_steps is None else validation.integer(self.max_steps, "max_steps", 1, 2**62),
         )
         if checked.tolerance is not None and self.integrator in ("verlet", "static"):
             raise ValueError(f"tolerance must be None with integrator={self.integrator!r}")
         if checked.duration is not None and checked.tolerance is None:
             raise ValueError("duration must be given with a tolerance, and only then")
+        if checked.max_steps is not None and checked.tolerance is None:
+            raise ValueError("max_steps must be given with a tolerance, and only then")
         return checked
 
     def _halvings(self) -> int:

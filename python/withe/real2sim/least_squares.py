@@ -36,6 +36,9 @@ _TRIALS = 8
 _TRIALS_OF_INEXACT = 2  # with derivatives that are updated or of another frame; then they are asked for anew
 _WORTH = 0.01
 _SMALL_OF_SECANTS = 1e-2  # likewise, of what each number that was seen leaves
+# Distances from lines of noisy points have kinks: likewise where a step lessens the square of the residual by less than
+# this share of what new derivatives promise.
+_SMALL_AT_KINK, _USEFUL = 5e-2, 0.1
 
 
 class Problem(Protocol):
@@ -222,18 +225,21 @@ def lone_frame(
         if secants is not None and secants.are_worth_renewing(gain, len(scales)) and secants.renew():
             continue
         inexact = lagged or (secants is not None and secants.updated)
-        for _ in range(_TRIALS_OF_INEXACT if inexact else _TRIALS):
+        at_kink = not inexact and gain <= _SMALL_AT_KINK * size / np.sqrt(np.isfinite(residual).sum())
+        for _ in range(_TRIALS_OF_INEXACT if inexact or at_kink else _TRIALS):
             trial = coordinates.copy()
             trial[which] += scales * step
             found = problem.residual(trial, frame)
             if found is not None and (smaller := _size(found[0])) < size:
+                at_kink = at_kink and size**2 - smaller**2 < _USEFUL * gain**2
                 coordinates, (residual, state), size = trial, found, smaller
                 break
             step = linear.bounded(right, 0.25 * float(np.abs(step).max()))
         else:
             if not lagged and (secants is None or not secants.renew()):
-                return FrameSolution(coordinates, residual, jacobian, iteration, False, "no step lessens the residual")
-        if secants is None and not lagged and size <= tolerance:
+                reason = "" if at_kink else "no step lessens the residual"
+                return FrameSolution(coordinates, residual, jacobian, iteration, at_kink, reason)
+        if at_kink or (secants is None and not lagged and size <= tolerance):
             return FrameSolution(coordinates, residual, jacobian, iteration, True, linear=linear)
     return FrameSolution(coordinates, residual, jacobian, max_iterations, False, "max_iterations were not enough")
 

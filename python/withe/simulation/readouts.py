@@ -225,10 +225,10 @@ class Statistics:
         Of Newton's method, its residual (with or without the matrix), its matrix.
     largest_turn : float [rad]
         Greatest turn of an edge within one inner step.
+    energy_momentum_steps : int
+        Inner steps of the energy-momentum rule: all of those of the default integrator and of "fourth_order".
     branch_changes : int
         Equilibria that lie on another branch than the state before; see `Equilibrium.branch_changed`.
-    energy_momentum_steps : int
-        Taken in place of implicit midpoint steps that gained energy (with `adaptive`).
     assembly_time, solve_time, fluid_time, total_time : float [s]
         Fluid: of Stokeslets, whose equations are solved once a step.
     """
@@ -239,8 +239,8 @@ class Statistics:
     evaluations: int
     factorizations: int
     largest_turn: float
-    branch_changes: int
     energy_momentum_steps: int
+    branch_changes: int
     assembly_time: float
     solve_time: float
     fluid_time: float

@@ -14,6 +14,7 @@ from withe.errors import (
     CoarseMeshWarning,
     CoarseStepWarning,
     ConvergenceError,
+    EnergyDriftWarning,
     OutOfPlaneWarning,
     RingLeftWarning,
 )
@@ -197,12 +198,14 @@ def convergence_error(session: Session, numbers: tuple[Any, ...]) -> Convergence
 
 
 def pass_on(sessions: Sequence[Session], found: _core.Warnings) -> None:
-    """Give warnings of the engine where there are any: of meshes, steps for motion and impacts, branches and planes."""
+    """Give the warnings of the engine: meshes, steps for motion and impacts, energy, branches and planes."""
     if found.mesh:
         warnings.warn(found.mesh, CoarseMeshWarning, stacklevel=_levels_to_user())
     for coarse in (found.steps, found.impact):
         if coarse and any(session.options.time_step > session.longest_meant for session in sessions):
             warnings.warn(coarse, CoarseStepWarning, stacklevel=_levels_to_user())
+    if found.drift:
+        warnings.warn(found.drift, EnergyDriftWarning, stacklevel=_levels_to_user())
     if found.branch:
         warnings.warn(found.branch, BranchChangedWarning, stacklevel=_levels_to_user())
     if found.plane:
