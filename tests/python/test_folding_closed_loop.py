@@ -36,6 +36,20 @@ def test_the_edges_meet_though_the_sheet_slides(half):
     assert watched.seen_slides[-1] == pytest.approx(watched.slide, abs=5e-4)
 
 
+@pytest.mark.parametrize("seed", [11, 12, 13])
+def test_large_sheets_that_slide_are_folded_within_a_millimetre(seed):
+    """Sheets up to A3, whose far edges are wider than those of A4: a camera has to see both corners of the edge."""
+    random = np.random.default_rng(seed)
+    length, lgb, friction = random.uniform([0.33, 0.045, 0.2], [0.42, 0.07, 0.4])
+    paper = Paper(length, length / np.sqrt(2.0), lgb, friction)
+    noise = replace(Noise.none(), friction=0.1, friction_variation=0.1)
+    found = fold(plan(paper, 0.8 * length), SimulatedSheet(paper, seed, noise, **COARSE), progress=False)
+    assert found.failure is None
+    assert found.slide > 3e-3
+    assert np.isfinite(found.seen_slides[:-1]).all()
+    assert abs(found.error) < 1e-3
+
+
 @pytest.mark.parametrize("target", ["half", 0.25])
 def test_no_slide_is_seen_where_there_is_none(target):
     # Not by the corners of the lifted edge over the far one, nor by those of a picture's pixels.
@@ -99,7 +113,8 @@ def test_a_sheet_that_slides_off_the_manifold_is_led_on_to_where_it_can_be_held(
 
 def test_a_hidden_edge_is_said_and_not_guessed(half):
     aside = overhead_camera(1.5)
-    watched = fold(half, SimulatedSheet(A4, **COARSE), replans=1, camera=aside, progress=False)
+    with pytest.warns(UserWarning, match="the camera never saw the sheet's far edge"):
+        watched = fold(half, SimulatedSheet(A4, **COARSE), replans=1, camera=aside, progress=False)
     assert np.isnan(watched.seen_slides).all()
 
 

@@ -13,6 +13,7 @@ from withe.perception import Camera
 
 cv2 = pytest.importorskip("cv2")
 
+from withe.folding.seeing import camera_over  # noqa: E402
 from withe.folding.views import strip_picture, table_picture  # noqa: E402
 
 A4 = Paper.a4()
@@ -127,6 +128,18 @@ def test_the_far_edge_is_found_within_half_a_millimetre_at_half_a_millimetre_a_p
         assert np.hypot(*(seen.corners[1] - seen.corners[0])) == pytest.approx(paper.width, abs=5e-4)
     assert np.abs(off).max() < 5e-4
     assert np.abs(np.mean(off)) < 1e-4
+
+
+def test_the_camera_of_a_watched_fold_sees_the_far_edge_of_sheets_of_any_width():
+    random = np.random.default_rng(60)
+    for _ in range(20):
+        width = random.uniform(0.1, 0.6)
+        paper, slide = Paper(np.sqrt(2.0) * width, width, 0.06), random.uniform(-0.03, 0.03)
+        camera = camera_over(paper)
+        pixel = float(np.ptp(camera.to_plane([[319.0, 239.5], [320.0, 239.5]])[:, 0]))
+        picture = table_picture(both_sides(lying(paper, slide), width), camera, (640, 480), random)
+        assert find_edge(picture, camera, paper).x - paper.length == pytest.approx(slide, abs=0.5 * pixel)
+        assert pixel < 1.001 * max(5e-4, width / 400)
 
 
 def test_a_layer_that_is_folded_over_does_not_hide_the_edge():

@@ -17,13 +17,16 @@ from withe.perception.camera import Camera
 from withe.perception.masks import MaskFunction, border_filter
 from withe.perception.tracing import check_image, read_image
 
-__all__ = ["SeenEdge", "find_edge", "overhead_camera"]
+__all__ = ["SeenEdge", "camera_over", "find_edge", "overhead_camera"]
 
 FloatArray = npt.NDArray[np.float64]
 _CORNERS, _QUALITY, _APART = 40, 0.05, 12.0  # at most, of the best, [px]
 _BLUR, _BLOCK = 1.5, 7  # of what is inside [px]: steps of single pixels along an edge look like corners
 _WINDOW = (5, 5)  # half of what a corner is refined by [px]
 _BORDER = 8  # of the picture, at which the sheet is cut off [px]
+_PICTURE = (640, 480)  # width and height of a picture [px]
+_HEIGHT, _PIXEL = 0.6, 5e-4  # of an overhead camera, and of a pixel on the table under it [m]
+_EDGE_SHARE = 1 / 1.1  # of a picture's height that a far edge may span: room for the edge to turn and for _BORDER
 _OFF = 0.01  # of the width, by which two corners' distance may differ from it
 _TURN = np.radians(20.0)  # of an edge, at most
 
@@ -47,7 +50,7 @@ class SeenEdge:
     corners: FloatArray
 
 
-def overhead_camera(x: float, *, height: float = 0.6, pixel: float = 5e-4) -> Camera:
+def overhead_camera(x: float, *, height: float = _HEIGHT, pixel: float = _PIXEL) -> Camera:
     """Make a camera of 640 by 480 pixels over the table that looks straight down on the middle of an edge.
 
     Parameters
@@ -78,7 +81,19 @@ def overhead_camera(x: float, *, height: float = 0.6, pixel: float = 5e-4) -> Ca
     height, pixel = validation.positive(height, "height"), validation.positive(pixel, "pixel")
     focal, down = height / pixel, np.diag([1.0, -1.0, -1.0])
     place = np.array([validation.number(x, "x"), 0.0, height])
-    return Camera([[focal, 0.0, 319.5], [0.0, focal, 239.5], [0.0, 0.0, 1.0]], rotation=down, translation=-down @ place)
+    middle = 0.5 * (_PICTURE[0] - 1), 0.5 * (_PICTURE[1] - 1)
+    lens = [[focal, 0.0, middle[0]], [0.0, focal, middle[1]], [0.0, 0.0, 1.0]]
+    return Camera(lens, rotation=down, translation=-down @ place)
+
+
+def camera_over(paper: Paper) -> Camera:
+    """Return an `overhead_camera` over the far edge of a flat sheet, hung as high as the edge's width asks for.
+
+    Both corners of the edge have to be in the picture: `find_edge` knows the edge by them.
+    """
+    wide = float(paper.width_at(paper.length))
+    higher = max(1.0, wide / (_EDGE_SHARE * _PICTURE[1] * _PIXEL))
+    return overhead_camera(paper.length, height=higher * _HEIGHT, pixel=higher * _PIXEL)
 
 
 def find_edge(
