@@ -10,9 +10,11 @@
 ///   X cos(tau) = c = d1_a . d1_b + d2_a . d2_b,  X sin(tau) = s = d2_a . d1_b - d1_a . d2_b,
 /// and change exactly (D for differences) by
 ///   D v_i = (D y_i - mean v_i D x) / mean X,
-///   D tau = D tau / (X0 X1 sin D tau) (mean c D s - mean s D c).
-/// Those halfway are kappa = R v, R a turn by tau / 2, and with J (x, y) = (y, -x)
-///   D kappa = mean R D v + D R mean v,  D R = (2 tan(D tau / 4) / D tau) J mean R D tau.
+///   D tau = D tau / (X0 X1 sin D tau) (mean c D s - mean s D c),
+/// and so do those in the directors of the second frame, y_i = -2 t_a . di_b. Those halfway are kappa = R v(a) =
+/// R^T v(b), R a turn by tau / 2. Half of either, so that a rod drawn backwards has the same moments, makes
+///   D kappa = mean R D v(a) / 2 + mean R^T D v(b) / 2 + tan(D tau / 4) sin(D tau / 2) / (2 D tau) D kappa' D tau,
+/// kappa' the change of kappa over the step: with J (x, y) = (y, -x), D R = (2 tan(D tau / 4) / D tau) J mean R D tau.
 /// The energy is a sum of squares of f(|kappa|^2) times strains, f rational, whose differences are exact products too.
 /// What follows is a moment m with m . (w_a - w_b) = E1 - E0, without a quotient of differences: it is as smooth as the
 /// energy, where Gonzalez's correction along a direction of the unknowns depends on how little a stencil deforms while
@@ -86,45 +88,61 @@ DividedMoments<Scalar> divided_moments(const BendMeasure& measure, const Vec3<Sc
   return h;
 }
 
-/// From moments that belong to the curvatures halfway and tau to those of the curvatures v in the first frame, and tau.
-/// `end` has kappa and tau at the end, `v` is the mean, and `turn` of the step's D tau.
+/// How moments follow from the curvatures v in the directors of either frame and from the twist: factors with
+/// sum_i (a_i D v_i(a) + b_i D v_i(b)) + twist D tau = E1 - E0.
+template <class Scalar>
+struct FrameMoments {
+  Vec2<Scalar> a, b;
+  Scalar twist;
+  /// By curvatures in the first frame at the end and by tau there; where asked for.
+  Vec2<Scalar> a_by[3], b_by[3];
+  Scalar twist_by[3];
+};
+
+/// From moments that belong to the curvatures halfway, kappa, and tau, those at both ends of the step being `start` and
+/// `end`; `turn`: of the step's D tau.
 template <bool second_too, class Scalar>
-void apply_half_twist(const HalfTwist<Scalar>& half0, const HalfTwist<Scalar>& half1, const TurnOverSine<Scalar>& turn,
-                      const Vec3<Scalar>& end, const Vec2<Scalar>& v, DividedMoments<Scalar>& h) {
+FrameMoments<Scalar> frame_moments(const HalfTwist<Scalar>& half0, const HalfTwist<Scalar>& half1,
+                                   const TurnOverSine<Scalar>& turn, const Vec3<Scalar>& start,
+                                   const Vec3<Scalar>& end, const DividedMoments<Scalar>& h) {
   const HalfTwist<Scalar> mean{0.5 * (half0.cosine + half1.cosine), 0.5 * (half0.sine + half1.sine)};
   const Scalar C = half0.cosine * half1.cosine + half0.sine * half1.sine;  // cos(D tau / 2)
-  const Scalar q = 1.0 / (turn.value * C * (1.0 + C));                     // 2 tan(D tau / 4) / D tau
-  const Vec2<Scalar> kappa = mean.to_halfway(v), by_tau{q * kappa.y, -(q * kappa.x)}, moment{h.by[0], h.by[1]};
+  const Scalar S = half0.cosine * half1.sine - half0.sine * half1.cosine;
+  const Scalar q = 1.0 / (turn.value * C * (1.0 + C));  // 2 tan(D tau / 4) / D tau
+  const Vec2<Scalar> moment{h.by[0], h.by[1]}, change{end.x - start.x, end.y - start.y};
+  const Scalar along = 0.25 * (q * S);
+  FrameMoments<Scalar> out;
+  out.a = 0.5 * mean.to_first(moment);
+  out.b = 0.5 * mean.to_halfway(moment);
+  out.twist = h.by[2] + along * dot(moment, change);
   if constexpr (second_too) {
-    const Scalar S = half0.cosine * half1.sine - half0.sine * half1.cosine;
     const Scalar q_slope = 0.5 * S * (1.0 / (1.0 + C) + 1.0 / C) - turn.slope / turn.value;  // over q
-    // By tau at the end, with which kappa changes there, and by v at the end.
-    Scalar with_tau[3];
-    Vec2<Scalar> with_v[3];
-    for (int i = 0; i < 3; ++i) {
-      with_tau[i] = h.second[i][2] + 0.5 * (h.second[i][0] * end.y - h.second[i][1] * end.x);
-      with_v[i] = half1.to_first({h.second[i][0], h.second[i][1]});
+    const Vec2<Scalar> across = half1.to_halfway({0.125 * moment.y, -0.125 * moment.x}),
+                       back = half1.to_first({-0.125 * moment.y, 0.125 * moment.x});
+    // By kappa at the end and by tau, and then by what kappa follows from.
+    Vec2<Scalar> a_by[3], b_by[3];
+    Scalar twist_by[3];
+    for (int j = 0; j < 3; ++j) {
+      const Vec2<Scalar> second{h.second[0][j], h.second[1][j]};
+      a_by[j] = 0.5 * mean.to_first(second);
+      b_by[j] = 0.5 * mean.to_halfway(second);
+      twist_by[j] = h.second[2][j] + along * dot(second, change);
     }
-    const Vec2<Scalar> turned = half1.to_halfway(v), across = mean.to_first({-moment.y, moment.x});
-    h.second[2][2] = with_tau[2] + with_tau[0] * by_tau.x + with_tau[1] * by_tau.y + q_slope * dot(moment, by_tau) -
-                     0.25 * (q * dot(moment, turned));
-    const Vec2<Scalar> along_tau = with_v[2] + by_tau.x * with_v[0] + by_tau.y * with_v[1] + (0.5 * q) * across;
-    const Vec2<Scalar> own = mean.to_first({with_tau[0], with_tau[1]});
-    const Vec2<Scalar> turning = half1.to_first({-0.25 * moment.y, 0.25 * moment.x});
-    const Vec2<Scalar> by1 = mean.to_first({with_v[0].x, with_v[1].x}), by2 = mean.to_first({with_v[0].y, with_v[1].y});
-    h.second[0][0] = by1.x;
-    h.second[1][0] = by1.y;
-    h.second[2][0] = along_tau.x;
-    h.second[0][1] = by2.x;
-    h.second[1][1] = by2.y;
-    h.second[2][1] = along_tau.y;
-    h.second[0][2] = own.x + turning.x;
-    h.second[1][2] = own.y + turning.y;
+    twist_by[0] += along * moment.x;
+    twist_by[1] += along * moment.y;
+    a_by[2] += back;
+    b_by[2] += across;
+    twist_by[2] += (0.25 * (q * q_slope * S) + 0.125 * (q * C)) * dot(moment, change);
+    const auto follow = [&](const auto(&by)[3], auto(&into)[3]) {
+      into[0] = half1.cosine * by[0] - half1.sine * by[1];
+      into[1] = half1.sine * by[0] + half1.cosine * by[1];
+      into[2] = by[2] + (0.5 * end.y) * by[0] - (0.5 * end.x) * by[1];
+    };
+    follow(a_by, out.a_by);
+    follow(b_by, out.b_by);
+    follow(twist_by, out.twist_by);
   }
-  h.by[2] += dot(moment, by_tau);
-  const Vec2<Scalar> first = mean.to_first(moment);
-  h.by[0] = first.x;
-  h.by[1] = first.y;
+  return out;
 }
 
 /// The moment m [N m] with m . (w_a - w_b) = E1 - E0, and its derivatives by spins of the two frames at the end.
@@ -139,7 +157,7 @@ void discrete_moment(const BendMeasure& measure, const EdgeFrame<Scalar>& a0, co
                      const EdgeFrame<Scalar>& b0, const EdgeFrame<Scalar>& b1, const Vec3<Scalar>& start,
                      const Vec3<Scalar>& end, const Vec3<Scalar>& natural, const Vec3<Scalar>& stiffness,
                      DiscreteMoment<Scalar>& out) {
-  DividedMoments<Scalar> h = divided_moments<with_matrix>(measure, start, end, natural, stiffness);
+  const DividedMoments<Scalar> divided = divided_moments<with_matrix>(measure, start, end, natural, stiffness);
   const auto mean = [](const Vec3<Scalar>& p, const Vec3<Scalar>& q) { return Scalar(0.5) * (p + q); };
   const Vec3<Scalar> ta = mean(a0.tangent, a1.tangent), tb = mean(b0.tangent, b1.tangent);
   const Vec3<Scalar> a[2] = {mean(a0.d1, a1.d1), mean(a0.d2, a1.d2)}, b[2] = {mean(b0.d1, b1.d1), mean(b0.d2, b1.d2)};
@@ -153,19 +171,22 @@ void discrete_moment(const BendMeasure& measure, const EdgeFrame<Scalar>& a0, co
   const TurnOverSine<Scalar> turn = turn_over_sine(end.z - start.z, sine, cosine);
   const Scalar g = turn.value * inverse_chi;
   const HalfTwist<Scalar> half0 = half_twist(start.z), half1 = half_twist(end.z);
-  const Vec2<Scalar> u = half1.to_first({end.x, end.y});
-  const Vec2<Scalar> k = Scalar(0.5) * (half0.to_first({start.x, start.y}) + u);
-  apply_half_twist<with_matrix>(half0, half1, turn, end, k, h);
+  const FrameMoments<Scalar> h = frame_moments<with_matrix>(half0, half1, turn, start, end, divided);
+  // Curvatures in the directors of the first and of the second frame: at the end, and their means.
+  const Vec2<Scalar> kappa{end.x, end.y}, u = half1.to_first(kappa), v = half1.to_halfway(kappa);
+  const Vec2<Scalar> ka = Scalar(0.5) * (half0.to_first({start.x, start.y}) + u),
+                     kb = Scalar(0.5) * (half0.to_halfway({start.x, start.y}) + v);
 
-  // m = sum of weights times the cross products that belong to x, y1, y2, c and s.
-  const Scalar w[2] = {inverse * h.by[0], inverse * h.by[1]}, wx = -(w[0] * k.x + w[1] * k.y);
-  const Scalar hg = h.by[2] * g, ws = hg * c, wc = -(hg * s);
-  const Vec3<Scalar> P[3] = {wx * tb, (2.0 * w[0]) * tb + wc * b[0] - ws * b[1],
-                             (2.0 * w[1]) * tb + ws * b[0] + wc * b[1]};
+  // m = sum of weights times the cross products that belong to x, to y1 and y2 of either frame, to c and s.
+  const Vec2<Scalar> wa = inverse * h.a, wb = inverse * h.b;
+  const Scalar wx = -(dot(wa, ka) + dot(wb, kb));
+  const Scalar hg = h.twist * g, ws = hg * c, wc = -(hg * s);
+  const Vec3<Scalar> P[3] = {wx * tb - 2.0 * (wb.x * b[0] + wb.y * b[1]), (2.0 * wa.x) * tb + wc * b[0] - ws * b[1],
+                             (2.0 * wa.y) * tb + ws * b[0] + wc * b[1]};
   out.moment = cross(ta, P[0]) + cross(a[0], P[1]) + cross(a[1], P[2]);
   if constexpr (with_matrix) {
-    const Vec3<Scalar> Q[3] = {wx * ta + 2.0 * (w[0] * a[0] + w[1] * a[1]), wc * a[0] + ws * a[1],
-                               wc * a[1] - ws * a[0]};
+    const Vec3<Scalar> Q[3] = {wx * ta + 2.0 * (wa.x * a[0] + wa.y * a[1]), wc * a[0] + ws * a[1] - (2.0 * wb.x) * ta,
+                               wc * a[1] - ws * a[0] - (2.0 * wb.y) * ta};
     const Vec3<Scalar>*at[3] = {&a1.tangent, &a1.d1, &a1.d2}, *bt[3] = {&b1.tangent, &b1.d1, &b1.d2};
     out.by_a = out.by_b = Mat3<Scalar>{};
     Scalar trace_a{0.0}, trace_b{0.0};
@@ -184,16 +205,19 @@ void discrete_moment(const BendMeasure& measure, const EdgeFrame<Scalar>& a0, co
                        vs = cross(a[1], b[0]) - cross(a[0], b[1]);
     const Vec3<Scalar> strain[3] = {i1 * (2.0 * cross(a1.d1, b1.tangent) - u.x * x),
                                     i1 * (2.0 * cross(a1.d2, b1.tangent) - u.y * x), -(i1 * (a1.tangent + b1.tangent))};
-    const Vec3<Scalar> y[2] = {2.0 * cross(a[0], tb), 2.0 * cross(a[1], tb)};
-    const Vec3<Scalar> my[2] = {inverse * (y[0] - k.x * vx), inverse * (y[1] - k.y * vx)};
+    const Vec3<Scalar> ya[2] = {2.0 * cross(a[0], tb), 2.0 * cross(a[1], tb)},
+                       yb[2] = {2.0 * cross(b[0], ta), 2.0 * cross(b[1], ta)};
+    const Vec3<Scalar> ma[2] = {inverse * (ya[0] - ka.x * vx), inverse * (ya[1] - ka.y * vx)},
+                       mb[2] = {inverse * (yb[0] - kb.x * vx), inverse * (yb[1] - kb.y * vx)};
     const Vec3<Scalar> twisting = c * vs - s * vc, mt = g * twisting;
-    const Vec3<Scalar> bending = w[0] * y[0] + w[1] * y[1] + wx * vx;
+    const Vec3<Scalar> bending = wa.x * ya[0] + wa.y * ya[1] + wb.x * yb[0] + wb.y * yb[1] + wx * vx;
+    // What wx changes by with the means of curvatures; those of the second frame turn with tau.
+    const Vec2<Scalar> by_curvature = Scalar(0.5) * (wa + half1.to_first(half1.to_first(wb)));
+    const Scalar falling[3] = {by_curvature.x, by_curvature.y, 0.5 * (wb.x * v.y - wb.y * v.x)};
     for (int j = 0; j < 3; ++j) {
-      Vec3<Scalar> W = h.second[0][j] * my[0] + h.second[1][j] * my[1] + h.second[2][j] * mt;
-      if (j < 2)
-        W -= (0.5 * w[j]) * vx;
-      else
-        W += (h.by[2] * turn.slope * inverse_chi) * twisting - (0.5 * hg) * (s1 * vs + c1 * vc);
+      Vec3<Scalar> W = h.a_by[j].x * ma[0] + h.a_by[j].y * ma[1] + h.b_by[j].x * mb[0] + h.b_by[j].y * mb[1] +
+                       h.twist_by[j] * mt - falling[j] * vx;
+      if (j == 2) W += (h.twist * turn.slope * inverse_chi) * twisting - (0.5 * hg) * (s1 * vs + c1 * vc);
       add_outer(out.by_a, Scalar(1.0), W, strain[j]);
       add_outer(out.by_b, Scalar(-1.0), W, strain[j]);
     }

@@ -42,9 +42,13 @@ Loss = npt.ArrayLike | Mapping[str, Any]
 """Derivatives of a scalar: by positions of every node, or by words of read-outs; see `Equilibrium.gradient`."""
 
 
-def _rates_differ(session: Session) -> bool:
-    """Whether reactions hold the inertia of what supports turn by other rates than the equations do."""
-    if session.options.integrator == "implicit_midpoint":
+def _poses_unknown(session: Session) -> bool:
+    """Whether derivatives of reaction moments by poses are unknown.
+
+    Reactions hold the inertia of what supports turn by other rates than the equations of midpoint steps do, and of held
+    edges in space; and moments of the parts of a fourth-order step are about where a hand is in each.
+    """
+    if session.options.integrator in ("implicit_midpoint", "fourth_order"):
         return True
     held = any(part.kind == "hold_edge" for part in session.directory.all(SupportPart))
     return held and not session.world.plan.planar
@@ -173,7 +177,7 @@ class RunDerivatives:
             kept,
             [unknown_reader(self._session, unknown) for unknown in kept],
             drawn=list(drawn.values()),
-            by_moves=not ("reaction_moments" in by and _rates_differ(self._session)),
+            by_moves=not ("reaction_moments" in by and _poses_unknown(self._session)),
         )
         initial = self._tape.gradient(
             [_core.MomentAdjoint(steps, each) for steps, each in zip(self._steps, adjoints, strict=True)],
