@@ -11,6 +11,10 @@ implicit integrator that takes them, at default options. Written down is the gre
 - the energy balance, stored + dissipated - work, over what there is at the start;
 - how much of what was dissipated came back, which viscosity never gives.
 
+Thirty drawn robots (three rods from a clamp or a pin, in rigid, pinned and revolute joints with springs, with tendons)
+fall from rest for 20 s, in steps of 5, 1 and 0.25 ms, by the default integrator and by fourth order. Nothing takes
+energy from them, and none may change by more than 1e-5 of the greatest kinetic energy.
+
 Momenta are read by `simulation.momentum()`. That the instrument is right is shown by what theory knows to the last
 digit: the midpoint rule keeps angular momentum in a plane, and in a torque-free step of backward Euler it changes by
 dt times the sum of v1 x (M v0), the mass matrix M made here. Of driven rods, the work of a support is its mean force
@@ -25,11 +29,13 @@ angle: there either book is of second order.
 
 from __future__ import annotations
 
+import inspect
 import math
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
-from conservation_cases import KINDS, Case, draw, spinning_rod
+from conservation_cases import KINDS, Case, draw, held, spinning_rod
 from reporting import OUT, Report, arguments, bar
 
 import withe
@@ -37,6 +43,7 @@ import withe
 INTEGRATORS = ("backward_euler", "implicit_midpoint", "energy_momentum", "fourth_order")
 STEPS_A_PERIOD = (1000, 100, 20, 5)
 LOOKS = 50
+HELD_STEPS = (5e-3, 1e-3, 2.5e-4)  # [s]
 
 
 @dataclass(frozen=True)
@@ -106,7 +113,45 @@ def worst_of(flights: list[Flight], name: str) -> float:
 
 def energy_off(flight: Flight) -> float:
     """What the energy goal of a scheme looks at."""
-    return max(flight.gained, flight.lost) if flight.integrator == "energy_momentum" else flight.gained
+    conserves = flight.integrator in ("energy_momentum", "fourth_order")
+    return max(flight.gained, flight.lost) if conserves else flight.gained
+
+
+# --- robots that something holds ---------------------------------------------------------------------------------
+
+
+def drift(number: int, integrator: str, time_step: float, seconds: float) -> float:
+    """Greatest change of the energy balance of a robot that falls from rest, over its greatest kinetic energy."""
+    simulation = held(number, integrator, time_step)
+    first, _, _ = balances(simulation)
+    worst = kinetic = 0.0
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # steps of 5 ms do not resolve all of them
+        for _ in range(200):
+            simulation.step(round(seconds / time_step) // 200)
+            worst = max(worst, abs(balances(simulation)[0] - first))
+            kinetic = max(kinetic, simulation.energy().kinetic)
+    return worst / kinetic
+
+
+def add_held(report: Report, cases: int, seconds: float) -> None:
+    """What robots keep of their energy by the default integrator and by fourth order, whatever the step."""
+    rows, default = [], inspect.signature(withe.Scene.build).parameters["integrator"].default
+    with bar(cases * 6, "robots") as shown:
+        for integrator in (default, "fourth_order"):
+            found = []
+            for time_step in HELD_STEPS:
+                found.append([])
+                for number in range(cases):
+                    found[-1].append(drift(number, integrator, time_step, seconds))
+                    shown.advance(1)
+            rows += [
+                [integrator, f"{1e3 * step:g} ms", figure(float(np.median(each))), figure(max(each))]
+                for step, each in zip(HELD_STEPS, found, strict=True)
+            ]
+            report.goal(f"robots, {integrator}: energy over {seconds:g} s", np.max(found), 1e-5, at_least=False)
+    header = ["integrator", "step", "median", "greatest"]
+    report.table(f"{cases} robots: greatest change of energy over the greatest kinetic energy", header, rows)
 
 
 # --- whether the instrument is right --------------------------------------------------------------------------
@@ -273,8 +318,11 @@ def add_goals(report: Report, flights: list[Flight]) -> None:
             report.goal(f"{integrator}: angular momentum", worst_of(own, "angular"), 1e-9, at_least=False)
         if integrator != "backward_euler":  # whose forces act at the end of a way, and work a little otherwise along it
             report.goal(f"{integrator}: dissipated comes back", worst_of(own, "fed"), 1e-9, at_least=False)
-        limit = 1e-6 if integrator == "energy_momentum" else 1e-3
-        what = "energy, either way" if integrator == "energy_momentum" else "energy gained"
+        if integrator == "implicit_midpoint":  # plain, and so without a bound: it warns
+            continue
+        conserves = integrator in ("energy_momentum", "fourth_order")
+        limit = 1e-6 if conserves else 1e-3
+        what = "energy, either way" if conserves else "energy gained"
         report.goal(f"{integrator}: {what}", max(map(energy_off, own), default=math.nan), limit, at_least=False)
     report.goal("flights that did not converge", sum(bool(f.failure) for f in flights), 0, at_least=False)
 
@@ -302,6 +350,7 @@ def main() -> None:
     report.table("Angular momentum that backward Euler loses", ["steps", "lost of J", "theory apart by"], rows)
     order = math.log2(losses[200][0] / losses[400][0])
     add_driven(report)
+    add_held(report, 2 if options.quick else 30, 0.2 if options.quick else 20.0)
 
     add_goals(report, flights)
     report.goal("backward Euler's loss of J: order", order, 0.9)

@@ -9,7 +9,7 @@ import numpy as np
 
 import withe
 
-__all__ = ["KINDS", "Case", "draw", "spinning_rod"]
+__all__ = ["KINDS", "Case", "draw", "held", "spinning_rod"]
 
 KINDS = ("rod", "joint", "ring", "curl", "contact")
 
@@ -127,3 +127,46 @@ def spinning_rod(integrator: str, periods: float, steps: int) -> tuple[withe.Sim
     for edge, length in enumerate(np.linalg.norm(np.diff(points, axis=0), axis=1)):
         mass[edge : edge + 2, edge : edge + 2] += 1000.0 * np.pi * 5e-3**2 * length / 6.0 * np.array([[2, 1], [1, 2]])
     return simulation, rod, mass, period
+
+
+def held(number: int, integrator: str, time_step: float) -> withe.Simulation:
+    """A conservative robot that falls from rest: three rods from a clamp or a pin, in joints, on hinges and tendons.
+
+    Nothing is viscous, nothing drags or rubs, and what holds it stands still.
+    """
+    r = np.random.default_rng([62, number])
+    scene = withe.Scene(gravity=6.0 * r.normal(size=3))
+
+    def curve(start: np.ndarray, length: float, nodes: int) -> np.ndarray:
+        s = np.linspace(0.0, 1.0, nodes)[:, None]
+        way, bow = r.normal(size=(2, 3))
+        return start + length * (s * way / np.linalg.norm(way) + 0.15 * s**2 * bow)
+
+    trunk = curve(np.zeros(3), 0.2, int(r.integers(6, 14)))
+    rods = []
+    for points in (
+        trunk,
+        curve(trunk[-1], 0.15, int(r.integers(5, 10))),
+        curve(trunk[-1], 0.12, int(r.integers(5, 9))),
+    ):
+        width, height = r.uniform(5e-3, 1e-2, 2)
+        material = withe.Material(
+            youngs_modulus=10.0 ** r.uniform(5.3, 6.5), poisson_ratio=r.uniform(0.2, 0.5), density=r.uniform(800, 1500)
+        )
+        section = withe.Rectangle(width=width, height=height) if r.random() < 0.5 else withe.Circle(radius=0.5 * width)
+        curvature = r.normal(0.0, 3.0, (len(points) - 2, 2)) if r.random() < 0.5 else None
+        rods.append(scene.add_rod(points=points, section=section, material=material, natural_curvature=curvature))
+    (scene.clamp if number % 3 else scene.pin)(rods[0].start)
+    kind = ("rigid", "pinned", "revolute")[number % 3]
+    for arm in rods[1:]:
+        if kind == "revolute":
+            spring = {"stiffness": 10.0 ** r.uniform(-4.0, -1.5), "rest_angle": r.uniform(-0.5, 0.5)}
+            scene.join(rods[0].end, arm.start, kind, axis=r.normal(size=3), **spring)
+        else:
+            scene.join(rods[0].end, arm.start, kind)
+    scene.add_mass(rods[1].end, r.uniform(0.0, 5e-3))
+    if r.random() < 0.5:
+        scene.add_tendon(rods[0], offset=r.uniform(-4e-3, 4e-3, 2), tension=r.uniform(0.05, 0.5))
+    if r.random() < 0.5:
+        scene.add_spring(rods[1].end, rods[2].end, stiffness=10.0 ** r.uniform(-1.0, 1.0), rest_length=0.1)
+    return scene.build(integrator=integrator, time_step=time_step, planar=False)
