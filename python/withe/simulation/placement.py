@@ -273,8 +273,8 @@ class Placement:
         ----------
         rod : Rod or str
         positions : array_like of shape (nodes, 3) [m]
-            The first director of the first edge follows by the smallest turn. Nodes that a support holds must stay:
-            move the support first.
+            The first director of the first edge follows by the smallest turn. Nodes that a support holds must stay, or
+            go to the position to which `move` moved the support without `over`.
         velocities : array_like of shape (nodes, 3) or (3,) [m/s]
             Those of nodes that are held stay as they are.
         twist : float or array_like of shape (stencils,) [rad/m]
