@@ -174,10 +174,11 @@ class Placement:
         tangent : array_like of shape (3,)
             Where the rod is to point, instead: the smallest turn from the drawn tangent, and then ...
         roll : float [rad]
-            ... a turn about it. Full turns count, and take time: at most half a turn in a time step. An obstacle turns
-            so about the normal of a plane, the axis of a capsule from start to end, or the tangent that is given for a
-            sphere: rollers, drums and turntables, which drag rods by friction. A belt is a plane that moves along
-            itself.
+            ... a turn about it. Full turns count, and take time: at most half a turn in a time step. With
+            integrator="static" they need no time: `equilibrium` and a step follow a roll of any size that is given
+            without `over`. An obstacle turns so about the normal of a plane, the axis of a capsule from start to end,
+            or the tangent that is given for a sphere: rollers, drums and turntables, which drag rods by friction. A
+            belt is a plane that moves along itself.
         over : float [s]
             Reached after so long, evenly; within the next step by default.
         path : callable, pair of callables, or array_like of shape (poses, 4) or (poses, 8)
