@@ -17,15 +17,14 @@ constexpr int kMostStiffenings = 8;
 constexpr double kRelieved = 0.9;
 
 constexpr const char* kSideways =
-    "the equilibrium in the plane of the scene is not stable against motions out of it: in space the scene buckles or "
-    "tips over sideways; build(planar=False) lets it, build(planar=True) says that something keeps it in its plane";
+    "the equilibrium is not stable against motions out of its plane: in space the scene buckles or tips over sideways; "
+    "build(planar=False) lets it, build(planar=True) says that something keeps it in its plane";
 
 constexpr const char* kNotInSpace =
-    "the equilibrium is stable in the plane of the scene, and was not looked at in space, where a clamp cannot hold "
+    "the equilibrium was found stable in its plane alone: it was not looked at in space, where a clamp cannot hold "
     "what "
-    "turns about one of several hinges: clamp what they turn against, or build(planar=True) says that something keeps "
-    "it "
-    "in its plane";
+    "turns about one of several hinges; clamp what they turn against, or build(planar=True) says that something keeps "
+    "it in its plane";
 
 }  // namespace
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import warnings
 from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any
@@ -12,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.user_warnings import warn
 from withe.deployment.cable import Cable
 from withe.deployment.feasibility import Controller, Feasibility, examine
 from withe.deployment.letters import written
@@ -277,11 +277,10 @@ class Pattern:
         self.deviation = float(distances(self.raw, self.points).max())
         if self.deviation > _MUCH_FARTHER * smoothing:
             away, asked = 1e3 * self.deviation, 1e3 * smoothing
-            warnings.warn(
-                f"the pattern is {away:.1f} mm from what was given, where {asked:.1f} mm were asked for: {nodes} nodes"
+            warn(
+                f"the pattern is {away:.1f} mm from what was given, for a smoothing of {asked:.1f} mm: {nodes} nodes"
                 f" sample that every {1e3 * even[1]:.1f} mm, too coarsely for its bends; give more nodes",
-                UserWarning,
-                stacklevel=3,
+                cause="pattern",
             )
 
     def to_dict(self) -> dict[str, Any]:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
 from withe.common import validation
+from withe.common.user_warnings import warn
 from withe.folding.jaw import Jaw
 from withe.folding.paper import Paper
 from withe.folding.planning import Grasp, Method, Source, least_friction, slow_plan
@@ -136,7 +136,7 @@ def plan(
         said = _unseen(slow)
     if said is None:
         if method not in ("slip", "intuitive") and slow.jumps_at is not None:
-            warnings.warn(_jumps(slow), UserWarning, stacklevel=2)
+            warn(_jumps(slow), cause="jumps")
         return slow
     if ending == "auto" and (grasp == "free" or replans):
         try:
@@ -144,7 +144,7 @@ def plan(
         except ValueError as error:
             said = f"{said}; {error}"
             slow = replace(slow, blocked=said)
-    warnings.warn(said, UserWarning, stacklevel=2)
+    warn(said, cause="slides")
     return slow
 
 
@@ -171,4 +171,7 @@ def _unseen(slow: Plan) -> str | None:
     needed = float(slow.slip_ratio[slow.poses[:, 0] > slow.poses[-1, 0] - _UNSEEN * lgb].max())
     if needed <= least:
         return None
-    return f"the last part, in which nobody sees the sheet slide, needs friction {needed:.3f}, there may be {least:.3g}"
+    return (
+        f"the end of the fold needs friction {needed:.3f}: there may be {least:.3g}, and no camera sees the sheet "
+        "slide there"
+    )
