@@ -19,6 +19,7 @@ from withe.errors import (
     CoarseStepWarning,
     ConvergenceError,
     OutOfPlaneWarning,
+    PlausibilityWarning,
     RingLeftWarning,
 )
 from withe.parts.friction_fields import FrictionMap
@@ -72,6 +73,7 @@ __all__ = [
     "Obstacle",
     "OutOfPlaneWarning",
     "Plan",
+    "PlausibilityWarning",
     "Reaction",
     "Record",
     "Rectangle",

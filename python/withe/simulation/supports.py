@@ -11,6 +11,7 @@ from withe.common import drawing, validation
 from withe.parts.description import describe_support
 from withe.parts.handles import Handle, NodeHandle, Support
 from withe.parts.kinds import SupportPart
+from withe.parts.plausibility import check_angle
 from withe.parts.supports import check_not_held
 from withe.simulation.motion import (
     POSE_WORDS,
@@ -168,6 +169,7 @@ def _turn(
         end_tangent, tangent_end = validation.unit_vector(tangent, f"tangent of {owner}"), now + over
     if roll is not None:
         end_roll, roll_end = validation.number(roll, f"roll of {owner}"), now + over
+        check_angle(end_roll, f"roll of {owner}")
         _check_turns(session, end_roll - start_roll, over, owner)
     return Turn(
         tangents=np.stack([start_tangent, end_tangent]),
