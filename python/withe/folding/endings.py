@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from withe.common import validation
+from withe.common.keywords import keyword_hints
 from withe.common.user_warnings import warn
 from withe.folding.jaw import Jaw
 from withe.folding.paper import Paper
@@ -22,9 +23,10 @@ _BEARABLE = 1e-3  # slide [m]
 _UNSEEN = 0.5  # from the target, in which a lifted edge hides what it comes down on [Lgb]
 
 
+@keyword_hints
 def plan(
     paper: Paper,
-    target: float | Literal["half"] = "half",
+    target: float | str = "half",
     *,
     method: Method = "ucs",
     grasp: Grasp = "moment_free",
@@ -44,9 +46,11 @@ def plan(
     Parameters
     ----------
     paper : Paper
-    target : float or "half" [m]
-        Where the lifted edge comes down, from where it lay (the dissertation's C); the crease is in the middle. "half":
-        on the far edge, which long sheets do not reach without a moment: what is refused says which targets can be.
+    target : float [m] or str
+        Where the lifted edge comes down, from where it lay (the dissertation's C); the crease is in the middle. Or the
+        share of the sheet that is folded over: "half", "third", "quarter", or a fraction up to a half such as "2/5",
+        whose C is twice that share of the length. "half" is on the far edge, which long sheets do not reach without a
+        moment: what is refused says which targets can be.
     method : {"ucs", "slip", "local", "intuitive"}
         "ucs": least accumulated ratio of the table's tangential to its normal force, on a grid of positions
         [dissertation, Alg. 7, with costs that accumulate]. "slip": no predicted slide where such a way exists, or else
