@@ -43,8 +43,8 @@ def make_tendon(
             )
     rods = {rod.index: rod for rod in directory.all(RodPart)}
     radii = np.array([rods[rod].section.radii[edge] for rod, edge, _ in places])
-    all_along = isinstance(guides, Rod) or (isinstance(guides, str) and parse_place(guides) is None)
-    check_offset(part.offsets, radii, pulls_all_along=all_along and part.tension > 0.0, owner=f"tendon {name!r}")
+    along = len(places) > 2 and isinstance(guides, Rod | str) and not rods[places[0][0]].closed
+    check_offset(part.offsets, radii, pulls_all_along=along and part.tension > 0.0, owner=f"tendon {name!r}")
     return part
 
 
