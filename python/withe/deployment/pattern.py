@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.keywords import keyword_hints
 from withe.common.user_warnings import warn
 from withe.deployment.cable import Cable
 from withe.deployment.feasibility import Controller, Feasibility, examine
@@ -40,6 +41,7 @@ _LEAST_BEHIND, _MOST_BEHIND = 0.1, 0.5  # of a pattern's length, in which what l
 _BENT_START = 1.0  # [rad]: curvature at a function's start times its length that asks for a lead-in
 
 
+@keyword_hints
 class Pattern:
     """A curve on the floor, smoothed and resampled by its length.
 

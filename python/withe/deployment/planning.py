@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.keywords import keyword_hints
 from withe.common.progress import progress as bar
 from withe.common.user_warnings import warn
 from withe.deployment.cable import JAW, Cable
@@ -198,6 +199,7 @@ class Plan:
         return f"Plan({self.controller}, {self.pattern.length:.3f} m in {self.times[-1]:.1f} s)"
 
 
+@keyword_hints
 def plan(
     cable: Cable,
     pattern: Pattern,

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.keywords import keyword_hints
 from withe.common.user_warnings import warn
 from withe.folding.strip_pictures import strip_ends
 
@@ -99,6 +100,7 @@ def droop(length: float) -> float:
     return length * _hanging(_angle_where(0, length))[1]
 
 
+@keyword_hints
 def measure(
     *,
     length: float | None = None,

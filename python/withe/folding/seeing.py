@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from withe.common import validation
 from withe.common.extras import require
+from withe.common.keywords import keyword_hints
 from withe.folding.paper import Paper
 from withe.perception.camera import Camera
 from withe.perception.masks import MaskFunction, border_filter
@@ -47,6 +48,7 @@ class SeenEdge:
     corners: FloatArray
 
 
+@keyword_hints
 def overhead_camera(x: float, *, height: float = 0.6, pixel: float = 5e-4) -> Camera:
     """Make a camera of 640 by 480 pixels over the table that looks straight down on the middle of an edge.
 
@@ -81,6 +83,7 @@ def overhead_camera(x: float, *, height: float = 0.6, pixel: float = 5e-4) -> Ca
     return Camera([[focal, 0.0, 319.5], [0.0, focal, 239.5], [0.0, 0.0, 1.0]], rotation=down, translation=-down @ place)
 
 
+@keyword_hints
 def find_edge(
     image: npt.ArrayLike | str | os.PathLike[str], camera: Camera, paper: Paper, *, mask: MaskFunction | None = None
 ) -> SeenEdge:

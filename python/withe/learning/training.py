@@ -13,6 +13,7 @@ import numpy as np
 
 from withe.common import validation
 from withe.common.extras import require
+from withe.common.keywords import keyword_hints
 from withe.common.progress import progress as progress_bar
 from withe.common.user_warnings import warn
 from withe.learning.environments import environment_class
@@ -22,6 +23,7 @@ from withe.learning.task import Task
 __all__ = ["train_policy"]
 
 
+@keyword_hints
 def train_policy(
     task: Task,
     steps: int,

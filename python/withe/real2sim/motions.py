@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.keywords import keyword_hints
 from withe.common.progress import Progress
 from withe.common.progress import progress as progress_bar
 from withe.common.user_warnings import warn
@@ -35,6 +36,7 @@ _MANY_SWINGS = 10.0  # between frames: what rings is seen several times a swing
 _CHANGE = 1e-9  # of the sum of squares: an iteration of L-BFGS that changes it by less is the last
 
 
+@keyword_hints
 def fit_motion(
     simulation: Simulation,
     targets: Target | Sequence[Target],

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import uuid
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 import numpy.typing as npt
 
 from withe.batch import Batch
 from withe.common import validation
-from withe.common.attributes import known_attributes
+from withe.common.attributes import known_attributes, of_a_simulation
 from withe.common.keywords import keyword_hints
 from withe.parts.applied_loads import AppliedLoads, Bearer
 from withe.parts.directory import Directory
@@ -80,6 +80,11 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
             There is none.
         """
         return self._directory.handle(name)
+
+    if not TYPE_CHECKING:  # a misspelt attribute stays an error to type checkers
+
+        def __getattr__(self, word: str) -> Any:
+            raise of_a_simulation("Scene", word, "simulation.{}")
 
     def __repr__(self) -> str:
         return f"Scene({', '.join(part.name for part in self._directory.parts.values())})"

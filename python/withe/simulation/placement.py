@@ -169,7 +169,8 @@ class Placement:
             of a plane, the centre of a sphere, the start of a capsule. What it does to rods is part of
             ``energy().work``.
         position : array_like of shape (3,) [m]
-        rotation : array_like of shape (3, 3), or a SciPy Rotation
+        rotation : array_like of shape (4,) or (3, 3), or a SciPy Rotation
+            A unit quaternion (w, x, y, z), a matrix, or a Rotation.
             Relative to the orientation as drawn; of a hand, its axes in the world as columns.
         tangent : array_like of shape (3,)
             Where the rod is to point, instead: the smallest turn from the drawn tangent, and then ...
