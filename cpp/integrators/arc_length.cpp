@@ -163,7 +163,7 @@ class ArcLength {
   }
 
   void back() {
-    state_ = start_.state;
+    path_.go_back(start_.state, start_.factor);
     factor_ = start_.factor;
     rate_ = start_.rate;
     tangent_ = start_.tangent;

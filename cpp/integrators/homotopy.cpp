@@ -93,6 +93,7 @@ bool Homotopy::stiffen_deep(const VectorX& q) {
 
 void Homotopy::accept(const VectorX& q) {
   const Model& model = equations_.model();
+  present_ = factor_;
   if (Contact* contact = equations_.contact()) {
     contact->update(q);
     contact->accept_at_rest(state_, false);
@@ -106,7 +107,7 @@ void Homotopy::find_pull(const VectorX& z, VectorX& pull, VectorX& held) {
   double little = boundary_.aim ? kLittleFactor : 1.0;
   for (int tries = 0; tries < 20; ++tries) {
     moved_ = z;
-    const bool reached = boundary_.hold(factor_ + little, moved_);
+    const bool reached = boundary_.hold(present_, factor_ + little, moved_);
     held = moved_ - z;
     const double turn = reached ? newton_.norms().turn(held) : INFINITY;
     if (turn <= kLittleTurn) break;

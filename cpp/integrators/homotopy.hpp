@@ -12,8 +12,9 @@ namespace withe {
 
 /// Where supports are at a factor.
 struct Boundary {
-  /// Sets the held unknowns of q. False where the frames of the present state are too far from there.
-  std::function<bool(double factor, VectorX& q)> hold;
+  /// Sets the held unknowns of q to those at `factor`. False where the present state, which is that at `present`, is
+  /// too many turns of a frame away.
+  std::function<bool(double present, double factor, VectorX& q)> hold;
   /// Tells hands that yield; nothing where none moves.
   std::function<void(double factor)> aim;
 };
@@ -44,7 +45,7 @@ class Homotopy {
   void start_out_of_balance();
   /// Loads and what is left out of balance at a factor; the frames count from the present state.
   void go_to(double factor);
-  bool hold(double factor, VectorX& q) const { return boundary_.hold(factor, q); }
+  bool hold(double factor, VectorX& q) const { return boundary_.hold(present_, factor, q); }
   /// From here on tangents leave alone what is neutral.
   void hold_neutral() { hold_neutral_ = true; }
   /// Whether supports did so where a tangent was last found.
@@ -67,6 +68,11 @@ class Homotopy {
   bool stiffen_deep(const VectorX& q);
   /// Goes on from q: contacts, frames and hands remember it.
   void accept(const VectorX& q);
+  /// Makes an earlier state, that at a factor, the present one.
+  void go_back(const State& state, double factor) {
+    state_ = state;
+    present_ = factor;
+  }
   /// Residual F(z, s), and the matrix when asked for.
   void evaluate(const VectorX& z, bool with_matrix, const double* axial_force);
 
@@ -83,7 +89,7 @@ class Homotopy {
   NewtonWorkspace& work_;
   VectorX imbalance_, target_, held_, moved_, shift_;
   Configuration scratch_;
-  double factor_ = 0.0;
+  double factor_ = 0.0, present_ = 0.0;  // last gone to; that of the present state
   bool moves_ = false, hold_neutral_ = false;
 };
 

@@ -70,7 +70,7 @@ class Statics {
     result.converged = follow(result);
     if (!result.converged) {
       result.branch_changed = true;
-      state_ = start;
+      path_.go_back(start, 0.0);
       path_.go_to(1.0);
       if (!path_.hold(1.0, state_.q)) return result;
       path_.accept(state_.q);

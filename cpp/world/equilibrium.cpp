@@ -17,15 +17,14 @@ constexpr int kMostStiffenings = 8;
 constexpr double kRelieved = 0.9;
 
 constexpr const char* kSideways =
-    "the equilibrium in the plane of the scene is not stable against motions out of it: in space the scene buckles or "
-    "tips over sideways; build(planar=False) lets it, build(planar=True) says that something keeps it in its plane";
+    "the equilibrium is not stable against motions out of its plane: in space the scene buckles or tips over sideways; "
+    "build(planar=False) lets it, build(planar=True) says that something keeps it in its plane";
 
 constexpr const char* kNotInSpace =
-    "the equilibrium is stable in the plane of the scene, and was not looked at in space, where a clamp cannot hold "
+    "the equilibrium was found stable in its plane alone: it was not looked at in space, where a clamp cannot hold "
     "what "
-    "turns about one of several hinges: clamp what they turn against, or build(planar=True) says that something keeps "
-    "it "
-    "in its plane";
+    "turns about one of several hinges; clamp what they turn against, or build(planar=True) says that something keeps "
+    "it in its plane";
 
 }  // namespace
 
@@ -46,11 +45,20 @@ Equations& World::Implementation::statics() {
 /// Energy-momentum steps, which take over where plain midpoint gains energy.
 namespace {
 
-/// A place between two of a support, or beyond.
+// A frame may turn by so much from the present state to the next on a path [rad]: rotations do not tell more than half
+// a turn from less.
+constexpr double kMostTurn = 2.5;
+
+/// Rotation vector of the turn of a support from one place to another that is left beside its roll.
+Vector3 swing_between(const SupportMotion& from, const SupportMotion& to) {
+  return rotation_log(to.rotation * rotation_exp(-to.roll) * from.rotation.transpose());
+}
+
+/// A place between two of a support, or beyond. Its rotation is exp(s swing) R exp(s roll).
 void put_between(const SupportMotion& from, const SupportMotion& to, double fraction, SupportMotion& out) {
   out.position = from.position + fraction * (to.position - from.position);
   out.fed = from.fed + fraction * (to.fed - from.fed);
-  out.rotation = rotation_exp(fraction * rotation_log(to.rotation * from.rotation.transpose())) * from.rotation;
+  out.rotation = rotation_exp(fraction * swing_between(from, to)) * from.rotation * rotation_exp(fraction * to.roll);
 }
 
 }  // namespace
@@ -64,9 +72,14 @@ void World::Implementation::move_between(const std::vector<SupportMotion>& from,
 Boundary World::Implementation::boundary_between(Equations& system, const std::vector<SupportMotion>& from,
                                                  const std::vector<SupportMotion>& to) {
   Boundary boundary{.hold =
-                        [this, &system, &from, &to](double factor, VectorX& q) {
+                        [this, &system, &from, &to](double present, double factor, VectorX& q) {
                           move_between(from, to, factor);
                           hold_now(work.held);
+                          for (std::size_t s = 0; s < to.size(); ++s) {
+                            const double turn = to[s].roll.norm() + swing_between(from[s], to[s]).norm();
+                            if (to[s].roll != Vector3::Zero() && std::abs(factor - present) * turn > kMostTurn)
+                              work.held.reachable = false;
+                          }
                           system.assembler().add_held_change(q, work.held.q, 1.0, q);
                           return work.held.reachable;
                         },
@@ -184,7 +197,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
     recall(lagged_before);  // and no more of `system`, which this may drop
   };
   std::vector<SupportMotion> from = before.motions;
-  const std::vector<SupportMotion> target = motions;
+  std::vector<SupportMotion> target = motions;
   const Boundary boundary = boundary_between(system, from, target);
   rest();
   StaticResult r;
@@ -194,12 +207,13 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
     aim_obstacles(system, time);
     aim_hands(system);
     VectorX reached = state.q;
-    if (boundary.hold(1.0, reached)) check_squeezed(system, reached, dt);
+    if (boundary.hold(0.0, 1.0, reached)) check_squeezed(system, reached, dt);
     if (drifts(system))
       newton->balance(work.newton.data, r.newton);
     else
       r = find_equilibrium(system, *newton, options, parameters, reshaped ? &shape_before : nullptr, boundary, state,
                            work.newton);
+    for (SupportMotion& m : target) m.roll.setZero();
     from = target;
     if (r.converged && system.contact()) settle_contact(system, boundary, r);
   } catch (...) {
@@ -337,6 +351,7 @@ PathPoint path_point(const World& world, const Model& model, const ArcPoint& poi
 void stop(SupportMotion& motion, double time) {
   motion.from_position = motion.to_position = motion.position;
   motion.from_rotation = motion.to_rotation = motion.rotation;
+  motion.roll.setZero();
   motion.shift = motion.turn = {time, time};
   motion.fed_before = motion.fed;
   motion.feeds_since = time;

@@ -145,10 +145,11 @@ void exchange(Archive& io, Moving& moving) {
   exchange(io, state);
   predictor.exchange(io);
   for (auto& motion : motions) {
-    auto& [position, rotation, from_position, to_position, from_rotation, to_rotation, shift, turn, stretch, fed,
+    auto& [position, rotation, from_position, to_position, from_rotation, to_rotation, roll, shift, turn, stretch, fed,
            fed_before, feed_rate, feeds_since] = motion;
     io(position), io(rotation), io(from_position), io(to_position), io(from_rotation), io(to_rotation);
-    exchange(io, shift), exchange(io, turn), io(stretch), io(fed), io(fed_before), io(feed_rate), io(feeds_since);
+    io(roll), exchange(io, shift), exchange(io, turn), io(stretch), io(fed), io(fed_before), io(feed_rate),
+        io(feeds_since);
   }
   for (double* x : {&support_work, &actuation_work, &dissipated, &load_work, &impulse_time}) io(*x);
   exchange(io, impulses);

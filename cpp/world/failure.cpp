@@ -114,7 +114,7 @@ std::string World::Implementation::unresolved() const {
   }
   if (node < 0) return "";
   return std::string("an edge ") + how + " by " + text(greatest * 180.0 / std::numbers::pi, 3) +
-         " degrees against the next" + place_of_node(node).words + " (time " + text(state.time, 6) +
+         " degrees against the next," + place_of_node(node).words + " (time " + text(state.time, 6) +
          " s): a mesh this coarse does not resolve the motion, and bends and twists wrongly; use more nodes";
 }
 

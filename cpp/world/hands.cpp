@@ -61,7 +61,8 @@ bool World::Implementation::hands_move(const std::vector<SupportMotion>& from,
                                        const std::vector<SupportMotion>& to) const {
   for (std::size_t s = 0; s < to.size(); ++s)
     if (model.supports[s].active && model.supports[s].yields() &&
-        (from[s].position != to[s].position || from[s].rotation != to[s].rotation || from[s].fed != to[s].fed))
+        (from[s].position != to[s].position || from[s].rotation != to[s].rotation || to[s].roll != Vector3::Zero() ||
+         from[s].fed != to[s].fed))
       return true;
   return false;
 }

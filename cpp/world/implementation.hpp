@@ -135,7 +135,8 @@ struct World::Implementation : Running {
 
   // set_state.cpp
   bool leaves_plane(const RodState& rod) const;
-  VectorX placed(const std::vector<RodState>& rods) const;
+  bool arrives(int support, const std::vector<bool>& told, const VectorX& q, HeldTarget& there);
+  VectorX placed(const std::vector<RodState>& rods);
   void place_rods(const std::vector<RodState>& rods);
   void place_directors(const RodState& rod, const VectorX& q, const Configuration& before);
   void keep_held_velocities(const VectorX& before);

@@ -62,7 +62,7 @@ void World::Implementation::set_motion_at(SupportMotion& motion, double time) co
 void World::Implementation::spread_jumps(double duration) {
   const Span step{state.time, state.time + duration};
   for (SupportMotion& m : motions) {
-    if (m.shift.start == m.shift.end && m.position != m.to_position) {
+    if (m.jumps()) {
       m.from_position = m.position;
       m.shift = step;
     }

@@ -29,11 +29,16 @@ struct SupportMotion {
   Matrix3 rotation = Matrix3::Identity();  ///< now, from the drawn orientation
   Vector3 from_position = Vector3::Zero(), to_position = Vector3::Zero();
   Matrix3 from_rotation = Matrix3::Identity(), to_rotation = Matrix3::Identity();
-  Span shift, turn;    ///< when each of them goes
-  double stretch = 1;  ///< of a held edge: its length when it was gripped, over the drawn one
+  Vector3 roll =
+      Vector3::Zero();  ///< of a static change, full turns counted [rad], about a drawn axis; see `swing_between`
+  Span shift, turn;     ///< when each of them goes
+  double stretch = 1;   ///< of a held edge: its length when it was gripped, over the drawn one
   // Of the drive of a ring: what it has fed, now and at a time from which it feeds evenly.
   double fed = 0, fed_before = 0;         ///< [m]
   double feed_rate = 0, feeds_since = 0;  ///< [m/s], [s]
+
+  /// Whether it is to be elsewhere at once, and no step has led it there yet.
+  bool jumps() const { return shift.start == shift.end && position != to_position; }
 };
 
 /// Where an obstacle goes, and how it turns.

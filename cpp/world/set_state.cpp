@@ -92,8 +92,27 @@ bool World::Implementation::leaves_plane(const RodState& rod) const {
   return false;
 }
 
+/// A support that was moved at once gets there now, instead of in the next step, where its nodes are placed there.
+/// Where it is then, of the held unknowns.
+bool World::Implementation::arrives(int support, const std::vector<bool>& told, const VectorX& q, HeldTarget& there) {
+  const Support& held = model.supports[at(support)];
+  SupportMotion& motion = motions[at(support)];
+  if (held.yields() || !motion.jumps()) return false;
+  const Vector3 before = motion.position;
+  motion.position = motion.to_position;
+  hold_now(there);
+  for (const Constraint& c : model.constraints)
+    for (int node : held.nodes)
+      if (c.first == model.node_dof[at(node)] &&
+          !(told[at(node)] && c.held_change(there.q, q).norm() <= kHeld * model.length_scale)) {
+        motion.position = before;
+        return false;
+      }
+  return true;
+}
+
 /// Unknowns with nodes where they are told to be; refuses to move what is held.
-VectorX World::Implementation::placed(const std::vector<RodState>& rods) const {
+VectorX World::Implementation::placed(const std::vector<RodState>& rods) {
   VectorX q = state.q;
   std::vector<bool> told(at(model.node_count), false);
   for (const RodState& rod : rods)
@@ -110,15 +129,19 @@ VectorX World::Implementation::placed(const std::vector<RodState>& rods) const {
       told[at(node)] = true;
       q.segment(dof, model.dimension) = own;
     }
-  for (const Support& support : model.supports) {
+  HeldTarget there;
+  for (int s = 0; s < static_cast<int>(model.supports.size()); ++s) {
+    const Support& support = model.supports[at(s)];
     if (!support.active) continue;
+    const bool arrived = arrives(s, told, q, there), moves = state.time < motions[at(s)].shift.end;
     for (int node : support.nodes) {
       for (const Constraint& c : model.constraints) {
         if (c.first != model.node_dof[at(node)]) continue;
-        const Vector3 moved = c.held_change(state.q, q);
-        require(moved.norm() <= kHeld * model.length_scale, "positions move what a support holds, by " +
-                                                                text(moved.norm()) + " m" + place_of_node(node).words +
-                                                                ": move the support there first, or release it");
+        const Vector3 moved = c.held_change(arrived ? there.q : state.q, q);
+        require(moved.norm() <= kHeld * model.length_scale,
+                "positions move what a support holds, by " + text(moved.norm()) + " m" + place_of_node(node).words +
+                    (moves ? ": the support is still on its way (over=), so move it there without over=, or release it"
+                           : ": move the support there first, or release it"));
         q.segment(c.first, c.size) -= moved.head(c.size);
       }
     }
@@ -143,11 +166,16 @@ void World::Implementation::place_directors(const RodState& rod, const VectorX& 
             "directors must be unit vectors normal to their edges" + where);
     const Vector3 d1 = (told - t * t.dot(told)).normalized();
     const Vector3 now = to_eigen(before.edge[at(edge)].d1);
-    for (const Support& support : model.supports)
-      require(!support.active || std::find(support.edges.begin(), support.edges.end(), edge) == support.edges.end() ||
-                  (d1 - now).norm() < kAligned,
+    for (std::size_t s = 0; s < model.supports.size(); ++s) {
+      const Support& support = model.supports[s];
+      const bool holds =
+          support.active && std::find(support.edges.begin(), support.edges.end(), edge) != support.edges.end();
+      const bool turns = state.time <= motions[s].turn.end && motions[s].rotation != motions[s].to_rotation;
+      require(!holds || (d1 - now).norm() < kAligned,
               "directors turn an edge that a support holds" + place_of_node(support.node).words +
-                  ": turn the support there first, or release it");
+                  (turns ? ": the support turns in the steps to come, so step() first, or release it"
+                         : ": turn the support there first, and step(), or release it"));
+    }
     state.tangent[at(edge)] = to_vec3(t);
     state.director[at(edge)] = to_vec3(d1);
     state.q(model.edge_dof[at(edge)]) = 0.0;

@@ -154,9 +154,9 @@ std::string World::Implementation::unresolved_impact(double dt, const Equations&
   if (!much(kinetic)) return "";
   find_component_energies(state, energy_scratch.components);
   if (!much(kinetic + energy_scratch.components.elastic)) return "";
-  return "an impact" + place_of_node(model.edge_tail[at(edge)]).words + " (time " + text(state.time, 6) +
-         " s) is over within a step of " + text(dt) +
-         " s, in which what strikes one after the other is sent off together, as if the rod were rigid: how high it "
+  return "an impact is over within a step of " + text(dt) + " s," + place_of_node(model.edge_tail[at(edge)]).words +
+         " (time " + text(state.time, 6) +
+         " s): nodes that strike one after the other are sent off together, as if the rod were rigid, and how high it "
          "bounces means nothing; a time_step of " +
          text(kMargin * longest, 2) +
          " s would do, restitution= says what impacts lose, and integrator='backward_euler' damps them";

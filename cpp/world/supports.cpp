@@ -95,9 +95,12 @@ void World::remove_support(int support) {
 }
 
 void World::move_support(int support, const std::optional<Vector3>& position, const std::optional<Matrix3>& rotation,
-                         double over) {
+                         double over, const Vector3& roll) {
   Implementation& self = *implementation_;
   require(std::isfinite(over) && over >= 0.0, "over must be finite and not negative");
+  const bool rolls = roll != Vector3::Zero();
+  require(roll.allFinite() && (!rolls || (rotation && over == 0.0 && self.options.integrator == Integrator::statics)),
+          "full turns of a support need a rotation, at once, and integrator='static'");
   prescribe_support(support, position, rotation);
   SupportMotion& m = self.motions[at(support)];
   const Span way{self.state.time, self.state.time + over};
@@ -108,7 +111,9 @@ void World::move_support(int support, const std::optional<Vector3>& position, co
   if (rotation) {
     m.from_rotation = m.rotation;
     m.turn = way;
+    m.roll = roll;
   }
+  if (rolls && self.model.planar()) self.leave_plane("a support that rolls");
 }
 
 /// Refuses a pose that is none; one that leaves a plane makes the scene spatial.
@@ -161,6 +166,7 @@ void World::prescribe_support(int support, const std::optional<Vector3>& positio
   }
   if (rotation) {
     m.to_rotation = m.from_rotation = *rotation;
+    m.roll.setZero();
     m.turn = now;
   }
 }

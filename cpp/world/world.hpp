@@ -254,9 +254,10 @@ class World {
   int add_support(const SupportDescription& support);  ///< holds the present position and orientation
   void remove_support(int support);                    ///< the next one to be added takes its row
   /// Target position [m] and rotation relative to the drawn orientation, reached `over` seconds from now. What is not
-  /// given goes on as it does.
+  /// given goes on as it does. `roll` [rad] is the part of the rotation about the drawn axis of the support, in drawn
+  /// axes, with full turns counted; only an equilibrium or a static step follows it, so that `over` is 0.
   void move_support(int support, const std::optional<Vector3>& position, const std::optional<Matrix3>& rotation,
-                    double over);
+                    double over, const Vector3& roll = Vector3::Zero());
   /// Position and rotation at the end of the coming inner step (from the step callback); likewise.
   void prescribe_support(int support, const std::optional<Vector3>& position, const std::optional<Matrix3>& rotation);
   Vector3 support_position(int support) const;

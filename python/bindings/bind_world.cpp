@@ -344,9 +344,9 @@ void define_supports(WorldClass& world) {
   world.def(
       "move_support",
       [](GuardedWorld& self, int support, const std::optional<Vector3>& position,
-         const std::optional<Matrix3>& rotation,
-         double over) { self.changing().move_support(support, position, rotation, over); },
-      py::arg("support"), py::arg("position"), py::arg("rotation"), py::arg("over"));
+         const std::optional<Matrix3>& rotation, double over,
+         const Vector3& roll) { self.changing().move_support(support, position, rotation, over, roll); },
+      py::arg("support"), py::arg("position"), py::arg("rotation"), py::arg("over"), py::arg("roll"));
   world.def(
       "prescribe_support",
       [](GuardedWorld& self, int support, const std::optional<Vector3>& position,

@@ -20,6 +20,7 @@ from withe.errors import (
     ConvergenceError,
     EnergyDriftWarning,
     OutOfPlaneWarning,
+    PlausibilityWarning,
     RingLeftWarning,
 )
 from withe.parts.friction_fields import FrictionMap
@@ -74,6 +75,7 @@ __all__ = [
     "Obstacle",
     "OutOfPlaneWarning",
     "Plan",
+    "PlausibilityWarning",
     "Reaction",
     "Record",
     "Rectangle",

@@ -1087,6 +1087,7 @@ class World:
         position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None,
         rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"] | None,
         over: typing.SupportsFloat | typing.SupportsIndex,
+        roll: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
     ) -> None: ...
     def natural_curvature(
         self, rod: typing.SupportsInt | typing.SupportsIndex

@@ -9,6 +9,7 @@ __all__ = [
     "ConvergenceError",
     "EnergyDriftWarning",
     "OutOfPlaneWarning",
+    "PlausibilityWarning",
     "RingLeftWarning",
 ]
 
@@ -60,6 +61,23 @@ class OutOfPlaneWarning(UserWarning):
     In space the scene would buckle or tip over sideways, as a deep beam does, or a truss that nothing holds there.
     ``build(planar=False)`` lets it; ``build(planar=True)`` says that something keeps it in its plane. Given once a
     simulation.
+    """
+
+
+class PlausibilityWarning(UserWarning):
+    """A number is possible, and beyond anything that is usual: mostly of another unit than SI.
+
+    Names the number and the likely slip. Given of
+
+    - a rod of more than 100 m with a radius below 10 mm,
+    - a density below 10 or above 30,000 kg/m^3 under gravity,
+    - a Young's modulus below 100 Pa, of a rod that it cannot hold against its weight,
+    - a tendon whose offset is more than 20 radii of its rod, or one that pulls along a centreline,
+    - a rest angle or a roll of more than a full turn that is a multiple of 15, as angles in degrees are,
+    - a time step above ten of the slowest periods of the scene, without a fluid or drag,
+    - `withe.learning.Task.build` that draws random numbers without `redraw`, so that all robots are equal.
+
+    ``warnings.simplefilter("ignore", withe.PlausibilityWarning)`` leaves them out.
     """
 
 

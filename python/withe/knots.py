@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from withe.common import diagrams, validation
 from withe.common.drawing import natural_shape
+from withe.common.keywords import keyword_hints
 
 __all__ = [
     "alexander_polynomial",
@@ -38,6 +39,7 @@ _TAIL_ROOM = 1.25
 _ROUNDING = 1e-12
 
 
+@keyword_hints
 def overhand_knot(
     n: int = 1,
     *,
@@ -136,6 +138,7 @@ def overhand_knot(
     return _even(whole(low, tail), _node_count(nodes, length, radius), length, braid_radius)
 
 
+@keyword_hints
 def reef_knot(
     *, length: float = 1.0, radius: float = 2e-3, nodes: int | None = None, tails: Tails = "up"
 ) -> FloatArray:
@@ -165,6 +168,7 @@ def reef_knot(
     return _two_half_knots(-1.0, length, radius, nodes, tails)
 
 
+@keyword_hints
 def granny_knot(
     *, length: float = 1.0, radius: float = 2e-3, nodes: int | None = None, tails: Tails = "up"
 ) -> FloatArray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from withe.common.keywords import keyword_hints
 from withe.common.validation import integer, non_negative, number, positive, unit_vector, vector
 from withe.knots import granny_knot, overhand_knot, reef_knot
 
@@ -13,6 +14,7 @@ __all__ = ["arc", "circle", "granny_knot", "helix", "overhand_knot", "reef_knot"
 FloatArray = npt.NDArray[np.float64]
 
 
+@keyword_hints
 def helix(radius: float, pitch: float, length: float, nodes: int, *, left_handed: bool = False) -> FloatArray:
     """Points on a helix about the z axis that starts at (radius, 0, 0) and rises.
 

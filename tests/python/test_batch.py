@@ -388,3 +388,78 @@ def test_discrete_curvatures_mean_the_angles_of_each_simulations_own_nodes():
     with pytest.raises(ValueError, match="less than pi at every node"):
         batch.set_natural_curvature("arm", [(0.0, 0.0), (0.0, 80.0)])
     assert simulations[0].get("arm", "natural_curvature")[0, 1] > 0.0
+
+
+def stiffened(count, **options):
+    """Cantilevers of unlike stiffness: batch, handle."""
+    scene, arm, _ = cantilever()
+    batch = scene.build_batch(count, workers=2, **options)
+    batch.set(arm, youngs_modulus=np.linspace(0.7e6, 2e6, count))
+    return batch, arm
+
+
+def test_a_run_of_a_batch_is_that_of_each_simulation():
+    batch, arm = stiffened(3, time_step=2e-3)
+    alone = batch.copy()
+    tip = {"tip": lambda b: b.positions(arm)[:, -1]}
+    run = batch.run(0.03, record_every=6e-3, progress=False, record=tip)
+    assert len(run) == 3
+    assert run.positions(arm).shape == (3, 6, 11, 3)
+    assert np.array_equal(run["tip"], run.positions(arm)[:, :, -1])
+    for i, simulation in enumerate(alone):
+        record = simulation.run(0.03, record_every=6e-3, progress=False)
+        assert np.array_equal(record.positions(), run[i].positions())
+        assert np.array_equal(record.times, run.times[i])
+        for what in ("directors", "curvatures", "twists", "tensions", "spins", "velocities"):
+            assert np.array_equal(getattr(record, what)(arm), getattr(run, what)(arm)[i])
+        assert np.array_equal(batch[i].record.positions(), record.positions())
+        assert batch[i].time == simulation.time
+
+
+def test_a_run_of_a_batch_calls_back_with_the_batch_and_ends_each_by_itself():
+    batch, arm = stiffened(4, time_step=2e-3)
+    calls = []
+    limit = -0.02
+
+    def fallen(b):
+        return b.positions(arm)[:, -1, 2] < limit
+
+    run = batch.run(0.4, 2e-3, progress=False, before_step=lambda b: calls.append(b is batch), until=fallen)
+    frames = [len(record) for record in run]
+    assert all(calls)
+    assert len(calls) == max(frames) - 1
+    assert len(set(frames)) > 1
+    for record in run:
+        tips = record.positions(arm)[:, -1, 2]
+        assert tips[-1] < limit
+        assert (tips[:-1] >= limit).all()
+    with pytest.raises(ValueError, match="must have equally many frames"):
+        run.positions(arm)
+    with pytest.raises(ValueError, match=r"until must return one truth value or shape \(4,\)"):
+        batch.run(0.01, progress=False, until=lambda b: [True])
+    for wrong in ({"duration": 0.003}, {"duration": 0.004, "record_every": 0.003}):
+        with pytest.raises(ValueError, match=r"of a batch must be a whole number of time steps of 0\.002 s"):
+            batch.run(progress=False, **wrong)
+    with pytest.raises(RuntimeError, match="step cannot be called while the simulation runs"):
+        batch.run(0.004, progress=False, before_step=lambda b: b.step())
+    assert len(batch.run(0.004, progress=False, lanes=[2, 0])) == 2
+
+
+def test_equilibria_of_a_batch_are_those_of_each_simulation():
+    batch, arm = stiffened(5, integrator="static")
+    alone = batch.copy()
+    batch[3].release("wall")  # it falls for ever
+    found = batch.equilibrium()
+    assert found.stable.tolist() == [True, True, True, False, True]
+    assert [failure is None for failure in found.failures] == found.stable.tolist()
+    assert np.isnan(found.residual).tolist() == [False, False, False, True, False]
+    with pytest.raises(withe.ConvergenceError, match="no support holds the scene"):
+        _ = found[3]
+    for i, simulation in enumerate(alone):
+        if i != 3:
+            single = simulation.equilibrium()
+            assert single.iterations == found.iterations[i] == found[i].iterations
+            assert np.array_equal(simulation.positions(), batch[i].positions())
+    (gradient,) = found[0].gradient(np.ones((11, 3)), [(arm, "youngs_modulus")])
+    assert np.isfinite(gradient)
+    assert len(batch.equilibrium(lanes=[0, 4])) == 2

@@ -311,7 +311,10 @@ def test_the_command_refuses_in_one_line(arguments, message, tmp_path, monkeypat
 def test_the_command_says_what_a_target_may_be(capsys):
     with pytest.raises(SystemExit):
         main(["fold", "--target", "abc"])
-    assert "argument --target: must be half, or a place along the sheet in m, got 'abc'" in capsys.readouterr().err
+    assert (
+        "argument --target: target, if not in m or a fraction such as '1/3', must be 'half' or 'third'"
+        in capsys.readouterr().err
+    )
 
 
 def test_the_command_takes_any_size_of_paper_and_warns_in_one_line(tmp_path, capsys):
@@ -354,7 +357,7 @@ def test_an_edge_that_is_pressed_into_the_table_is_held_from_the_side():
         ({"target": 0.4}, "target must be on the sheet"),
         ({"target": -0.1}, "target must be positive"),
         ({"target": float("nan")}, "target must"),
-        ({"target": "third"}, "target must be 'half'"),
+        ({"target": "fifth"}, "target, if not in m or a fraction such as '1/3', must be 'half'"),
         ({"target": 0.02}, "target is 0.02 m"),
         ({"method": "best"}, "method must be"),
         ({"grasp": "tight"}, "grasp must be"),
@@ -397,3 +400,23 @@ def test_the_planner_knows_no_simulated_sheet():
     for name in seen:
         assert not name.startswith(("withe.simulation", "withe.scene", "withe.parts")), name
         assert "simulated" not in name, name
+
+
+@pytest.mark.parametrize(
+    ("words", "share"),
+    [("half", 0.5), ("third", 1 / 3), ("quarter", 0.25), ("1/3", 1 / 3), ("2/5", 0.4), ("1 / 2", 0.5)],
+)
+def test_a_target_may_be_the_share_of_the_sheet_that_is_folded_over(words, share):
+    paper = Paper(length=0.2, width=0.1, gravito_bending_length=0.06)
+    found = plan(paper, words, method="intuitive", progress=False)
+    assert found.target == pytest.approx(2.0 * share * 0.2, rel=1e-15)
+    assert found.target == plan(paper, 2.0 * share * 0.2, method="intuitive", progress=False).target
+
+
+@pytest.mark.parametrize(
+    ("target", "message"),
+    [("thrid", "did you mean 'third'"), ("2/3", "fraction up to 1/2"), ("0/3", "fraction up to 1/2"), ("1/0", "up to")],
+)
+def test_shares_that_cannot_be_folded_are_refused(target, message):
+    with pytest.raises(ValueError, match=message):
+        plan(Paper.a4(), target)

@@ -1,12 +1,18 @@
 """What a call does not take is refused with what the user may have meant; what is right is left alone."""
 
+import copy
 import inspect
+import pickle
+import re
 
+import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import withe
 from simple_scenes import RUBBER, cantilever
 from withe.common import keywords
+from withe.common.attributes import SIMULATION_WORDS
 from withe.common.keywords import keyword_hints
 
 ENDS = {"start": (0, 0, 0), "end": (1, 0, 0), "radius": 0.01}
@@ -145,3 +151,98 @@ def test_words_of_other_packages_lead_to_words_that_there_are():
     offered = {word for words in keywords._ELSEWHERE.values() for word in words}
     offered |= {word for word, _ in keywords._COUNTED_OTHERWISE.values()}
     assert offered - there == set()
+
+
+def public_functions():
+    """Functions and methods of the package that take keywords only, by their names."""
+    modules = [withe, withe.learning, withe.folding, withe.deployment, withe.perception, withe.real2sim, withe.shapes]
+    for module in modules:
+        for name in module.__all__:
+            found = getattr(module, name)
+            if inspect.isclass(found):
+                own = {n: f for n, f in vars(found).items() if n == "__init__" or not n.startswith("_")}
+                yield from ((f"{module.__name__}.{name}.{n}", getattr(f, "__func__", f)) for n, f in own.items())
+            else:
+                yield f"{module.__name__}.{name}", found
+
+
+def test_every_function_that_takes_keywords_only_says_so_alike():
+    checked = 0
+    for name, function in public_functions():
+        if not inspect.isfunction(function):
+            continue
+        parameters = list(inspect.signature(function).parameters.values())
+        kinds = [each.kind for each in parameters]
+        by_name = kinds.count(inspect.Parameter.KEYWORD_ONLY)
+        if not by_name or any(kind in kinds for kind in (inspect.Parameter.VAR_POSITIONAL,)):
+            continue
+        checked += 1
+        with pytest.raises(TypeError) as error:
+            function(*range(len(parameters) - by_name + 1 - (inspect.Parameter.VAR_KEYWORD in kinds)))
+        assert "by position, got" in str(error.value), name
+        assert "as in" in str(error.value), name
+    assert checked > 45
+
+
+WORDS = [
+    (lambda: cantilever(integrator="implicit_midpont"), "did you mean 'implicit_midpoint'?"),
+    (lambda: cantilever(integrator="Euler"), "did you mean 'backward_euler'?"),
+    (lambda: cantilever(solver="Sparse"), "did you mean 'sparse'?"),
+    (lambda: cantilever(bending="tangents"), "did you mean 'tangent'?"),
+    (lambda: withe.Scene().enable_contact(friction_model="anchor"), "did you mean 'anchored'?"),
+    (lambda: cantilever()[2].positions("arn"), "did you mean 'arm'?"),
+    (lambda: cantilever()[2].release("walls"), "did you mean 'wall'?"),
+]
+
+
+@pytest.mark.parametrize("case", range(len(WORDS)))
+def test_near_misses_of_words_are_asked_about(case):
+    call, message = WORDS[case]
+    with pytest.raises(ValueError, match=r"must be|is not in the scene") as error:
+        call()
+    assert str(error.value).endswith(message)
+    with pytest.raises(ValueError, match="integrator must be") as error:
+        cantilever(integrator="zzz")
+    assert "did you mean" not in str(error.value)
+
+
+def test_what_only_a_simulation_has_says_to_build_the_scene_first():
+    scene, arm, _ = cantilever()
+    for call in (lambda: scene.run(1.0), lambda: scene.equilibrium(), lambda: scene.step(3)):
+        with pytest.raises(
+            AttributeError, match=r"Scene has no '\w+': build the scene first, simulation = scene.build"
+        ):
+            call()
+    for owner, name in ((arm, "arm"), (scene["wall"], "wall"), (arm.end, "arm.end")):
+        message = f"has no 'positions': build the scene first, .* simulation.positions\\('{name}', ...\\)"
+        with pytest.raises(AttributeError, match=message):
+            _ = owner.positions
+    for owner in (scene, arm, arm.end):
+        with pytest.raises(AttributeError, match="has no attribute 'nonsense'"):
+            _ = owner.nonsense
+        assert copy.deepcopy(owner) is not None
+        assert not hasattr(owner, "__array__")
+    assert pickle.loads(pickle.dumps(arm)) == arm
+    for word in SIMULATION_WORDS:
+        assert hasattr(withe.Simulation, word), word
+        assert not hasattr(withe.Scene, word), word
+
+
+def test_a_rotation_is_a_quaternion_a_rotation_of_scipy_or_a_matrix():
+    for seed in range(5):
+        turn = Rotation.random(random_state=seed)
+        x, y, z, w = turn.as_quat()
+        found = []
+        for given in (turn, turn.as_matrix(), (w, x, y, z), np.array([-w, -x, -y, -z])):
+            _, _, simulation = cantilever(planar=False)
+            simulation.move("wall", rotation=given, over=1e-9)
+            simulation.step()
+            found.append(simulation.get("wall", "rotation"))
+        for each in found:
+            assert np.allclose(each, turn.as_matrix(), atol=1e-12)
+    said = "rotation of support 'wall' must be a quaternion (w, x, y, z), a SciPy Rotation or a matrix of shape (3, 3)"
+    for wrong in ((0, 0, 1), 3.0, "up", np.eye(4), Rotation.random(2, random_state=0)):
+        with pytest.raises(ValueError, match=re.escape(said)):
+            simulation.move("wall", rotation=wrong)
+    with pytest.raises(ValueError, match="of length 1, got one of 2"):
+        simulation.move("wall", rotation=(2, 0, 0, 0))

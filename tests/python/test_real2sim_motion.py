@@ -214,7 +214,7 @@ def test_times_in_milliseconds_are_asked_about_and_long_runs_that_are_seen_often
         asked(np.arange(0.04, 2000.0, 0.04))
         asked(np.arange(40.0, 120.0, 40.0))  # rarely seen, but no long run
     assert not caught
-    with pytest.warns(UserWarning, match=r"40 s apart or more, .* periods of the .* in milliseconds\?") as caught:
+    with pytest.warns(UserWarning, match=r"40 s apart or more: .* periods of the .* in milliseconds\?") as caught:
         asked(1e3 * np.arange(0.04, 2.0, 0.04))
     assert caught[0].filename == __file__
 

@@ -312,3 +312,73 @@ def test_importing_withe_imports_neither_scipy_nor_matplotlib():
     code = "import withe, sys; print([m for m in ('scipy', 'matplotlib', 'pyvista', 'torch') if m in sys.modules])"
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert result.stdout.strip() == "[]"
+
+
+def star(count, one_call, kind="rigid", **options):
+    """Rods from one place into drawn directions, two of them clamped: scene, rods."""
+    generator = np.random.default_rng(count)
+    scene = withe.Scene()
+    ways = generator.normal(size=(count, 3))
+    rods = [
+        scene.add_rod(start=(0, 0, 0), end=0.1 * way / np.linalg.norm(way), nodes=6, radius=3e-3, material=RUBBER)
+        for way in ways
+    ]
+    nodes = [rod.start for rod in rods]
+    joints = scene.join(*nodes, kind=kind, **options) if one_call else None
+    if not one_call:
+        for node in nodes[1:]:
+            scene.join(nodes[0], node, kind, **options)
+    for rod in rods[:2]:
+        scene.clamp(rod.end)
+    return scene, rods, joints
+
+
+@pytest.mark.parametrize("count", [3, 4, 6])
+@pytest.mark.parametrize("kind", ["rigid", "pinned", "revolute"])
+def test_any_number_of_nodes_is_joined_in_one_call_as_in_several(count, kind):
+    options = {"axis": (0, 1, 0), "stiffness": 1e-3} if kind == "revolute" else {}
+    together, in_turn = star(count, True, kind, **options), star(count, False, kind, **options)
+    assert [joint.name for joint in together[2]] == [f"joint {i + 1}" for i in range(count - 1)]
+    assert {int(rod.rows[0]) for rod in together[1]} == {0}
+    a, b = together[0].build(time_step=1e-3), in_turn[0].build(time_step=1e-3)
+    a.step(10)
+    b.step(10)
+    assert np.array_equal(a.positions(), b.positions())
+
+
+def test_two_nodes_give_a_joint_and_a_kind_may_follow_the_nodes():
+    scene, rods, _ = star(4, True)
+    other = withe.Scene()
+    ends = [other.add_rod(start=(0, 0, 0), end=end, nodes=3, radius=3e-3, material=RUBBER).start for end in np.eye(3)]
+    joints = other.join(*ends, "revolute", axis=(1, 1, 1), name="hub")
+    assert [joint.name for joint in joints] == ["hub 1", "hub 2"]
+    assert isinstance(joints, tuple)
+    assert scene.rods == tuple(rods)
+    pair = withe.Scene()
+    two = [pair.add_rod(start=(0, 0, 0), end=end, nodes=3, radius=3e-3, material=RUBBER).start for end in np.eye(3)[:2]]
+    assert pair.join(*two) == pair["joint 1"]
+
+
+def test_nodes_that_cannot_all_be_joined_are_not_joined_at_all():
+    def nodes(scene):
+        ends = [(0.1, 0, 0), (0, 0.1, 0), (0, 0, 0.1)]
+        return [scene.add_rod(start=(0, 0, 0), end=end, nodes=3, radius=3e-3, material=RUBBER) for end in ends]
+
+    for wrong, message in (
+        (lambda s, r: s.join(r[0].start, r[1].start, r[2].end), "must coincide to be joined"),
+        (lambda s, r: s.join(r[0].start, r[1].start, r[0].start), "must be two, got 'rod 1.start' twice"),
+        (lambda s, r: s.join(r[0].start, r[1].start, r[2].start, "revolut", axis=(1, 0, 0)), "did you mean 'revolute'"),
+        (lambda s, r: s.join(r[0].start, r[1].start, r[2].start, "pinned", kind="revolute"), "must be given once"),
+        (lambda s, r: s.join(r[0].start, r[1].start, 3.0), "third node to join must be a handle or a name"),
+        (
+            lambda s, r: s.join(r[0].start, r[1].start, r[1].start, "revolute", axis=(1, 0, 0)),
+            "turn against each other",
+        ),
+    ):
+        scene = withe.Scene()
+        rods = nodes(scene)
+        with pytest.raises(ValueError, match=message):
+            wrong(scene, rods)
+        assert rods[0].rows[0] != rods[1].rows[0]
+        scene.join(*(rod.start for rod in rods))
+        assert rods[0].rows[0] == rods[1].rows[0] == rods[2].rows[0]

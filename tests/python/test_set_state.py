@@ -267,3 +267,45 @@ def test_what_is_held_goes_on_with_a_support_that_moves(how):
         value = {"spins": 0.0, "velocities": way, "positions": simulation.positions(rod)}[how]
         simulation.set_state(rod, **{how: value})
     np.testing.assert_allclose(simulation.velocities(rod)[0], way, atol=1e-9)
+
+
+@pytest.mark.parametrize("held", ["pin", "clamp", "edge", "free"])
+@pytest.mark.parametrize("planar", [True, False])
+def test_a_support_that_was_moved_is_where_its_rod_is_placed(held, planar):
+    """A state that fits where supports are to be at once is taken as well as one where they are."""
+    for seed in range(4):
+        generator = np.random.default_rng([seed, len(held)])
+        scene = withe.Scene(gravity=(0, 0, -1e-6))
+        rod = scene.add_rod(start=(0, 0, 0), end=(1, 0, 0), nodes=21, radius=5e-3, material=RUBBER)
+        scene.clamp(rod.start)
+        if held == "pin":
+            end = scene.pin(rod.end)
+        elif held == "free":
+            end = scene.clamp(rod.end, free=(1, 0, 0))
+        else:
+            end = scene.clamp(rod.end, hold="edge" if held == "edge" else "frame")
+        simulation = scene.build(time_step=1e-3, planar=planar)
+        shift = generator.uniform(-0.1, 0.1, 3) * (1, 0 if planar else 1, 1)
+        share = np.linspace(0.0, 1.0, 21)[:, None]
+        positions = np.array([1.0, 0, 0]) * share + shift * share
+        positions[[0, 1]] = [(0, 0, 0), (0.05, 0, 0)]
+        positions[[-2, -1]] = np.array([(0.95, 0, 0), (1, 0, 0)]) + shift
+        with pytest.raises(ValueError, match="move the support there first"):
+            simulation.set_state(rod, positions=positions)
+        simulation.move(end, position=np.array([1.0, 0, 0]) + shift)
+        simulation.set_state(rod, positions=positions)
+        assert np.allclose(simulation.positions(rod), positions, rtol=0, atol=1e-14)
+        simulation.step(2)
+        if held != "free":
+            assert np.allclose(simulation.positions(rod)[-1], positions[-1], rtol=0, atol=1e-12)
+
+
+def test_a_support_on_its_way_says_how_it_gets_there():
+    _, arm, simulation = cantilever(planar=False)
+    place = simulation.positions(arm) + np.array([0.01, 0, 0])
+    simulation.move("wall", position=(0.01, 0, 0), over=0.1)
+    with pytest.raises(ValueError, match=r"still on its way \(over=\), so move it there without over="):
+        simulation.set_state(arm, positions=place)
+    simulation.move("wall", position=(0.01, 0, 0))
+    simulation.set_state(arm, positions=place)
+    assert np.allclose(simulation.positions(arm), place)

@@ -386,3 +386,69 @@ def test_a_support_in_the_row_of_another_survives_snapshots_and_copies():
     simulation.step(20)
     assert np.array_equal(simulation.reaction(second).force, force)
     assert np.array_equal(twin.positions(), simulation.positions())
+
+
+def _turned_end(hold):
+    scene = withe.Scene(gravity=(0, 0, 0))
+    rod = scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=21, radius=5e-3, material=RUBBER, name="rod")
+    scene.clamp(rod.start)
+    end = scene.grasp(rod, at=0.2) if hold == "hand" else scene.clamp(rod.end, hold=hold)
+    return rod, end, scene.build(integrator="static", time_step=0.1)
+
+
+@pytest.mark.parametrize("hold", ["frame", "edge", "hand"])
+@pytest.mark.parametrize("how", ["equilibrium", "step", "path"])
+def test_a_roll_by_any_number_of_turns_at_once_twists_as_one_in_parts(hold, how):
+    """The twist of a straight rod between its ends is the roll over the length: below Greenhill's load no rod bends."""
+    generator = np.random.default_rng([ord(hold[0]), ord(how[0])])
+    for roll in (*generator.uniform(3.0, 11.0, 3) * generator.choice([-1.0, 1.0], 3), 3.0 * np.pi, -2.0 * np.pi):
+        rod, end, simulation = _turned_end(hold)
+        simulation.move(end, roll=roll)
+        if how == "step":
+            simulation.step()
+        else:
+            simulation.equilibrium(**({"path": "arc_length"} if how == "path" else {}))
+        twists = simulation.twists(rod)
+        if hold != "hand":
+            assert np.sum(twists) * 0.01 == pytest.approx(roll * len(twists) / (20 - 0.5 * (hold == "edge")), rel=1e-6)
+        by_parts_rod, by_parts_end, by_parts = _turned_end(hold)
+        for share in np.linspace(0.25, 1.0, 4):
+            by_parts.move(by_parts_end, roll=share * roll)
+            by_parts.equilibrium()
+        assert np.allclose(twists, by_parts.twists(by_parts_rod), rtol=1e-6)
+        # The roll is at rest: nothing goes on.
+        simulation.equilibrium()
+        assert np.allclose(twists, simulation.twists(rod), rtol=1e-9)
+
+
+def test_a_roll_with_a_tangent_at_once_ends_as_one_after_the_other():
+    for seed in range(3):
+        generator = np.random.default_rng(seed)
+        roll = float(generator.uniform(4.0, 9.0))
+        tangent = np.array([1.0, 0.0, 0.0]) + generator.normal(0.0, 0.1, 3)
+        (_, end, at_once), (_, last, in_turn) = _turned_end("frame"), _turned_end("frame")
+        at_once.move(end, position=(0.19, 0, 0), tangent=tangent, roll=roll)
+        at_once.equilibrium()
+        in_turn.move(last, position=(0.19, 0, 0), tangent=tangent)
+        for share in np.linspace(0.1, 1.0, 10):
+            in_turn.move(last, roll=share * roll)
+            in_turn.equilibrium()
+        assert at_once.twists("rod").sum() == pytest.approx(in_turn.twists("rod").sum(), rel=1e-6)
+
+
+def test_a_roll_on_its_way_or_undone_leaves_no_turns_behind():
+    rod, end, simulation = _turned_end("frame")
+    before = simulation.snapshot()
+    simulation.move(end, roll=9.0)
+    kept = simulation.snapshot()
+    simulation.restore(before)
+    simulation.equilibrium()
+    assert np.allclose(simulation.twists(rod), 0.0)
+    simulation.restore(kept)
+    simulation.copy().equilibrium()
+    simulation.move(end, rotation=np.eye(3))
+    simulation.equilibrium()
+    assert np.allclose(simulation.twists(rod), 0.0)
+    simulation.restore(kept)
+    simulation.equilibrium()
+    assert np.sum(simulation.twists(rod)) * 0.01 == pytest.approx(9.0 * 19 / 20, rel=1e-6)

@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from typing import Any, SupportsIndex, SupportsInt, overload
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, Literal, SupportsIndex, SupportsInt, overload
 
 import numpy as np
 import numpy.typing as npt
 
 from withe.batch.lanes import Lanes
 from withe.batch.reading import Reading
+from withe.batch.records import BatchRecord, Equilibria
+from withe.batch.running import BatchRun
 from withe.batch.setting import Setting
 from withe.common import validation
 from withe.common.attributes import known_attributes
 from withe.common.keywords import keyword_hints
+from withe.common.progress import progress as progress_bar
+from withe.common.user_warnings import Cause, each_cause_once, located_at, user_place
 from withe.errors import ConvergenceError
 from withe.simulation.functions import force_function, step_callback
 from withe.simulation.hands import forget_left_rings
+from withe.simulation.readouts import Equilibrium
 from withe.simulation.running import listed_simulations, thread_count
 from withe.simulation.session import Session
 from withe.simulation.simulation import Simulation
@@ -143,6 +149,9 @@ class Batch(Setting, Reading):
         steps = validation.integer(count, "number of steps", 0, _MAX_STEPS)
         self._lanes.refuse_in_run("step")
         self._lanes.forgive_restored()
+        self._advance(numbers, steps)
+
+    def _advance(self, numbers: npt.NDArray[np.intc], steps: int) -> None:
         functions: dict[SupportsInt | SupportsIndex, tuple[Any, Any]] = {
             int(numbers[place]): (step_callback(simulation._session), force_function(simulation._session))
             for place, simulation in self._lanes.each(numbers)
@@ -158,6 +167,108 @@ class Batch(Setting, Reading):
                 lane, name, time = left[0]
                 more = f", and {len(left) - 1} more" if len(left) > 1 else ""
                 report_left(f"ring {name!r} of simulation {lane} (time {time:.6g} s){more}: released")
+
+    def run(
+        self,
+        duration: float,
+        record_every: float | None = None,
+        *,
+        progress: bool | Literal["always"] = True,
+        before_step: Callable[[Batch], object] | None = None,
+        until: Callable[[Batch], npt.ArrayLike] | None = None,
+        record: Mapping[str, Callable[[Batch], npt.ArrayLike]] | None = None,
+        lanes: npt.ArrayLike | None = None,
+    ) -> BatchRecord:
+        """Advance all simulations by a duration, side by side, and record what happens.
+
+        As `Simulation.run`, with callbacks that are given the batch, and frames at whole time steps.
+
+        Parameters
+        ----------
+        duration : float [s]
+            A whole number of time steps.
+        record_every : float [s]
+            A whole number of time steps; by default a hundredth of the duration, rounded up to one.
+        progress : bool or "always"
+            Whether to show a progress bar; True shows one on a terminal and in a notebook.
+        before_step : callable
+            Called with the batch once before every time step.
+        until : callable
+            Called with the batch after every time step; the simulations for which it returns true, shape (n,), have
+            ended, with a last frame. One truth value is for all.
+        record : mapping of str to callable
+            What else to record: each is called with the batch at every frame and returns an array of a row for each
+            simulation.
+        lanes : array_like of shape (n,), bool, or of numbers, optional
+            Which simulations; all by default.
+
+        Returns
+        -------
+        BatchRecord
+            A `Record` of each, in the order of `lanes`; that of a simulation is also its `record`. One that fails
+            keeps the frames until then: see `failed`.
+
+        Raises
+        ------
+        ValueError
+            Times that are no whole number of steps, or a callback that returns another shape.
+        KeyboardInterrupt, or what a callback raised
+            What was recorded until then is the `record` of each simulation.
+
+        Examples
+        --------
+        >>> batch = scene.build_batch(3, time_step=5e-3)
+        >>> run = batch.run(0.1, until=lambda b: b.positions(arm)[:, -1, 2] < -0.5, progress=False)
+        >>> run.times.shape
+        (3, 21)
+        """
+        numbers = self._lanes.chosen(lanes)
+        self._lanes.refuse_in_run("run")
+        self._lanes.forgive_restored()
+        loop = BatchRun(self, self._lanes, numbers, duration, record_every, before_step, until, record)
+        with progress_bar(loop.duration, "simulating", progress) as bar:
+            loop.go(self._advance, bar.update)
+        return loop.record
+
+    def equilibrium(self, lanes: npt.ArrayLike | None = None) -> Equilibria:
+        """Find the static equilibria that the present states lead to, and go there; see `Simulation.equilibrium`.
+
+        Parameters
+        ----------
+        lanes : array_like of shape (n,), bool, or of numbers, optional
+            Which simulations; all by default.
+
+        Returns
+        -------
+        Equilibria
+            Arrays with an entry for each simulation, and the `Equilibrium` of each. One for which none was found stays
+            where it was, and `failures` says why.
+
+        Examples
+        --------
+        >>> batch = scene.build_batch(3, integrator="static")
+        >>> batch.set(arm, youngs_modulus=[0.8e6, 1.0e6, 1.2e6])
+        >>> batch.equilibrium().stable
+        array([ True,  True,  True])
+        """
+        chosen = [simulation for _, simulation in self._lanes.each(self._lanes.chosen(lanes))]
+        self._lanes.refuse_in_run("equilibrium")
+        heard: set[Cause] = set()
+        place = user_place()
+
+        def find(simulation: Simulation) -> Equilibrium | ConvergenceError:
+            with located_at(place), each_cause_once(heard):
+                try:
+                    return simulation.equilibrium()
+                except ConvergenceError as error:
+                    return error
+
+        with ThreadPoolExecutor(max(1, min(self.workers, len(chosen))), thread_name_prefix="withe") as pool:
+            found = list(pool.map(find, chosen))
+        return Equilibria(
+            tuple(each if isinstance(each, ConvergenceError) else None for each in found),
+            tuple(each if isinstance(each, Equilibrium) else None for each in found),
+        )
 
     def _left_rings(self, heard: Iterable[int]) -> list[tuple[int, str, float]]:
         """Rings that the engine has released: simulation, name, and when [s]; `heard`: simulations that may know."""

@@ -6,9 +6,85 @@ from collections.abc import Callable
 from difflib import get_close_matches
 from typing import Any, TypeVar
 
-__all__ = ["known_attributes"]
+__all__ = ["known_attributes", "of_a_simulation"]
 
 T = TypeVar("T", bound=type)
+
+SIMULATION_WORDS = frozenset(
+    [
+        "check_jacobian",
+        "contacts",
+        "curvatures",
+        "deflection",
+        "directors",
+        "energy",
+        "equilibrium",
+        "feed",
+        "get",
+        "hand",
+        "joint_angle",
+        "joint_rate",
+        "joint_torque",
+        "linearise",
+        "link",
+        "momentum",
+        "move",
+        "obstacle_position",
+        "passage",
+        "picture",
+        "plan",
+        "plot",
+        "pose",
+        "positions",
+        "reaction",
+        "record",
+        "release",
+        "remove",
+        "reset",
+        "restore",
+        "run",
+        "set",
+        "set_natural_curvature",
+        "set_natural_stretch",
+        "set_natural_twist",
+        "set_state",
+        "set_velocities",
+        "snapshot",
+        "spins",
+        "spring_tension",
+        "statistics",
+        "step",
+        "step_jacobian",
+        "tendon_length",
+        "tendon_points",
+        "tensions",
+        "time",
+        "time_step",
+        "twists",
+        "velocities",
+        "view",
+        "wrench",
+    ]
+)
+"""What a simulation has, and new users ask of scenes and of handles."""
+
+
+def of_a_simulation(owner: str, name: str, call: str) -> AttributeError:
+    """The error of an attribute that a scene or a handle has not: where a simulation has it, how to get there.
+
+    Parameters
+    ----------
+    owner : str
+        What was asked, such as "rod 'arm'".
+    name : str
+        The attribute.
+    call : str
+        How the simulation is called, with {} for the attribute, such as "simulation.{}(arm)".
+    """
+    if name not in SIMULATION_WORDS:
+        return AttributeError(f"{owner} has no attribute {name!r}")
+    how = f"simulation = scene.build(), then {call.format(name)}"
+    return AttributeError(f"{owner} has no {name!r}: build the scene first, {how}")
 
 
 def known_attributes(instead: str) -> Callable[[T], T]:

@@ -16,6 +16,8 @@ __all__ = ["keyword_hints"]
 
 T = TypeVar("T", bound=Callable[..., Any])
 
+_OWN = ("self", "cls")
+
 # What other packages (PyElastica, DisMech, MuJoCo), textbooks and habit call what our words name; those count that the
 # function called has.
 _ELSEWHERE: dict[str, tuple[str, ...]] = {
@@ -137,6 +139,8 @@ def keyword_hints(target: T) -> T:
     for name, function in list(vars(target).items()):
         if isinstance(function, FunctionType) and (name == "__init__" or not name.startswith("_")):
             setattr(target, name, _hinted(function, target.__name__ if name == "__init__" else name))
+        elif isinstance(function, classmethod) and not name.startswith("_"):
+            setattr(target, name, classmethod(_hinted(function.__func__, name)))
     return target
 
 
@@ -161,18 +165,17 @@ def _explained(function: Callable[..., Any], name: str, given: int, keywords: Co
     """What is wrong with the arguments of a call, `given` of them by position; None where Python says it best."""
     parameters = list(inspect.signature(function).parameters.values())
     kinds = [each.kind for each in parameters]
-    if inspect.Parameter.VAR_KEYWORD in kinds:
-        return None
+    takes_any = inspect.Parameter.VAR_KEYWORD in kinds
     named = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
-    known = [each.name for each in parameters if each.kind in named and each.name != "self"]
-    unknown = [word for word in keywords if word not in known]
+    known = [each.name for each in parameters if each.kind in named and each.name not in _OWN]
+    unknown = [word for word in keywords if word not in known and not takes_any]
     if unknown:
         return "\n".join(f"{name}() has no keyword {word!r}; {_meant(word, known)}" for word in unknown)
     by_name = [each.name for each in parameters if each.kind is each.KEYWORD_ONLY and each.name not in keywords]
-    places = len(parameters) - kinds.count(inspect.Parameter.KEYWORD_ONLY)
+    places = len(parameters) - kinds.count(inspect.Parameter.KEYWORD_ONLY) - takes_any
     if given <= places or not by_name or inspect.Parameter.VAR_POSITIONAL in kinds:
         return None
-    selves = sum(each.name == "self" for each in parameters)
+    selves = sum(each.name in _OWN for each in parameters)
     example = ", ".join(f"{word}=..." for word in by_name[: given - places])
     return (
         f"{name}() takes {places - selves or 'no'} argument{'' if places - selves == 1 else 's'} by position, "

@@ -6,7 +6,8 @@ import math
 import numbers
 import os
 import reprlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -21,11 +22,13 @@ __all__ = [
     "has_masked",
     "integer",
     "is_scalar",
+    "near_word",
     "non_negative",
     "number",
     "number_array",
     "per_item",
     "positive",
+    "quaternion_matrix",
     "rotation_matrix",
     "truth",
     "unit_vector",
@@ -111,8 +114,18 @@ def truth(value: Any, what: str) -> bool:
 def choice(value: Any, what: str, options: Sequence[str]) -> str:
     """One of several words."""
     if not isinstance(value, str) or value not in options:
-        raise ValueError(f"{what} must be {' or '.join(map(repr, options))}, got {_short(value)}")
+        near = near_word(value, options) if isinstance(value, str) else None
+        meant = "" if near is None else f"; did you mean {near!r}?"
+        raise ValueError(f"{what} must be {' or '.join(map(repr, options))}, got {_short(value)}{meant}")
     return value
+
+
+def near_word(value: str, options: Iterable[str]) -> str | None:
+    """The word that was probably meant: spelt alike, or of which a part was given."""
+    known = list(options)
+    plain = value.strip().lower().replace("-", "_").replace(" ", "_")
+    near = get_close_matches(plain, known, 1) or [word for word in known if len(plain) > 2 and plain in word]
+    return near[0] if near else None
 
 
 def file_path(value: str | os.PathLike[str], *suffixes: str, instead: str = "") -> Path:
@@ -260,15 +273,24 @@ def unit_vector(value: Any, what: str) -> FloatArray:
 
 
 def rotation_matrix(value: Any, what: str) -> FloatArray:
-    """A rotation, as a matrix of shape (3, 3), from such a matrix or a SciPy Rotation.
+    """A rotation, as a matrix of shape (3, 3), from a unit quaternion (w, x, y, z), a SciPy Rotation or such a matrix.
 
     Raises
     ------
     ValueError
-        Not orthogonal to 1e-6, or a reflection.
+        None of these, not orthogonal to 1e-6, or a reflection.
     """
     as_matrix = getattr(value, "as_matrix", None)
-    matrix = number_array(as_matrix() if callable(as_matrix) else value, what, (3, 3))
+    given = as_matrix() if callable(as_matrix) else value
+    shape = np.shape(given) if is_scalar(given) or not isinstance(given, str) else ()
+    if shape not in ((3, 3), (4,)):
+        raise ValueError(
+            f"{what} must be a quaternion (w, x, y, z), a SciPy Rotation or a matrix of shape (3, 3), "
+            f"got {_short(value) if shape == () else f'shape {_shape(shape)}'}"
+        )
+    if shape == (4,):
+        return quaternion_matrix(number_array(given, what, (4,)), what)
+    matrix = number_array(given, what, (3, 3))
     off = float(np.abs(matrix @ matrix.T - _IDENTITY).max())
     if off > 1e-6:
         raise ValueError(f"{what} must be a rotation: its rows are not orthonormal")
@@ -279,6 +301,21 @@ def rotation_matrix(value: Any, what: str) -> FloatArray:
         return matrix
     u, _, vt = np.linalg.svd(matrix)
     return np.asarray(u @ vt, np.float64)
+
+
+def quaternion_matrix(quaternion: FloatArray, what: str) -> FloatArray:
+    """Rotation of a unit quaternion w, x, y, z."""
+    size = float(np.linalg.norm(quaternion))
+    if abs(size - 1.0) > 1e-6:
+        raise ValueError(f"{what} must have a quaternion qw, qx, qy, qz of length 1, got one of {size:g}")
+    w, x, y, z = quaternion / size
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
 
 
 def is_scalar(value: Any) -> bool:

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.keywords import keyword_hints
 from withe.perception.masks import border_filter
 from withe.perception.tracing import check_image, read_image
 
@@ -101,6 +102,7 @@ class MeasuredCable:
     error: float
 
 
+@keyword_hints
 def measure(
     *,
     height: float | None = None,

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.keywords import keyword_hints
 from withe.deployment.cable import Cable
 from withe.deployment.motion import lengthened
 from withe.deployment.pattern import distances
@@ -63,6 +64,7 @@ class Deployment:
     passed: npt.NDArray[np.bool_]
 
 
+@keyword_hints
 def deploy(
     plan: Plan,
     cable: Cable | None = None,
@@ -152,6 +154,7 @@ def deploy(
     return _compared(plan, setup.arc_length, held, laid, record)
 
 
+@keyword_hints
 def place(
     plan: Plan,
     *,
@@ -246,6 +249,7 @@ def trial_cable(cable: Cable, seed: int, noise: float = 1.0) -> Cable:
     return _cable_of(cable, _drawn(seed, validation.non_negative(noise, "noise")))
 
 
+@keyword_hints
 def hang(cable: Cable, *, nodes: int = 200) -> FloatArray:
     """How a cable hangs in the rod engine from a jaw at its end, at rest: what a camera sees before it is laid.
 

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from withe._core import GraspTable
 from withe.common import validation
+from withe.common.keywords import keyword_hints
 from withe.errors import ConvergenceError
 
 __all__ = ["Grasp", "grasp"]
@@ -63,6 +64,7 @@ def table() -> GraspTable:
     return GraspTable()
 
 
+@keyword_hints
 def grasp(
     suspended: npt.ArrayLike,
     curvature: npt.ArrayLike,

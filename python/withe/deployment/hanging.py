@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.keywords import keyword_hints
 from withe.deployment.cable import pixel_size
 from withe.perception.masks import border_filter
 from withe.perception.tracing import check_image, read_image
@@ -40,6 +41,7 @@ class MeasuredCurvature:
     error: float
 
 
+@keyword_hints
 def measure_curvature(
     gravito_bending_length: float,
     *,

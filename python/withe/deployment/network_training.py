@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.keywords import keyword_hints
 from withe.deployment.grasp_network import CURVATURES, FORMS, LENGTHS, STIFFNESSES, GraspNetwork, side
 from withe.deployment.grasping import grasp
 from withe.learning.network_training import Alternating, Cosine
@@ -20,6 +21,7 @@ _SAMPLES = {"small": 100_000, "source": 6358}
 _BEYOND = 1.03  # of the range: at the edge of its samples a network is worst
 
 
+@keyword_hints
 def train(
     name: Literal["small", "source"] = "small",
     seed: int = 0,

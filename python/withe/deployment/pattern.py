@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import warnings
 from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any
@@ -12,6 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.keywords import keyword_hints
+from withe.common.user_warnings import warn
 from withe.deployment.cable import Cable
 from withe.deployment.feasibility import Controller, Feasibility, examine
 from withe.deployment.letters import written
@@ -40,6 +41,7 @@ _LEAST_BEHIND, _MOST_BEHIND = 0.1, 0.5  # of a pattern's length, in which what l
 _BENT_START = 1.0  # [rad]: curvature at a function's start times its length that asks for a lead-in
 
 
+@keyword_hints
 class Pattern:
     """A curve on the floor, smoothed and resampled by its length.
 
@@ -277,11 +279,10 @@ class Pattern:
         self.deviation = float(distances(self.raw, self.points).max())
         if self.deviation > _MUCH_FARTHER * smoothing:
             away, asked = 1e3 * self.deviation, 1e3 * smoothing
-            warnings.warn(
-                f"the pattern is {away:.1f} mm from what was given, where {asked:.1f} mm were asked for: {nodes} nodes"
+            warn(
+                f"the pattern is {away:.1f} mm from what was given, for a smoothing of {asked:.1f} mm: {nodes} nodes"
                 f" sample that every {1e3 * even[1]:.1f} mm, too coarsely for its bends; give more nodes",
-                UserWarning,
-                stacklevel=3,
+                cause="pattern",
             )
 
     def to_dict(self) -> dict[str, Any]:

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.keywords import keyword_hints
 from withe.deployment.cable import Cable
 from withe.deployment.pattern import Pattern, distances
 from withe.deployment.posts import Post
@@ -18,6 +19,7 @@ FloatArray = npt.NDArray[np.float64]
 _ON_FLOOR = 1.0  # [radii] that the cable may be above the floor beside a post
 
 
+@keyword_hints
 def posts_along(
     pattern: Pattern,
     cable: Cable,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import warnings
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path as FilePath
@@ -13,7 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.keywords import keyword_hints
 from withe.common.progress import progress as bar
+from withe.common.user_warnings import warn
 from withe.deployment.cable import JAW, Cable
 from withe.deployment.drawing import draw_plan
 from withe.deployment.feasibility import Controller, Feasibility, Slip, examine, grasps_along, require_bendable
@@ -198,6 +199,7 @@ class Plan:
         return f"Plan({self.controller}, {self.pattern.length:.3f} m in {self.times[-1]:.1f} s)"
 
 
+@keyword_hints
 def plan(
     cable: Cable,
     pattern: Pattern,
@@ -306,7 +308,7 @@ def plan(
         grasps = grasps_along(path, held, controller)
         needed, way = _needed(pattern, held, controller, grasps, bool(posts)), way_along(held, path, grasps)
         if friction is not None and not posts and needed.max() > friction:
-            warnings.warn(_slips(pattern, needed, friction), UserWarning, stacklevel=2)
+            warn(_slips(pattern, needed, friction), cause="slips")
     motion = course(held, path, way, speed, time_step, start)
     return Plan(
         times=motion.times,

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.keywords import keyword_hints
 from withe.deployment.cable import JAW
 from withe.deployment.deploying import DRAWN, drawn_setup
 from withe.deployment.planning import Plan
@@ -90,6 +91,7 @@ class Tying:
         return self.shapes[-1]
 
 
+@keyword_hints
 def tie(
     plans: Sequence[Plan],
     steps: Sequence[Sequence[Move]],

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 
 import numpy as np
 
 from withe.common.progress import progress as progress_bar
+from withe.common.user_warnings import warn
 from withe.errors import ConvergenceError
 from withe.folding.jaw_motion import JawMotion
 from withe.parts.handles import Rod
@@ -98,10 +98,9 @@ def carried(
         watch.failure = f"not over after {simulation.time:.0f} s"
     watch.slip = max(float(np.linalg.norm(simulation.deflection(hand).slip)) for hand in hands)
     if watch.slip > _SLIPS:
-        warnings.warn(
-            f"the sheet slipped by {1e3 * watch.slip:.1f} mm in the jaw, which presses on it too little: a greater "
-            "force_limit of the Jaw holds it",
-            UserWarning,
-            stacklevel=4,
+        warn(
+            f"the sheet slipped by {1e3 * watch.slip:.1f} mm in the jaw: it presses too little, and a greater "
+            "force_limit of the Jaw holds the sheet",
+            cause="slipped in the jaw",
         )
     return watch

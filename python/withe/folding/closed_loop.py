@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.keywords import keyword_hints
 from withe.folding.paper import require_length
 from withe.folding.plans import Plan
 from withe.folding.seeing import camera_over, find_edge
@@ -48,6 +49,7 @@ def fold(
 ) -> WideFold: ...
 
 
+@keyword_hints
 def fold(
     plan: Plan,
     sheet: SimulatedSheet | WideSheet,

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from withe.folding.endings import plan
-from withe.folding.paper import Paper
+from withe.folding.paper import Paper, folded_share
 
 __all__ = ["add_parser", "run"]
 
@@ -17,9 +17,14 @@ _PAPERS = {"a4": Paper.a4, "us_letter": Paper.us_letter, "cardboard": Paper.card
 
 def _target(text: str) -> float | str:
     try:
-        return text if text == "half" else float(text)
+        return float(text)
     except ValueError:
-        raise argparse.ArgumentTypeError(f"must be half, or a place along the sheet in m, got {text!r}") from None
+        pass
+    try:
+        folded_share(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    return text
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -35,7 +40,12 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument("--thickness", type=float, metavar="M", help="of the sheet [m] (default: 1e-4)")
     parser.add_argument("--lgb", type=float, metavar="M", help="gravito-bending length [m], if not the paper's")
     parser.add_argument("--friction", type=float, help="coefficient between sheet and table (default: 0.12)")
-    parser.add_argument("--target", type=_target, default="half", help="where the edge comes down [m], or half")
+    parser.add_argument(
+        "--target",
+        type=_target,
+        default="half",
+        help="where the edge comes down [m], or the share folded: half, third, quarter, 2/5",
+    )
     parser.add_argument("--method", choices=["ucs", "slip", "local", "intuitive"], default="ucs")
     parser.add_argument("--grasp", choices=["moment_free", "free"], default="moment_free")
     parser.add_argument("--curvature", type=float, metavar="K", help="bound of a free grasp [1/Lgb] (default: 2.5)")

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
 from withe.common import validation
+from withe.common.keywords import keyword_hints
+from withe.common.user_warnings import warn
 from withe.folding.jaw import Jaw
 from withe.folding.paper import Paper
 from withe.folding.planning import Grasp, Method, Source, least_friction, slow_plan
@@ -22,9 +23,10 @@ _BEARABLE = 1e-3  # slide [m]
 _UNSEEN = 0.5  # from the target, in which a lifted edge hides what it comes down on [Lgb]
 
 
+@keyword_hints
 def plan(
     paper: Paper,
-    target: float | Literal["half"] = "half",
+    target: float | str = "half",
     *,
     method: Method = "ucs",
     grasp: Grasp = "moment_free",
@@ -44,9 +46,11 @@ def plan(
     Parameters
     ----------
     paper : Paper
-    target : float or "half" [m]
-        Where the lifted edge comes down, from where it lay (the dissertation's C); the crease is in the middle. "half":
-        on the far edge, which long sheets do not reach without a moment: what is refused says which targets can be.
+    target : float [m] or str
+        Where the lifted edge comes down, from where it lay (the dissertation's C); the crease is in the middle. Or the
+        share of the sheet that is folded over: "half", "third", "quarter", or a fraction up to a half such as "2/5",
+        whose C is twice that share of the length. "half" is on the far edge, which long sheets do not reach without a
+        moment: what is refused says which targets can be.
     method : {"ucs", "slip", "local", "intuitive"}
         "ucs": least accumulated ratio of the table's tangential to its normal force, on a grid of positions
         [dissertation, Alg. 7, with costs that accumulate]. "slip": no predicted slide where such a way exists, or else
@@ -136,7 +140,7 @@ def plan(
         said = _unseen(slow)
     if said is None:
         if method not in ("slip", "intuitive") and slow.jumps_at is not None:
-            warnings.warn(_jumps(slow), UserWarning, stacklevel=2)
+            warn(_jumps(slow), cause="jumps")
         return slow
     if ending == "auto" and (grasp == "free" or replans):
         try:
@@ -144,7 +148,7 @@ def plan(
         except ValueError as error:
             said = f"{said}; {error}"
             slow = replace(slow, blocked=said)
-    warnings.warn(said, UserWarning, stacklevel=2)
+    warn(said, cause="slides")
     return slow
 
 
@@ -171,4 +175,7 @@ def _unseen(slow: Plan) -> str | None:
     needed = float(slow.slip_ratio[slow.poses[:, 0] > slow.poses[-1, 0] - _UNSEEN * lgb].max())
     if needed <= least:
         return None
-    return f"the last part, in which nobody sees the sheet slide, needs friction {needed:.3f}, there may be {least:.3g}"
+    return (
+        f"the end of the fold needs friction {needed:.3f}: there may be {least:.3g}, and no camera sees the sheet "
+        "slide there"
+    )

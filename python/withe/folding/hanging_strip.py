@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import os
-import warnings
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.keywords import keyword_hints
+from withe.common.user_warnings import warn
 from withe.folding.strip_pictures import strip_ends
 
 __all__ = ["Measured", "droop", "measure"]
@@ -99,6 +100,7 @@ def droop(length: float) -> float:
     return length * _hanging(_angle_where(0, length))[1]
 
 
+@keyword_hints
 def measure(
     *,
     length: float | None = None,
@@ -281,10 +283,9 @@ def _measured(angle: float, over: float, drop: float, error: float, by_reach: bo
     length = over / reach if by_reach else over
     if not _TELLING[0] < strip < _TELLING[1]:
         low, high = (1e3 * bound * length / strip for bound in _TELLING)
-        warnings.warn(
+        warn(
             f"the strip is {strip:.2g} Lgb long, and its droop says little: measure one of {low:.0f} to {high:.0f} mm",
-            UserWarning,
-            stacklevel=3,
+            cause="strip",
         )
     ahead, back = _hanging(angle + _STEP), _hanging(angle - _STEP)
     # With p the angle, a = length or reach, b = drop: b / a = r(p) and b = Lgb f(p), f = the drop in Lgb.

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from withe._core import SheetManifold
 from withe.common import validation
+from withe.common.keywords import keyword_hints
 from withe.folding.sheet_network import shipped
 from withe.folding.sheets import Elastica, described, shared
 from withe.folding.widths import EVEN, Width
@@ -45,6 +46,7 @@ def _solved(solve: Callable[..., FloatArray], first: FloatArray, second: FloatAr
     return described(rows, first.shape)
 
 
+@keyword_hints
 def elastica(
     x: npt.ArrayLike | None = None,
     z: npt.ArrayLike | None = None,

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.keywords import keyword_hints
 from withe.folding.grid import HIGH, WIDE
 from withe.folding.manifold import elastica
 from withe.folding.sheet_network import FORMS, SheetNetwork
@@ -25,6 +26,7 @@ _SAMPLES = {"small": 300_000, "source": 95_796}
 _WEIGHTS = (4.0, 1.0, 2.0, 0.5, 0.2)
 
 
+@keyword_hints
 def train(
     name: Literal["small", "source"] = "small",
     seed: int = 0,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -10,10 +11,11 @@ import numpy.typing as npt
 
 from withe.common import validation
 
-__all__ = ["Paper", "require_length"]
+__all__ = ["Paper", "folded_share", "require_length"]
 
 FloatArray = npt.NDArray[np.float64]
 _LARGEST = 20.0  # [m]
+_SHARES = {"half": 1.0 / 2.0, "third": 1.0 / 3.0, "quarter": 1.0 / 4.0}
 _STIFFEST = 10.0  # lengths that Lgb may be: such a sheet droops by 6e-5 of its length
 
 
@@ -115,6 +117,23 @@ class Paper:
         """
         diagonal = np.sqrt(2.0) * validation.positive(side, "side")
         return cls(diagonal, diagonal, 0.043, outline=((0.0, 0.0), (0.5, 1.0), (1.0, 0.0)))
+
+
+def folded_share(target: str) -> float:
+    """Share of a sheet that is folded over, of a word or a fraction such as "1/3".
+
+    Raises
+    ------
+    ValueError
+        Another word, or a fraction that is not above 0 and up to a half.
+    """
+    fraction = re.fullmatch(r"(\d{1,6})/(\d{1,6})", target.replace(" ", "")) if isinstance(target, str) else None
+    if fraction is None:
+        return _SHARES[validation.choice(target, "target, if not in m or a fraction such as '1/3',", list(_SHARES))]
+    part, whole = int(fraction[1]), int(fraction[2])
+    if not 0 < 2 * part <= whole:
+        raise ValueError(f"target must be a fraction up to 1/2, the share that is folded over, got {target!r}")
+    return part / whole
 
 
 def require_length(paper: Paper, planned: Paper) -> None:

@@ -14,7 +14,7 @@ from withe.folding import free_moment, moment_free
 from withe.folding.free_moment import Holding, Way
 from withe.folding.jaw import Jaw, inner_edge, outer_edge
 from withe.folding.manifold import Manifold
-from withe.folding.paper import Paper
+from withe.folding.paper import Paper, folded_share
 from withe.folding.plans import SHORT, Plan, flat_forces
 from withe.folding.sheets import LONGEST, SHORTEST, Elastica, at_forces, at_poses, forces_of, join, poses_of, take
 from withe.folding.timing import evenly, travel_times
@@ -89,7 +89,7 @@ class _Task:
 
 def slow_plan(
     paper: Paper,
-    target: float | Literal["half"],
+    target: float | str,
     *,
     method: Method,
     grasp: Grasp,
@@ -151,8 +151,7 @@ def _planned(task: _Task) -> Plan:
 
 def _target(paper: Paper, target: float | str) -> float:
     if isinstance(target, str):
-        validation.choice(target, "target", ("half",))
-        return paper.length
+        return 2.0 * folded_share(target) * paper.length
     where = validation.positive(target, "target")
     if where > paper.length:
         raise ValueError(f"target must be on the sheet, which is {paper.length:g} m long, got {where:g} m")

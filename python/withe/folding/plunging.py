@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.keywords import keyword_hints
 from withe.common.progress import progress as progress_bar
 from withe.folding.jaw_motion import Motion
 from withe.folding.planning import plan_above
@@ -70,6 +71,7 @@ class _Tried:
         return (np.inf, np.inf) if fold.failure is not None else (fold.error, fold.slide - self._known)
 
 
+@keyword_hints
 def plunge(
     plan: Plan,
     *,

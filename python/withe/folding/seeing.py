@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from withe.common import validation
 from withe.common.extras import require
+from withe.common.keywords import keyword_hints
 from withe.folding.paper import Paper
 from withe.perception.camera import Camera
 from withe.perception.masks import MaskFunction, border_filter
@@ -50,6 +51,7 @@ class SeenEdge:
     corners: FloatArray
 
 
+@keyword_hints
 def overhead_camera(x: float, *, height: float = _HEIGHT, pixel: float = _PIXEL) -> Camera:
     """Make a camera of 640 by 480 pixels over the table that looks straight down on the middle of an edge.
 
@@ -96,6 +98,7 @@ def camera_over(paper: Paper) -> Camera:
     return overhead_camera(paper.length, height=higher * _HEIGHT, pixel=higher * _PIXEL)
 
 
+@keyword_hints
 def find_edge(
     image: npt.ArrayLike | str | os.PathLike[str], camera: Camera, paper: Paper, *, mask: MaskFunction | None = None
 ) -> SeenEdge:

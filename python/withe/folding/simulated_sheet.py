@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.keywords import keyword_hints
 from withe.folding.carrying import FRAMES, Watch, carried
 from withe.folding.jaw import Jaw
 from withe.folding.jaw_motion import JawMotion, Motion, lead
@@ -86,6 +87,7 @@ class Held:
     jaw: JawMotion
 
 
+@keyword_hints
 class SimulatedSheet:
     """A sheet on a table, whole, and a jaw that holds one of its edges: a robot's world, in simulation.
 

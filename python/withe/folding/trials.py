@@ -12,12 +12,13 @@ from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from withe.common import validation
 from withe.common.cluster import cluster_executor, require_client
+from withe.common.keywords import keyword_hints
 from withe.common.progress import progress as progress_bar
 from withe.folding.closed_loop import fold
 from withe.folding.endings import plan
@@ -40,7 +41,7 @@ class Trial:
     ----------
     paper : Paper
         As it is thought to be; of its Lgb the planner is told only what the photograph says.
-    target : float or "half" [m]
+    target : float [m] or str, as of `plan`
     seed : int
         Of how the sheet differs from the paper.
     noise : Noise
@@ -66,7 +67,7 @@ class Trial:
     """
 
     paper: Paper
-    target: float | Literal["half"] = "half"
+    target: float | str = "half"
     seed: int = 0
     noise: Noise = field(default_factory=Noise)
     replans: int = 0
@@ -115,6 +116,7 @@ class Outcome:
     seconds: float = 0.0
 
 
+@keyword_hints
 def run_trials(
     trials: Sequence[Trial], *, processes: int | None = None, client: Any | None = None, progress: bool = True
 ) -> Iterator[Outcome]:
@@ -228,7 +230,7 @@ def _planned(paper: Paper, target: float | str, options: tuple[tuple[str, Any], 
     began = time.thread_time()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # of slide that is predicted: it is measured here
-        found = plan(paper, target, progress=False, **dict(options))  # type: ignore[arg-type]
+        found = plan(paper, target, progress=False, **dict(options))
     return found, time.thread_time() - began
 
 

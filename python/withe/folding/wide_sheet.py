@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.keywords import keyword_hints
 from withe.folding.carrying import Watch, carried
 from withe.folding.jaw import Jaw
 from withe.folding.jaw_motion import JawMotion, Motion, lead
@@ -72,6 +73,7 @@ class WideFold:
     slip: float = 0.0
 
 
+@keyword_hints
 class WideSheet:
     """Two strips of a sheet on a table, joined at their far ends and held by one jaw: what slides unevenly turns.
 

@@ -5,12 +5,15 @@ from __future__ import annotations
 import copy
 from dataclasses import dataclass
 from typing import Any, TypeVar
+from weakref import WeakKeyDictionary, WeakValueDictionary
 
 import numpy as np
 import numpy.typing as npt
 
 from withe.batch import Batch
 from withe.common import validation
+from withe.common.user_warnings import Cause, each_cause_once, warn
+from withe.errors import PlausibilityWarning
 from withe.learning.task import Task
 from withe.simulation.simulation import Simulation
 
@@ -41,6 +44,21 @@ class Outcome:
     failed: BoolArray
 
 
+class _Causes(set[Cause]):
+    """A set that may be referred to weakly."""
+
+
+_causes_of: WeakKeyDictionary[type[Task], WeakValueDictionary[str, _Causes]] = WeakKeyDictionary()
+
+
+def _shared_causes(task: type[Task]) -> _Causes:
+    """Causes of warnings that were given in a training run, which lasts as long as any environment of its task."""
+    held = _causes_of.setdefault(task, WeakValueDictionary())
+    causes = held.get("run", _Causes())
+    held["run"] = causes
+    return causes
+
+
 class Episodes:
     """Robots that do a task, each at its own place in its episode.
 
@@ -65,7 +83,8 @@ class Episodes:
             self.task = task = copy.deepcopy(task)
         except TypeError as error:
             raise ValueError(f"task must be one that copy.deepcopy can copy: {type(task).__name__}, {error}") from error
-        first = self._built(np.random.default_rng(0))
+        self._causes = _shared_causes(type(task))
+        first = self._first()
         self.robots = Batch([first, *(first.copy() for _ in range(number - 1))], workers)
         self.begun = np.zeros(number, bool)
         self._taken = np.zeros(number, np.int64)
@@ -88,14 +107,15 @@ class Episodes:
 
     def begin(self, chosen: IntArray, generators: list[np.random.Generator]) -> None:
         """Begin episodes of some robots, with a generator of random numbers for each of them."""
-        if self.task.redraw:
-            for lane, generator in zip(chosen, generators, strict=True):
-                self.robots[int(lane)] = self._built(generator)
-        else:
-            self.robots.reset(chosen)
-        self._taken[chosen] = 0
-        self.begun[chosen] = True
-        self.task.begin(self.robots, chosen, generators)
+        with each_cause_once(self._causes):
+            if self.task.redraw:
+                for lane, generator in zip(chosen, generators, strict=True):
+                    self.robots[int(lane)] = self._built(generator)
+            else:
+                self.robots.reset(chosen)
+            self._taken[chosen] = 0
+            self.begun[chosen] = True
+            self.task.begin(self.robots, chosen, generators)
 
     def observe(self) -> npt.NDArray[np.float32]:
         """What is seen of every robot.
@@ -122,8 +142,9 @@ class Episodes:
             The task returns rewards or ends of another shape than (n,), or rewards that are not finite.
         """
         if chosen.size > 0:  # a task need not know what none does
-            self.task.act(self.robots, actions, chosen)
-            self.robots.step(self._count, chosen)
+            with each_cause_once(self._causes):
+                self.task.act(self.robots, actions, chosen)
+                self.robots.step(self._count, chosen)
             self._taken[chosen] += 1
         failed = self.robots.failed
         reward = self._returned(self.task.reward(self.robots), "reward", np.float64)
@@ -134,6 +155,21 @@ class Episodes:
 
     def _name(self, method: str) -> str:
         return f"{type(self.task).__name__}.{method}"
+
+    def _first(self) -> Simulation:
+        """The robot that all are copies of, unless each episode has its own."""
+        generator = np.random.default_rng(0)
+        before = generator.bit_generator.state
+        with each_cause_once(self._causes):
+            built = self._built(generator)
+            if not self.task.redraw and generator.bit_generator.state != before:
+                warn(
+                    f"{self._name('build')} draws random numbers, but redraw is False: all robots and episodes have "
+                    "the scene of the first draw; with redraw = True each episode builds its own",
+                    PlausibilityWarning,
+                    "redraw",
+                )
+        return built
 
     def _built(self, generator: np.random.Generator) -> Simulation:
         """A robot of the task as it begins."""

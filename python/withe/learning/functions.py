@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common.extras import require
+from withe.common.keywords import keyword_hints
 from withe.parts.handles import Support
 from withe.simulation.overlaps import order_of_setting, remaining
 from withe.simulation.simulation import Simulation
@@ -31,6 +32,7 @@ Values = Mapping[Unknown, Any]
 _READOUTS = ("positions", "velocities")
 
 
+@keyword_hints
 def rollout(
     simulation: Simulation,
     values: Values,

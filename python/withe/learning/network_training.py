@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from withe.common import validation
 from withe.common.extras import require
+from withe.common.keywords import keyword_hints
 from withe.common.progress import progress as progress_bar
 from withe.learning.networks import ACTIVATIONS, Network, Training, make_layers
 
@@ -70,6 +71,7 @@ class Alternating:
     until: float = 5e-4
 
 
+@keyword_hints
 def train_network(
     x: npt.ArrayLike,
     y: npt.ArrayLike,

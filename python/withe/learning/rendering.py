@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -12,6 +11,7 @@ import numpy.typing as npt
 from withe.batch import Batch
 from withe.common.extras import require
 from withe.common.outlines import ObstacleOutline
+from withe.common.user_warnings import warn
 from withe.simulation.obstacles import obstacle_outlines
 from withe.view.scenery import patch
 
@@ -51,8 +51,10 @@ class Screen:
     def show(self) -> None:
         """Bring the window up to date; warns where there is no screen to open it on."""
         if self._figure is None and str(require("matplotlib", "view").get_backend()).lower() == "agg":
-            message = 'render_mode="human" has no screen to open a window on, and shows nothing: take "rgb_array"'
-            warnings.warn(message, UserWarning, stacklevel=3)
+            warn(
+                'render_mode="human" has no screen to open a window on: it shows nothing, take "rgb_array"',
+                cause="screen",
+            )
         self._paint()
         require("matplotlib.pyplot", "view").pause(1e-3)
 

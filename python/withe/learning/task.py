@@ -36,7 +36,8 @@ class Task(ABC):
     steps : int
         Actions in an episode, which is then truncated.
     redraw : bool
-        Whether each episode begins with a scene of its own, from `build`, instead of a reset.
+        Whether each episode begins with a scene of its own, from `build`, instead of a reset. Where it is false,
+        a `build` that draws random numbers is warned of, with `withe.PlausibilityWarning`: all robots are equal.
 
     Examples
     --------

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import random
-import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
@@ -14,7 +13,9 @@ import numpy as np
 
 from withe.common import validation
 from withe.common.extras import require
+from withe.common.keywords import keyword_hints
 from withe.common.progress import progress as progress_bar
+from withe.common.user_warnings import warn
 from withe.learning.environments import environment_class
 from withe.learning.network_training import own_torch
 from withe.learning.task import Task
@@ -22,6 +23,7 @@ from withe.learning.task import Task
 __all__ = ["train_policy"]
 
 
+@keyword_hints
 def train_policy(
     task: Task,
     steps: int,
@@ -137,7 +139,7 @@ def _learn(policy: Any, total: int, callback: Callable[[Any], None] | None, norm
             policy.learn(total, callback=Report())
         except KeyboardInterrupt:
             reached = f"{policy.num_timesteps} of {total} control steps"
-            warnings.warn(f"training was interrupted: the policy is as it was after {reached}", stacklevel=3)
+            warn(f"training was interrupted: the policy is as it was after {reached}", cause="interrupted")
     if callback is not None:
         callback(policy)
 

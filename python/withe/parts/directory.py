@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, TypeVar
 
+from withe.common.validation import near_word
 from withe.parts.handles import EdgeHandle, Handle, Layout, NodeHandle, Rod, parse_place
 from withe.parts.kinds import (
     ContactSettings,
@@ -124,7 +125,9 @@ class Directory:
         part = self.parts.get(name)
         if part is None:
             known = ", ".join(map(repr, sorted(self.parts)[:12])) or "nothing"
-            raise ValueError(f"{what} {name!r:.80} is not in the scene, which has {known}")
+            near = near_word(name, self.parts)
+            meant = "" if near is None else f"; did you mean {near!r}?"
+            raise ValueError(f"{what} {name!r:.80} is not in the scene, which has {known}{meant}")
         return part
 
     def handle(self, name: str) -> Any:

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.attributes import of_a_simulation
 
 __all__ = [
     "CustomForce",
@@ -130,6 +132,12 @@ class Handle:
 
     scene_id: str = field(repr=False)
     name: str
+
+    if not TYPE_CHECKING:  # a misspelt attribute stays an error to type checkers
+
+        def __getattr__(self, word: str) -> Any:
+            what = f"{type(self).__name__} {self.__dict__.get('name')!r}"
+            raise of_a_simulation(what, word, f"simulation.{{}}({self.__dict__.get('name')!r}, ...)")
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from withe.parts.directory import Directory
 from withe.parts.handles import Rod
 from withe.parts.kinds import Grasp, RodPart, SupportPart
 
-__all__ = ["Sliding", "check_free", "held_edges", "make_hand", "pose_of", "quaternion_matrix", "touched_edges"]
+__all__ = ["Sliding", "check_free", "held_edges", "make_hand", "pose_of", "touched_edges"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -123,25 +123,10 @@ def pose_of(pose: Any, what: str) -> tuple[FloatArray, FloatArray]:
         )
     array = validation.number_array(pose, what, (7,), (4, 4))
     if array.shape == (7,):
-        return array[:3], quaternion_matrix(array[3:], what)
+        return array[:3], validation.quaternion_matrix(array[3:], what)
     if np.abs(array[3] - (0.0, 0.0, 0.0, 1.0)).max() > 1e-9:
         raise ValueError(f"{what} must have the last row 0 0 0 1, got {array[3]}")
     return array[:3, 3].copy(), validation.rotation_matrix(array[:3, :3], f"rotation in the {what}")
-
-
-def quaternion_matrix(quaternion: FloatArray, what: str) -> FloatArray:
-    """Rotation of a unit quaternion w, x, y, z."""
-    size = float(np.linalg.norm(quaternion))
-    if abs(size - 1.0) > 1e-6:
-        raise ValueError(f"{what} must have a quaternion qw, qx, qy, qz of length 1, got one of {size:g}")
-    w, x, y, z = quaternion / size
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
 
 
 def touched_edges(rod: RodPart, at: float, length: float) -> tuple[int, ...]:

@@ -12,6 +12,7 @@ from withe import _core
 from withe.common import validation
 from withe.parts.handles import UnionFind
 from withe.parts.kinds import JoinPart, JointForm, Pass
+from withe.parts.plausibility import check_angle
 
 __all__ = [
     "JOINT_WORDS",
@@ -41,7 +42,12 @@ class JointGroup:
 def checked_number(name: str, word: str, value: float) -> float:
     """A number of a revolute joint, in its range."""
     what = f"{word} of joint {name!r}"
-    return validation.non_negative(value, what) if word in ("stiffness", "damping") else validation.number(value, what)
+    if word in ("stiffness", "damping"):
+        return validation.non_negative(value, what)
+    number = validation.number(value, what)
+    if word == "rest_angle":
+        check_angle(number, what)
+    return number
 
 
 def connected(joins_at: Mapping[Pass, Sequence[JoinPart]], seed: Pass) -> list[JoinPart]:

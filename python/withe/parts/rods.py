@@ -13,6 +13,7 @@ from withe.common import drawing, validation
 from withe.parts.kinds import Drawing, RodPart
 from withe.parts.materials import Material, Stiffness
 from withe.parts.parameters import RodParameters
+from withe.parts.plausibility import check_length
 from withe.parts.sections import Circle, Section, SectionProperties, check_section
 
 __all__ = ["Natural", "curvature_array", "curvature_given", "make_rod", "redrawn", "stretch_array", "twist_array"]
@@ -64,6 +65,7 @@ def make_rod(
     if contact_radius is not None:
         touching = validation.per_item(contact_radius, f"contact_radius of {owner}", len(lengths), "edges")
         _check_thickness(touching, lengths, "contact_radius", owner)
+    check_length(float(lengths.sum()), float(properties.radii.max()), owner)
     parameters = _parameters(material, stiffness, line_density, properties, owner)
 
     validation.choice(natural, f"natural of {owner}", get_args(Natural))

@@ -13,6 +13,7 @@ from withe.common.outlines import TendonOutline
 from withe.parts.directory import Directory
 from withe.parts.handles import EdgeHandle, Handle, NodeHandle, Rod, parse_place
 from withe.parts.kinds import Guide, GuidePlace, RodPart, TendonPart
+from withe.parts.plausibility import check_offset
 
 __all__ = ["Guides", "checked_tension", "describe_tendons", "make_tendon", "outline_of"]
 
@@ -40,6 +41,10 @@ def make_tendon(
                 f"guides {index} and {index + 1} of tendon {name!r} must be apart, or it has no direction to pull in: "
                 f"both are at {points[index]}"
             )
+    rods = {rod.index: rod for rod in directory.all(RodPart)}
+    radii = np.array([rods[rod].section.radii[edge] for rod, edge, _ in places])
+    along = len(places) > 2 and isinstance(guides, Rod | str) and not rods[places[0][0]].closed
+    check_offset(part.offsets, radii, pulls_all_along=along and part.tension > 0.0, owner=f"tendon {name!r}")
     return part
 
 

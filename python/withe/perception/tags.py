@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from withe.common import validation
 from withe.common.extras import require
+from withe.common.keywords import keyword_hints
 from withe.common.short_repr import ShortRepr
 from withe.perception.camera import Camera
 from withe.perception.tag_edges import refine_square
@@ -62,6 +63,7 @@ class TagDetection(ShortRepr):
         return np.array(found, np.float64).reshape(-1, 2)
 
 
+@keyword_hints
 def detect_tags(
     image: ArrayLike | str | os.PathLike[str],
     camera_matrix: ArrayLike | None = None,

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.keywords import keyword_hints
 from withe.common.progress import Progress
 from withe.common.progress import progress as progress_bar
 from withe.errors import ConvergenceError
@@ -75,6 +76,7 @@ class Calibration(Camera):
         return float(np.sqrt(np.nanmean((self.residuals**2).sum(axis=2))))
 
 
+@keyword_hints
 def calibrate(
     simulation: Simulation,
     tags: Tags,

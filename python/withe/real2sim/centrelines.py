@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.keywords import keyword_hints
 from withe.common.short_repr import ShortRepr
 from withe.parts.handles import Rod
 from withe.perception.camera import Camera
@@ -184,6 +185,7 @@ class _LineResidual(Residual):
         return edges, share, (share > 0.0) & (share < 1.0)
 
 
+@keyword_hints
 def rest_shape(
     simulation: Simulation,
     rod: Rod | str,

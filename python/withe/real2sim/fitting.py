@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.keywords import keyword_hints
 from withe.common.progress import Progress
 from withe.common.progress import progress as progress_bar
 from withe.errors import ConvergenceError
@@ -28,6 +29,7 @@ FloatArray = npt.NDArray[np.float64]
 Method = Literal["gauss_newton", "lbfgs", "source"]
 
 
+@keyword_hints
 def fit(
     simulation: Simulation,
     targets: Target | Sequence[Target],

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.keywords import keyword_hints
 from withe.common.short_repr import ShortRepr
 
 __all__ = ["Log", "read_log"]
@@ -41,6 +42,7 @@ class Log(ShortRepr):
     tags: tuple[int, ...]
 
 
+@keyword_hints
 def read_log(
     path: str | os.PathLike[str],
     tags: Iterable[int],

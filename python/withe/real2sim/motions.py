@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Sequence
 from typing import Any, Literal
 
@@ -10,8 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.keywords import keyword_hints
 from withe.common.progress import Progress
 from withe.common.progress import progress as progress_bar
+from withe.common.user_warnings import warn
 from withe.errors import ConvergenceError
 from withe.real2sim.gathering import gather
 from withe.real2sim.least_squares import Secants, lone_frame, seen
@@ -35,6 +36,7 @@ _MANY_SWINGS = 10.0  # between frames: what rings is seen several times a swing
 _CHANGE = 1e-9  # of the sum of squares: an iteration of L-BFGS that changes it by less is the last
 
 
+@keyword_hints
 def fit_motion(
     simulation: Simulation,
     targets: Target | Sequence[Target],
@@ -153,11 +155,10 @@ def _check_unit(simulation: Simulation, times: FloatArray) -> None:
         return
     slowest = abs(simulation.linearise().frequencies(1)[0])
     if between * slowest > _MANY_SWINGS:
-        warnings.warn(
-            f"times of targets [s] are {between:.3g} s apart or more, {between * slowest:.3g} periods of the slowest "
-            f"mode, and each run goes on for {steps:,.0f} time steps: are they in milliseconds?",
-            UserWarning,
-            stacklevel=3,
+        warn(
+            f"times of targets are {between:.3g} s apart or more: that is {between * slowest:.3g} periods of the "
+            f"slowest mode, and each run goes on for {steps:,.0f} time steps; are they in milliseconds?",
+            cause="times",
         )
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 
@@ -15,6 +18,8 @@ __all__ = ["JoinedNodes"]
 
 FloatArray = npt.NDArray[np.float64]
 
+_ORDINALS = ("first", "second", "third", "fourth")
+
 
 class JoinedNodes:
     """The joins of a scene by their nodes, so that a new one is compared with those at its own node alone."""
@@ -27,18 +32,54 @@ class JoinedNodes:
 
     def join(
         self,
-        a: NodeHandle | str,
-        b: NodeHandle | str,
+        nodes: Sequence[NodeHandle | str],
         kind: JoinKind,
         axis: npt.ArrayLike | None,
         form: JointForm,
         numbers: tuple[float, float, float, float],
         name: str | None,
+    ) -> list[JoinPart]:
+        """Joins of the first node with each of the others, checked, and all merged; not yet in the directory.
+
+        All or none; see `Scene.join`.
+        """
+        names = self._new_names(name, len(nodes) - 1)
+        first, *others = (
+            self._directory.node(node, f"{_ORDINALS[i] if i < len(_ORDINALS) else 'another'} node to join")
+            for i, node in enumerate(nodes)
+        )
+        parts = [
+            self._part(own, first, other, kind, axis, form, numbers) for own, other in zip(names, others, strict=True)
+        ]
+        joins = {join.name: join for part in parts for node in part.nodes for join in connected(self._joins_at, node)}
+        gather([*joins.values(), *parts])
+        for part in parts:
+            for node in part.nodes:
+                self._joins_at.setdefault(node, []).append(part)
+            self._directory.layout.merge(*part.nodes)
+        return parts
+
+    def _new_names(self, name: str | None, count: int) -> list[str]:
+        """One name for one joint; for several a number follows it."""
+        if count == 1:
+            return [self._directory.new_name(name, "joint")]
+        if name is not None:
+            return [self._directory.new_name(f"{name} {i + 1}", "joint") for i in range(count)]
+        word, _, number = self._directory.new_name(None, "joint").rpartition(" ")
+        free = (f"{word} {i}" for i in itertools.count(int(number)))
+        return list(itertools.islice((each for each in free if each not in self._directory.parts), count))
+
+    def _part(
+        self,
+        name: str,
+        a: tuple[Pass, str],
+        b: tuple[Pass, str],
+        kind: JoinKind,
+        axis: npt.ArrayLike | None,
+        form: JointForm,
+        numbers: tuple[float, float, float, float],
     ) -> JoinPart:
-        """A join, checked, and its nodes merged; not yet in the directory. See `Scene.join`."""
-        name = self._directory.new_name(name, "joint")
-        node_a, name_a = self._directory.node(a, "first node to join")
-        node_b, name_b = self._directory.node(b, "second node to join")
+        (node_a, name_a), (node_b, name_b) = a, b
         validation.choice(kind, "kind of the joint", ("rigid", "pinned", "revolute"))
         validation.choice(form, "form of the joint", ("frame", "pairs"))
         if (kind == "revolute") != (axis is not None):
@@ -60,13 +101,7 @@ class JoinedNodes:
                 f"nodes {name_a!r} and {name_b!r} must coincide to be joined, they are {distance:g} m apart"
             )
         direction = None if axis is None else validation.unit_vector(axis, "axis of the joint")
-        part = JoinPart(name, (node_a, node_b), (name_a, name_b), kind, direction, form, **values)
-        joins = {join.name: join for node in part.nodes for join in connected(self._joins_at, node)}
-        gather([*joins.values(), part])
-        for node in part.nodes:
-            self._joins_at.setdefault(node, []).append(part)
-        self._directory.layout.merge(node_a, node_b)
-        return part
+        return JoinPart(name, (node_a, node_b), (name_a, name_b), kind, direction, form, **values)
 
     def _point(self, node: Pass) -> FloatArray:
         rod = self._directory.layout.rods[node[0]].name

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import uuid
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast, overload
 
 import numpy as np
 import numpy.typing as npt
 
 from withe.batch import Batch
 from withe.common import validation
-from withe.common.attributes import known_attributes
+from withe.common.attributes import known_attributes, of_a_simulation
 from withe.common.keywords import keyword_hints
 from withe.parts.applied_loads import AppliedLoads, Bearer
 from withe.parts.directory import Directory
-from withe.parts.handles import Joint, Load, NodeHandle, Rod, RodPlace
+from withe.parts.handles import Joint, Load, NodeHandle, Rod, RodPlace, parse_place
 from withe.parts.kinds import JoinKind, JointForm, LoadPart, RodPart
 from withe.parts.materials import Material, Section, Stiffness
 from withe.parts.options import Bending, BuildOptions, Integrator, LineSearch, Solver
@@ -80,6 +80,11 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
             There is none.
         """
         return self._directory.handle(name)
+
+    if not TYPE_CHECKING:  # a misspelt attribute stays an error to type checkers
+
+        def __getattr__(self, word: str) -> Any:
+            raise of_a_simulation("Scene", word, "simulation.{}")
 
     def __repr__(self) -> str:
         return f"Scene({', '.join(part.name for part in self._directory.parts.values())})"
@@ -188,6 +193,7 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         self._directory.layout.add(place)
         return cast(Rod, self._directory.add(rod))
 
+    @overload
     def join(
         self,
         a: NodeHandle | str,
@@ -201,11 +207,44 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         damping: float = 0.0,
         moment: float = 0.0,
         name: str | None = None,
-    ) -> Joint:
-        """Make two nodes that coincide one.
+    ) -> Joint: ...
 
-        Joins at the same node add up: any number of rods may meet there. Revolute ones there all turn against one rod,
-        to which each of the others is joined; a clamp at that node holds that rod.
+    @overload
+    def join(
+        self,
+        a: NodeHandle | str,
+        b: NodeHandle | str,
+        c: NodeHandle,
+        /,
+        *others: NodeHandle | str,
+        kind: JoinKind = "rigid",
+        axis: npt.ArrayLike | None = None,
+        form: JointForm = "frame",
+        stiffness: float = 0.0,
+        rest_angle: float = 0.0,
+        damping: float = 0.0,
+        moment: float = 0.0,
+        name: str | None = None,
+    ) -> tuple[Joint, ...]: ...
+
+    def join(
+        self,
+        a: NodeHandle | str,
+        b: NodeHandle | str,
+        *others: NodeHandle | str,
+        kind: JoinKind = "rigid",
+        axis: npt.ArrayLike | None = None,
+        form: JointForm = "frame",
+        stiffness: float = 0.0,
+        rest_angle: float = 0.0,
+        damping: float = 0.0,
+        moment: float = 0.0,
+        name: str | None = None,
+    ) -> Joint | tuple[Joint, ...]:
+        """Make nodes that coincide one: two of them, or any number.
+
+        Several nodes are joined to the first, each by a joint of its own. Joins at the same node add up. Revolute ones
+        there all turn against one rod, to which each of the others is joined; a clamp at that node holds that rod.
 
         A revolute joint has an angle theta, by which b has turned about the axis since it was drawn, seen from a, by
         the right-hand rule. Its motor, spring and damper turn b, and a the other way, by the torque
@@ -216,10 +255,10 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
 
         Parameters
         ----------
-        a, b : NodeHandle or str
-            Ends or inner nodes, of two rods or of one.
+        a, b, *others : NodeHandle or str
+            Ends or inner nodes, of several rods or of one.
         kind : {"rigid", "pinned", "revolute"}
-            Whether the rods keep their angles, may turn freely, or about one axis.
+            Whether the rods keep their angles, may turn freely, or about one axis. It may follow the nodes by position.
         axis : array_like of shape (3,)
             Of a revolute joint, as it is drawn; it turns with a.
         form : {"frame", "pairs"}
@@ -233,17 +272,19 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         moment : float [N m]
             Of a motor; its work is in `energy().loads`, as that of loads is.
         name : str
+            Of several joints "NAME 1", "NAME 2", ...
 
         Returns
         -------
         Joint
+            Of two nodes; else a tuple of joints, of the first node with each of the others in turn.
 
         Raises
         ------
         ValueError
-            Nodes that are apart by more than 1e-9 of the scene, one and the same node, joins that
-            contradict each other, or an axis, a stiffness, a rest_angle, a damping or a moment without a revolute
-            joint.
+            Nodes that are apart by more than 1e-9 of the scene, one and the same node, joins that contradict each
+            other, or an axis, a stiffness, a rest_angle, a damping or a moment without a revolute joint. Then nothing
+            is joined.
 
         Examples
         --------
@@ -256,8 +297,15 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         >>> simulation.set(knee, rest_angle=0.3)
         >>> record = simulation.run(1.0)
         """
+        nodes = [a, b, *others]
+        if others and isinstance(others[-1], str) and parse_place(others[-1]) is None:
+            if kind != "rigid":
+                raise ValueError(f"kind of the joint must be given once, got {others[-1]!r} and {kind!r}")
+            kind = cast(JoinKind, nodes.pop())
         numbers = (stiffness, rest_angle, damping, moment)
-        return cast(Joint, self._directory.add(self._joints.join(a, b, kind, axis, form, numbers, name)))
+        parts = self._joints.join(nodes, kind, axis, form, numbers, name)
+        joints = tuple(cast(Joint, self._directory.add(part)) for part in parts)
+        return joints if len(joints) > 1 else joints[0]
 
     # Simulations
 

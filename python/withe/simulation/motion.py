@@ -10,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import drawing, validation
-from withe.parts.hands import quaternion_matrix
 
 __all__ = [
     "POSE_WORDS",
@@ -176,7 +175,9 @@ def make_path(path: PathLike, turns: bool, owner: str) -> Path:
         raise ValueError(f"{what} must have times that grow, got {rows[row, 0]:g} s and then {rows[row + 1, 0]:g} s")
     if rows.shape[1] == 8 and not turns:
         raise ValueError(f"{what} must have positions only, (t, x, y, z): a pin holds no direction")
-    turned = [quaternion_matrix(row[4:], f"row {i} of the {what}") for i, row in enumerate(rows) if len(row) == 8]
+    turned = [
+        validation.quaternion_matrix(row[4:], f"row {i} of the {what}") for i, row in enumerate(rows) if len(row) == 8
+    ]
     return Waypoints(rows[:, 0].copy(), rows[:, 1:4].copy(), np.array(turned).reshape(-1, 3, 3))
 
 
@@ -229,7 +230,7 @@ def evaluate_path(path: Path, time: float, turns: bool, owner: str) -> Pose:
     value = path(time)
     if turns and isinstance(value, np.ndarray) and value.shape == (7,):
         value = validation.number_array(value, what, (7,))
-        value = value[:3], quaternion_matrix(value[3:], what)
+        value = value[:3], validation.quaternion_matrix(value[3:], what)
     if isinstance(value, tuple | list) and len(value) == 2:
         position = validation.vector(value[0], f"position on the {what}")
         if not turns:

@@ -169,15 +169,17 @@ class Placement:
             of a plane, the centre of a sphere, the start of a capsule. What it does to rods is part of
             ``energy().work``.
         position : array_like of shape (3,) [m]
-        rotation : array_like of shape (3, 3), or a SciPy Rotation
+        rotation : array_like of shape (4,) or (3, 3), or a SciPy Rotation
+            A unit quaternion (w, x, y, z), a matrix, or a Rotation.
             Relative to the orientation as drawn; of a hand, its axes in the world as columns.
         tangent : array_like of shape (3,)
             Where the rod is to point, instead: the smallest turn from the drawn tangent, and then ...
         roll : float [rad]
-            ... a turn about it. Full turns count, and take time: at most half a turn in a time step. An obstacle turns
-            so about the normal of a plane, the axis of a capsule from start to end, or the tangent that is given for a
-            sphere: rollers, drums and turntables, which drag rods by friction. A belt is a plane that moves along
-            itself.
+            ... a turn about it. Full turns count, and take time: at most half a turn in a time step. With
+            integrator="static" they need no time: `equilibrium` and a step follow a roll of any size that is given
+            without `over`. An obstacle turns so about the normal of a plane, the axis of a capsule from start to end,
+            or the tangent that is given for a sphere: rollers, drums and turntables, which drag rods by friction. A
+            belt is a plane that moves along itself.
         over : float [s]
             Reached after so long, evenly; within the next step by default.
         path : callable, pair of callables, or array_like of shape (poses, 4) or (poses, 8)
@@ -273,8 +275,8 @@ class Placement:
         ----------
         rod : Rod or str
         positions : array_like of shape (nodes, 3) [m]
-            The first director of the first edge follows by the smallest turn. Nodes that a support holds must stay:
-            move the support first.
+            The first director of the first edge follows by the smallest turn. Nodes that a support holds must stay, or
+            go to the position to which `move` moved the support without `over`.
         velocities : array_like of shape (nodes, 3) or (3,) [m/s]
             Those of nodes that are held stay as they are.
         twist : float or array_like of shape (stencils,) [rad/m]

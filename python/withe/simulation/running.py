@@ -13,6 +13,7 @@ import numpy.typing as npt
 from withe.common import validation
 from withe.common.keywords import keyword_hints
 from withe.common.progress import progress as progress_bar
+from withe.common.user_warnings import located_at, user_place
 from withe.recording.record import Record
 from withe.simulation.loop import Run
 from withe.simulation.remote import run_on
@@ -90,13 +91,14 @@ def run_many(
     if not runs:
         return []
 
-    stop = threading.Event()
+    stop, place = threading.Event(), user_place()
     with progress_bar(sum(each.duration for each in runs), "simulating", progress) as bar:
 
         def work(each: Run[Simulation]) -> Record:
             task = bar.task(each.duration)
             try:
-                each.go(task.update, stop.is_set)
+                with located_at(place):
+                    each.go(task.update, stop.is_set)
             finally:
                 task.finish()
             return each.record

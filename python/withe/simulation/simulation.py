@@ -28,6 +28,7 @@ from withe.simulation.measurements import Measurements
 from withe.simulation.obstacles import obstacle_outlines
 from withe.simulation.paths import EquilibriumPath, path_options
 from withe.simulation.placement import Placement
+from withe.simulation.plausibility import check_scene
 from withe.simulation.readouts import Equilibrium
 from withe.simulation.session import Session
 from withe.simulation.snapshots import Snapshot, restore
@@ -78,7 +79,9 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
         """A simulation of a directory that nobody else changes."""
         session = Session.begin(directory, gravity, options)
         find_friction_fields(session)
-        return cls._of(Stepping(session))
+        stepping = Stepping(session)
+        check_scene(stepping)
+        return cls._of(stepping)
 
     @classmethod
     def _of(cls, stepping: Stepping, initial: Snapshot | None = None) -> Simulation:

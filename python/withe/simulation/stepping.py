@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import sys
-import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 from withe import _core
+from withe.common.user_warnings import warn
 from withe.errors import (
     BranchChangedWarning,
     CoarseMeshWarning,
@@ -83,11 +82,10 @@ class Stepping:
         world = self.session.world
         begun = [name for (_, name), time in self.session.settings.ramps.items() if time == world.time]
         if begun:
-            warnings.warn(
-                f"what {begun[0]!r} was told to reach after a while (over=) has not begun, and time stands still in "
-                "equilibrium(): without over= it is reached at once, or step() or run() first",
-                UserWarning,
-                stacklevel=4,
+            warn(
+                f"{begun[0]!r} has not begun to go where over= leads it: time stands still in equilibrium(), so leave "
+                "out over= to be there at once, or step() or run() first",
+                cause="over",
             )
         apply_functions(self.session, world.time, world.time)
         with self._convergence():
@@ -200,27 +198,18 @@ def convergence_error(session: Session, numbers: tuple[Any, ...]) -> Convergence
 def pass_on(sessions: Sequence[Session], found: _core.Warnings) -> None:
     """Give the warnings of the engine: meshes, steps for motion and impacts, energy, branches and planes."""
     if found.mesh:
-        warnings.warn(found.mesh, CoarseMeshWarning, stacklevel=_levels_to_user())
-    for coarse in (found.steps, found.impact):
+        warn(found.mesh, CoarseMeshWarning)
+    for cause, coarse in ("motion", found.steps), ("impact", found.impact):
         if coarse and any(session.options.time_step > session.longest_meant for session in sessions):
-            warnings.warn(coarse, CoarseStepWarning, stacklevel=_levels_to_user())
+            warn(coarse, CoarseStepWarning, cause)
     if found.drift:
-        warnings.warn(found.drift, EnergyDriftWarning, stacklevel=_levels_to_user())
+        warn(found.drift, EnergyDriftWarning)
     if found.branch:
-        warnings.warn(found.branch, BranchChangedWarning, stacklevel=_levels_to_user())
+        warn(found.branch, BranchChangedWarning)
     if found.plane:
-        warnings.warn(found.plane, OutOfPlaneWarning, stacklevel=_levels_to_user())
+        warn(found.plane, OutOfPlaneWarning)
 
 
 def report_left(what: str) -> None:
     """Say that a ring was left, which one, and what came of it."""
-    warnings.warn(f"the end of a rod has passed out of {what}", RingLeftWarning, stacklevel=_levels_to_user())
-
-
-def _levels_to_user() -> int:
-    """How many calls lie between what warns and the line outside of withe that led here."""
-    level, frame = 1, sys._getframe(1)
-    while frame.f_back is not None and frame.f_globals.get("__name__", "").split(".")[0] in ("withe", "contextlib"):
-        frame = frame.f_back
-        level += 1
-    return level
+    warn(f"the end of a rod has passed out of {what}", RingLeftWarning)

@@ -11,6 +11,7 @@ from withe.common import drawing, validation
 from withe.parts.description import describe_support
 from withe.parts.handles import Handle, NodeHandle, Support
 from withe.parts.kinds import SupportPart
+from withe.parts.plausibility import check_angle
 from withe.parts.supports import check_not_held
 from withe.simulation.motion import (
     POSE_WORDS,
@@ -115,10 +116,14 @@ def move_support(
     if matrix is not None and session.journal is not None:
         axis, angle = axis_angle(matrix @ np.array(session.world.support_rotation(index)).T)
         given["rotation"] = angle * axis
+    counted = np.zeros(3)
     if turn is not None and turn.times.max() <= session.world.time:
         # The engine leads what is to be there at once evenly through the next time step, however that is cut.
-        matrix, turn = turn(session.world.time), turn.arrived(session.world.time)
-    session.world.move_support(index, target, matrix, over)
+        matrix, rolled = turn(session.world.time), float(turn.rolls[1] - turn.rolls[0])
+        if abs(rolled) > np.pi:
+            counted = rolled * turn.drawn[0]
+        turn = turn.arrived(session.world.time)
+    session.world.move_support(index, target, matrix, over, counted)
     # What is not given goes on as it does.
     if target is not None:
         session.settings.paths.pop((part.name, "position"), None)
@@ -164,6 +169,7 @@ def _turn(
         end_tangent, tangent_end = validation.unit_vector(tangent, f"tangent of {owner}"), now + over
     if roll is not None:
         end_roll, roll_end = validation.number(roll, f"roll of {owner}"), now + over
+        check_angle(end_roll, f"roll of {owner}")
         _check_turns(session, end_roll - start_roll, over, owner)
     return Turn(
         tangents=np.stack([start_tangent, end_tangent]),
@@ -189,12 +195,15 @@ def _beside(known: float, roll: float) -> float:
 
 
 def _check_turns(session: Session, way: float, over: float, owner: str) -> None:
-    """Rotations at the ends of a step do not tell full turns between them."""
+    """Rotations at the ends of a step do not tell full turns between them; equilibria at once count them."""
     step = float(session.options.time_step)
+    if over == 0.0 and session.options.integrator == "static":
+        return
     if abs(way) * min(step / over if over > 0.0 else 1.0, 1.0) > np.pi:
         raise ValueError(
             f"roll of {owner} must turn by at most half a turn in a time step, got {way:g} rad "
-            f"{'at once' if over == 0.0 else f'over {over:g} s'}: take over={1.5 * abs(way) / np.pi * step:.2g} or more"
+            f"{'at once' if over == 0.0 else f'over {over:g} s'}: take over={1.5 * abs(way) / np.pi * step:.2g} or "
+            "more and step there, or build(integrator='static') for equilibria, which count full turns at once"
         )
 
 

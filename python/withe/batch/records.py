@@ -1,0 +1,167 @@
+"""What a batch's runs and equilibria leave: those of every simulation, and arrays with one more axis in front."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any, overload
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.errors import ConvergenceError
+from withe.parts.handles import Rod
+from withe.recording.record import Record
+from withe.simulation.readouts import Equilibrium
+
+__all__ = ["BatchRecord", "Equilibria"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+class BatchRecord(Sequence[Record]):
+    """The frames of a run of a batch, made by `Batch.run`: a `Record` of each simulation.
+
+    Read-outs have the simulations as their first axis and the frames as their second; a string names what ``record=``
+    of the run added. They need equally many frames: where a simulation has failed, or was ended by itself, the records
+    are read one by one, ``run[3]``.
+
+    Examples
+    --------
+    >>> run = scene.build_batch(3, time_step=5e-3).run(0.1, record_every=0.02, progress=False)
+    >>> run.positions(arm).shape
+    (3, 6, 31, 3)
+    >>> run[2].positions(arm).shape
+    (6, 31, 3)
+    """
+
+    def __init__(self, records: Sequence[Record]) -> None:
+        self._records = tuple(records)
+
+    def __len__(self) -> int:
+        return len(self._records)
+
+    @overload
+    def __getitem__(self, which: int) -> Record: ...
+
+    @overload
+    def __getitem__(self, which: slice) -> BatchRecord: ...
+
+    @overload
+    def __getitem__(self, which: str) -> npt.NDArray[Any]: ...
+
+    def __getitem__(self, which: int | slice | str) -> Record | BatchRecord | npt.NDArray[Any]:
+        """The record of a simulation, or what was recorded under a name, shape (n, frames, ...)."""
+        if isinstance(which, str):
+            return self._stacked([record[which] for record in self._records])
+        if isinstance(which, slice):
+            return BatchRecord(self._records[which])
+        return self._records[which]
+
+    def __iter__(self) -> Iterator[Record]:
+        return iter(self._records)
+
+    def __repr__(self) -> str:
+        return f"BatchRecord({len(self)} records of {len(self._records[0])} frames)"
+
+    @property
+    def times(self) -> FloatArray:
+        """Times of the frames, shape (n, frames) [s]."""
+        return self._stacked([record.times for record in self._records])
+
+    def positions(self, rod: Rod | str | None = None) -> FloatArray:
+        """Positions of nodes, shape (n, frames, nodes, 3) [m]."""
+        return self._stacked([record.positions(rod) for record in self._records])
+
+    def velocities(self, rod: Rod | str | None = None) -> FloatArray:
+        """Velocities of nodes, shape (n, frames, nodes, 3) [m/s]."""
+        return self._stacked([record.velocities(rod) for record in self._records])
+
+    def directors(self, rod: Rod | str) -> FloatArray:
+        """Material frames of edges, shape (n, frames, edges, 3, 3)."""
+        return self._stacked([record.directors(rod) for record in self._records])
+
+    def curvatures(self, rod: Rod | str) -> FloatArray:
+        """Curvatures towards d1 and d2, shape (n, frames, stencils, 2) [1/m]."""
+        return self._stacked([record.curvatures(rod) for record in self._records])
+
+    def twists(self, rod: Rod | str) -> FloatArray:
+        """Twists, shape (n, frames, stencils) [rad/m]."""
+        return self._stacked([record.twists(rod) for record in self._records])
+
+    def tensions(self, rod: Rod | str) -> FloatArray:
+        """Axial forces of edges, shape (n, frames, edges) [N]."""
+        return self._stacked([record.tensions(rod) for record in self._records])
+
+    def spins(self, rod: Rod | str) -> FloatArray:
+        """Angular velocities of edges about their tangents, shape (n, frames, edges) [rad/s]."""
+        return self._stacked([record.spins(rod) for record in self._records])
+
+    def _stacked(self, arrays: list[Any]) -> npt.NDArray[Any]:
+        frames = [len(record) for record in self._records]
+        if len(set(frames)) > 1:
+            raise ValueError(
+                f"records must have equally many frames to be one array, got {min(frames)} to {max(frames)}: read them "
+                "one by one, such as run[0]"
+            )
+        return np.stack(arrays)
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibria(Sequence[Equilibrium]):
+    """Equilibria of the simulations of a batch, made by `Batch.equilibrium`; ``equilibria[i]`` is that of one.
+
+    Attributes
+    ----------
+    failures : tuple of ConvergenceError or None
+        What went wrong in each simulation; it is in the state before.
+    """
+
+    failures: tuple[ConvergenceError | None, ...]
+    _found: tuple[Equilibrium | None, ...] = field(repr=False)
+
+    @property
+    def stable(self) -> npt.NDArray[np.bool_]:
+        """Whether each is stable, shape (n,); false where none was found."""
+        return np.array([each is not None and each.stable for each in self._found])
+
+    @property
+    def branch_changed(self) -> npt.NDArray[np.bool_]:
+        """Whether each lies on another branch than the state before, shape (n,)."""
+        return np.array([each is not None and each.branch_changed for each in self._found])
+
+    @property
+    def iterations(self) -> npt.NDArray[np.intp]:
+        """Iterations of Newton's method, shape (n,); 0 where none was found."""
+        return np.array([0 if each is None else each.iterations for each in self._found])
+
+    @property
+    def residual(self) -> FloatArray:
+        """Greatest force out of balance that is left, shape (n,) [N]; NaN where none was found."""
+        return np.array([np.nan if each is None else each.residual for each in self._found])
+
+    def __len__(self) -> int:
+        return len(self._found)
+
+    @overload
+    def __getitem__(self, index: int) -> Equilibrium: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> Equilibria: ...
+
+    def __getitem__(self, index: int | slice) -> Equilibrium | Equilibria:
+        """That of a simulation.
+
+        Raises
+        ------
+        ConvergenceError
+            None was found for it.
+        """
+        if isinstance(index, slice):
+            return Equilibria(self.failures[index], self._found[index])
+        found = self._found[index]
+        if found is None:
+            failure = self.failures[index]
+            assert failure is not None
+            raise failure
+        return found

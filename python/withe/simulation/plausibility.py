@@ -1,0 +1,87 @@
+"""Numbers of a scene that are possible, and point to a slip together: a `PlausibilityWarning` each."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from withe.common.user_warnings import warn
+from withe.errors import PlausibilityWarning
+from withe.parts.kinds import DragPart, FluidPart, RodPart
+from withe.simulation.session import Session
+from withe.simulation.stepping import Stepping
+
+__all__ = ["check_scene"]
+
+_LIGHTEST, _HEAVIEST = 10.0, 3e4  # kg/m^3: foams are above the first, osmium (22,600) is below the second
+_SOFTEST = 100.0  # Pa: the softest gels and tissues
+_FIRST_CANTILEVER = 1.875104**2  # (beta L)^2 of the first mode of a cantilever
+_UNRESOLVED = 10.0  # periods in a time step; a few are taken on purpose, by backward Euler on the way to rest
+
+
+def check_scene(stepping: Stepping) -> None:
+    """Warn of materials and of a time step that are no more than possible, at the time of `Scene.build`."""
+    session = stepping.session
+    gravity = float(np.linalg.norm(session.gravity))
+    for rod in session.directory.all(RodPart):
+        _check_density(session, rod, gravity)
+        _check_modulus(session, rod, gravity)
+    _check_time_step(stepping)
+
+
+def _check_density(session: Session, rod: RodPart, gravity: float) -> None:
+    """Without gravity a density stands for the masses that a model is to have, if any."""
+    density = session.settings.rods[rod.index].density
+    if density is None or gravity == 0.0:
+        return
+    for number in np.ravel(density):
+        if number < _LIGHTEST:
+            _warn(f"density of {rod.owner} is {number:g} kg/m^3, lighter than any foam", "is it in g/cm^3?")
+            return
+        if number > _HEAVIEST:
+            _warn(f"density of {rod.owner} is {number:g} kg/m^3, heavier than any metal", "is it in kg/m^3?")
+            return
+
+
+def _check_modulus(session: Session, rod: RodPart, gravity: float) -> None:
+    """A rod that is as soft may yet be short enough to bear its weight, rho g L < E, as scaled models are."""
+    numbers = session.settings.rods[rod.index]
+    if numbers.youngs_modulus is None or numbers.density is None:
+        return
+    modulus = float(np.min(numbers.youngs_modulus))
+    weight = float(np.max(numbers.density)) * gravity * float(rod.lengths.sum())
+    if modulus < _SOFTEST and (gravity == 0.0 or weight > modulus):
+        _warn(f"youngs_modulus of {rod.owner} is {modulus:g} Pa, softer than any gel", "is it in MPa or GPa?")
+
+
+def _check_time_step(stepping: Stepping) -> None:
+    """A scene with a rigid or an unstable mode has no slowest period, and one with a fluid or drag no vibrations.
+
+    Modes are found only where the step is long for a single rod, since joints, masses and springs make a scene slower.
+    """
+    session = stepping.session
+    step = session.options.time_step
+    damped = any(session.directory.all(FluidPart)) or any(session.directory.all(DragPart))
+    if session.options.integrator in ("static", "verlet") or session.custom_forces or damped:
+        return
+    if step < max(_cantilever_period(session, rod) for rod in session.directory.all(RodPart)):
+        return
+    modes = stepping.linearise().frequencies(1)
+    lowest = complex(modes[0]).real if len(modes) else 0.0
+    if step * lowest > _UNRESOLVED:
+        _warn(
+            f"time_step is {step:g} s, longer than the slowest period of {1.0 / lowest:.2g} s",
+            "no vibration is resolved; is it in seconds?",
+        )
+
+
+def _cantilever_period(session: Session, rod: RodPart) -> float:
+    """Of the slowest bending mode of a rod that is clamped at one end [s]."""
+    numbers = session.settings.rods[rod.index]
+    softest, heaviest = float(np.min(numbers.bend_stiffness)), float(np.max(numbers.line_density))
+    return 2.0 * math.pi * float(rod.lengths.sum()) ** 2 / _FIRST_CANTILEVER * math.sqrt(heaviest / softest)
+
+
+def _warn(wrong: str, slip: str) -> None:
+    warn(f"{wrong}: {slip}", PlausibilityWarning, wrong.split(" is ")[0])
