@@ -103,8 +103,8 @@ struct FrameMoments {
 /// `end`; `turn`: of the step's D tau.
 template <bool second_too, class Scalar>
 FrameMoments<Scalar> frame_moments(const HalfTwist<Scalar>& half0, const HalfTwist<Scalar>& half1,
-                                   const TurnOverSine<Scalar>& turn, const Vec3<Scalar>& start,
-                                   const Vec3<Scalar>& end, const DividedMoments<Scalar>& h) {
+                                   const TurnOverSine<Scalar>& turn, const Vec3<Scalar>& start, const Vec3<Scalar>& end,
+                                   const DividedMoments<Scalar>& h) {
   const HalfTwist<Scalar> mean{0.5 * (half0.cosine + half1.cosine), 0.5 * (half0.sine + half1.sine)};
   const Scalar C = half0.cosine * half1.cosine + half0.sine * half1.sine;  // cos(D tau / 2)
   const Scalar S = half0.cosine * half1.sine - half0.sine * half1.cosine;

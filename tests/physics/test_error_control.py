@@ -89,3 +89,24 @@ def test_first_order_error_control_gets_through_a_hard_impact():
     simulation = scene.build(integrator="backward_euler", time_step=1e-2, tolerance=1e-4)
     simulation.run(0.0656, progress=False)
     assert simulation.positions(rod)[:, 2].min() > 0.98 * 5e-3
+
+
+def test_error_control_has_a_limit_of_work_and_names_remedies():
+    def stiff(**options):
+        scene = withe.Scene(gravity=(0, 0, 0))
+        rod = rods.straight(scene, 11, stiffness=rods.stiffness(stretch=4e6), radius=1e-3)
+        scene.clamp(rod.start)
+        simulation = scene.build(time_step=0.5, tolerance=1e-3, duration=2.0, **options)
+        simulation.set_natural_curvature(rod, (12.0, 0.0))
+        return simulation
+
+    simulation = stiff(max_steps=2000)
+    with pytest.raises(withe.ConvergenceError, match="2000 inner steps .* larger tolerance, .*or a greater max_steps"):
+        simulation.step()
+    assert simulation.statistics.steps + simulation.statistics.rejected_steps == 2000
+    assert simulation.time < 0.5  # where it can be looked at, and continued
+    simulation = stiff(max_steps=10**7)
+    simulation.step()
+    assert simulation.time == 0.5
+    with pytest.raises(ValueError, match="max_steps must be given with a tolerance, and only then"):
+        withe.Scene().build(max_steps=10)

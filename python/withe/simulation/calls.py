@@ -248,8 +248,8 @@ class Ledger:
         if self._poses and not by_moves:
             raise ValueError(
                 "no gradient of reaction moments by the pose of a support or an obstacle is available with "
-                "integrator='implicit_midpoint' or 'fourth_order', nor in space with hold='edge': take integrator='energy_momentum' or "
-                "'backward_euler', and hold='frame'"
+                "integrator='implicit_midpoint' or 'fourth_order', nor in space with hold='edge': take "
+                "integrator='energy_momentum' or 'backward_euler', and hold='frame'"
             )
         for place in self._poses:
             self.sums[place] = np.zeros(3)
