@@ -17,7 +17,7 @@ __all__ = ["KINDS", "LAWS", "METHODS", "ContactCase", "build", "draw_case"]
 
 SEED = 20_260_311
 KINDS = ("floor", "crossing", "post", "pile", "knot")
-METHODS = ("backward_euler", "implicit_midpoint")
+METHODS = ("backward_euler", "energy_momentum")
 LAWS = ("implicit", "lagged", "anchored")
 STEPS = 60
 

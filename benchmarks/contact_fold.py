@@ -19,7 +19,7 @@ import withe
 LENGTH, WIDTH, THICKNESS, LGB = 0.297, 0.21, 1e-4, 0.048  # [m]
 WEIGHT = 0.08 * WIDTH * 9.81  # of 80 g/m^2 [N/m]
 FRICTION, DURATION = 0.3, 10.0  # [-], [s]
-CASES = (("backward_euler", 10e-3, 0.5), ("implicit_midpoint", 5e-3, 2.0))  # integrator, step [s], goal [s]
+CASES = (("backward_euler", 10e-3, 0.5), ("energy_momentum", 5e-3, 2.0))  # integrator, step [s], goal [s]
 
 
 def fold(integrator: withe.parts.Integrator, time_step: float, edges: int = 150) -> withe.Simulation:

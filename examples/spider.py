@@ -48,7 +48,7 @@ def build(nodes: int, time_step: float, nudge: float) -> withe.Simulation:
         scene.join(thigh.end, shank.start)
     scene.add_floor(height=-LIMB, friction=0.4)
     scene.enable_contact(friction=0.4, friction_model="anchored", distance_tolerance=5e-4, stiffness=STIFFNESS)
-    return scene.build(integrator="implicit_midpoint", time_step=time_step)
+    return scene.build(time_step=time_step)
 
 
 def fall(duration: float, time_step: float, nodes: int = NODES, nudge: float = 0.0) -> withe.Record:

@@ -101,7 +101,7 @@ def test_error_control_has_a_limit_of_work_and_names_remedies():
         return simulation
 
     simulation = stiff(max_steps=2000)
-    with pytest.raises(withe.ConvergenceError, match="2000 inner steps .* larger tolerance, .*or a greater max_steps"):
+    with pytest.raises(withe.ConvergenceError, match=r"2000 inner steps .* larger tolerance, .*or a greater max_steps"):
         simulation.step()
     assert simulation.statistics.steps + simulation.statistics.rejected_steps == 2000
     assert simulation.time < 0.5  # where it can be looked at, and continued
