@@ -13,7 +13,7 @@ from withe.real2sim.results import Fit, Outlier, Unobservable
 from withe.real2sim.targets import Tags, Target
 from withe.real2sim.unknowns import Coordinates
 
-__all__ = ["gather"]
+__all__ = ["gather", "persistence"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -122,18 +122,18 @@ def _told(targets: list[Target], fitted: int, residuals: FloatArray, normal: Flo
     rows = residuals[fitted].reshape(len(seen_in), -1)
     inside = np.nan_to_num(rows)
     if normal is None:
-        return _Told(numbers, float(np.sum(inside**2)), persistence=_persistence(rows))
+        return _Told(numbers, float(np.sum(inside**2)), persistence=persistence(rows))
     across = block_diag(*(target.across(normal) for target in targets))
     seen = np.isfinite(rows) @ across**2 > 1.0 - 1e-9
     beside = np.where(seen, inside @ across, 0.0)
     inside = inside - beside @ across.T
     lost = int(seen.sum())
-    persistence = _persistence(np.where(np.isfinite(rows), inside, np.nan))
-    return _Told(numbers - lost, float(np.sum(inside**2)), lost, float(np.sum(beside**2)), persistence)
+    together = persistence(np.where(np.isfinite(rows), inside, np.nan))
+    return _Told(numbers - lost, float(np.sum(inside**2)), lost, float(np.sum(beside**2)), together)
 
 
-def _persistence(rows: FloatArray) -> float:
-    """Correlation of the residuals of successive frames, shape (frames, n) -> [-]; 0 where chance explains it."""
+def persistence(rows: FloatArray) -> float:
+    """Correlation of residuals of successive frames or points, shape (n, numbers) -> [-]; 0: chance explains it."""
     first, second = rows[:-1].ravel(), rows[1:].ravel()
     both = np.isfinite(first) & np.isfinite(second) & ((first != 0.0) | (second != 0.0))
     first, second = first[both], second[both]
