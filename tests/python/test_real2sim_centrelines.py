@@ -53,6 +53,47 @@ def test_a_photograph_is_traced_and_the_rest_shape_told():
     assert simulation.get("arm", "natural_curvature")[:, 1] == pytest.approx(1.0 + 5.0 * SHARE, abs=0.6)
 
 
+def curl(random):
+    """A soft strand that hangs in a helix of drawn radius and turns, from a straight start; its scene and nodes."""
+    arc, turns, radius = np.linspace(0.0, 0.2, 41), random.uniform(1.0, 2.5), random.uniform(0.006, 0.012)
+    angle, grown = 2.0 * np.pi * turns * arc / 0.2, radius / (1.0 + np.exp(-(arc - 0.06) / 0.02))
+    points = np.stack([grown * np.cos(angle), grown * np.sin(angle), -0.95 * arc], axis=1)
+    scene = withe.Scene()
+    hair = withe.Material(youngs_modulus=1e9, poisson_ratio=0.4, density=1300.0)
+    rod = scene.add_rod(points=points, radius=3e-4, material=hair, name="hair")
+    scene.clamp(rod.start)
+    return scene.build(integrator="static"), points
+
+
+@pytest.mark.parametrize("noise", [0.0, 5e-5])
+def test_the_rest_shape_of_a_curl_has_as_many_functions_as_the_centreline_tells(noise):
+    random = np.random.default_rng(15)
+    for _ in range(3):
+        simulation, points = curl(random)
+        seen = points + random.normal(0.0, noise, points.shape)
+        found = rest_shape(simulation, "hair", seen, sigma=noise or None)
+        assert found.reasons == {}
+        found.apply(simulation)
+        simulation.equilibrium()
+        off = np.linalg.norm(simulation.positions("hair") - points, axis=1).max()
+        assert off < 1e-3
+        few = rest_shape(simulation, "hair", points, basis="constant")
+        assert "basis does not follow the centreline" in few.reasons[0]
+
+
+def test_natural_twist_is_found_beside_natural_curvature():
+    simulation, _ = curl(np.random.default_rng(16))
+    start = simulation.get("hair", "natural_twist").copy()
+    simulation.set("hair", natural_twist=start + 3.0)
+    simulation.equilibrium()
+    target = withe.real2sim.Tags(simulation.positions("hair")[None], [f"hair.node({i})" for i in range(41)])
+    simulation.set("hair", natural_twist=start)
+    found = fit(simulation, target, [("hair", "natural_twist", "segment")], progress=False)
+    assert found.value("hair", "natural_twist")[0, 5:30] == pytest.approx(start[5:30] + 3.0, abs=0.01)
+    with pytest.raises(ValueError, match="natural_twist of rod 'arm' cannot be unknown in a plane"):
+        fit(arm(), Centrelines([[(0, 0, 0), (0.3, 0, 0)]], "arm"), [("arm", "natural_twist")], progress=False)
+
+
 def test_derivatives_are_those_of_the_residuals():
     simulation = arm()
     simulation.equilibrium()

@@ -71,6 +71,42 @@ def test_without_noise_a_coarser_mesh_and_step_leave_damping_within_a_percent():
     assert found.value("delay")[0] == pytest.approx([0.013], abs=1e-5)
 
 
+def swung(nodes, time_step, modulus, swings):
+    """A cable whose clamp swings in the plane with three frequencies."""
+    scene = withe.Scene()
+    rubber = withe.Material(youngs_modulus=modulus, density=1000.0)
+    cable = scene.add_rod(start=(0, 0, 0), end=(0, 0, -0.4), nodes=nodes, radius=4e-3, material=rubber, name="cable")
+    scene.clamp(cable.start, name="wall")
+    simulation = scene.build(time_step=time_step, planar=True, integrator="energy_momentum")
+
+    def way(time):
+        return (min(1.0, 5.0 * time) * float(np.sum(0.02 * np.sin(swings * time))), 0.0, 0.0)
+
+    return simulation, lambda copy: copy.move("wall", path=way)
+
+
+@pytest.mark.parametrize(
+    ("nodes", "time_step", "cause"), [(5, 2e-3, "mesh too coarse"), (31, 1.5e-2, "time step too long")]
+)
+def test_sigmas_count_what_a_coarse_mesh_and_a_long_step_leave(nodes, time_step, cause):
+    random = np.random.default_rng(60)
+    scaled = []
+    for _ in range(4):
+        modulus, swings = 1e6 * random.uniform(0.5, 2.0), random.uniform(6.0, 16.0, 3)
+        simulation, start = swung(41, 1e-3, modulus, swings)
+        start(simulation)
+        record = simulation.run(0.9, record_every=0.03, progress=False)
+        tags = Tags(
+            record.positions("cable")[1:, 10::10], [("cable", 0.1 * i) for i in range(1, 5)], times=record.times[1:]
+        )
+        coarse, start = swung(nodes, time_step, 1.1 * modulus, swings)
+        found = fit_motion(coarse, tags, [("cable", "youngs_modulus")], begin=start, progress=False)
+        assert cause in found.reasons[0]
+        scaled.append((found.values[0, 0] - modulus) / found.sigma("cable", "youngs_modulus")[0, 0])
+    assert np.abs(scaled).max() < 2.5
+    assert np.abs(scaled).max() > 0.05  # they are no larger than they need be
+
+
 def test_errors_have_the_size_that_the_covariance_says():
     exact = seen(0.0, viscosity=3000.0)
     rng = np.random.default_rng(7)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -15,6 +15,7 @@ from withe.common.short_repr import ShortRepr
 from withe.parts.handles import Rod
 from withe.perception.camera import Camera
 from withe.real2sim.fitting import fit
+from withe.real2sim.gathering import persistence
 from withe.real2sim.places import lines_of, node_count, rod_part
 from withe.real2sim.results import Fit
 from withe.real2sim.targets import Residual, Target, across_of_points, checked_times, pixel_derivative
@@ -23,6 +24,11 @@ from withe.simulation.simulation import Simulation
 __all__ = ["Centrelines", "rest_shape"]
 
 FloatArray = npt.NDArray[np.float64]
+
+_RESOLVED = 1e-6  # of the extent of a centreline: what fits resolve
+_FOLLOWED = 1e-3  # of that extent: what a basis may miss of it without a reason
+_ON_THE_WAY = 12  # iterations of fits with fewer functions than the last
+_CHANCE = 1e-6  # probability below which a gain by more functions is none of chance
 
 
 @dataclass(eq=False, repr=False)
@@ -191,7 +197,7 @@ def rest_shape(
     rod: Rod | str,
     centreline: npt.ArrayLike,
     camera: Camera | None = None,
-    basis: Any = "linear",
+    basis: Any = None,
     *,
     unknown: Literal["natural_curvature", "points"] = "natural_curvature",
     ends: bool = True,
@@ -209,7 +215,9 @@ def rest_shape(
         Seen along it, such as `perception.trace(picture).centrelines[0]`; pixels need the camera.
     camera : perception.Camera, optional
     basis : optional
-        Of natural curvature, or of the turns of edges, as in `fit`.
+        Of natural curvature, or of the turns of edges, as in `fit`. By default "linear"; to natural curvature cosines
+        are added, twice as many functions each time, for as long as the centreline tells more: until it is followed to
+        within `sigma`, or chance explains how much closer more functions come (F test).
     unknown : {"natural_curvature", "points"}
         With "points", the rod as it was drawn and what holds it: also the angle at which it is clamped.
     ends : bool
@@ -222,7 +230,7 @@ def rest_shape(
     -------
     Fit
         Of one frame; `found.apply(simulation)` gives the rod this rest shape, and `found.points(rod)` has its nodes
-        where ``points`` were unknown.
+        where ``points`` were unknown. `Fit.reasons` names a basis that does not follow the centreline.
 
     Raises
     ------
@@ -238,7 +246,87 @@ def rest_shape(
     """
     validation.choice(unknown, "unknown", ("natural_curvature", "points"))
     target = Centrelines([centreline], rod, camera, ends, sigma=sigma)
-    return fit(simulation, target, [(rod, unknown, basis)], progress=progress)
+    given = "linear" if basis is None else basis
+    found = fit(simulation, target, [(rod, unknown, given)], progress=progress)
+    if basis is None and unknown == "natural_curvature":
+        found = _refined(simulation, target, rod, found, progress)
+    return _with_misfit_named(found, target)
+
+
+def _refined(
+    simulation: Simulation, target: Centrelines, rod: Rod | str, found: Fit, progress: bool | Literal["always"]
+) -> Fit:
+    """The fit with as many functions as the centreline tells, from that with linear ones on."""
+    voronoi = rod_part(simulation, rod).voronoi
+    least = _RESOLVED * _extent(target) if target.sigma is None else target.sigma
+    told, count, worse = target.told(0), 2, 0
+    functions: list[Any] = []
+    per_function = len(found.names) // count
+    # A curl of several turns is told by neither 2 nor 4 functions: two steps without gain end the search.
+    while worse < 2 and _square(found, target) > told * least**2:
+        count *= 2
+        if count > len(voronoi) or per_function * count >= told:
+            break
+        unknowns = [(rod, "natural_curvature", _functions(voronoi, count))]
+        # What is drawn may lead to another minimum than what fewer functions have found.
+        coarser = simulation.copy()
+        found.apply(coarser)
+        fits = [
+            fit(start, target, unknowns, max_iterations=_ON_THE_WAY, progress=progress)
+            for start in (simulation, coarser)
+        ]
+        finer = min(fits, key=lambda each: _square(each, target))
+        if _tells_more(finer, found, target):
+            found, functions, worse = finer, unknowns, 0
+        else:
+            worse += 1
+    if functions and not found.converged[0]:
+        last = simulation.copy()
+        found.apply(last)
+        found = fit(last, target, functions, progress=progress)
+    return found
+
+
+def _functions(voronoi: FloatArray, count: int) -> FloatArray:
+    """Linear functions at stencils, and cosines, whose sum approaches a smooth function as 1 / count^3."""
+    share = (np.cumsum(voronoi) - 0.5 * voronoi) / voronoi.sum()
+    waves = np.cos(np.pi * np.outer(share, np.arange(1, count - 1)))
+    return np.concatenate([np.stack([1.0 - share, share], axis=1), waves], axis=1)
+
+
+def _square(found: Fit, target: Centrelines) -> float:
+    """Sum of the squares of what a fit leaves [m^2 or px^2]."""
+    return float(np.nansum(found.residuals[0] ** 2)) * (target.sigma or 1.0) ** 2
+
+
+def _tells_more(finer: Fit, coarser: Fit, target: Centrelines) -> bool:
+    """Whether chance does not explain how much closer a fit with more functions comes, by the F test."""
+    from scipy.special import fdtrc
+
+    free, more = target.told(0) - len(finer.names), len(finer.names) - len(coarser.names)
+    left = _square(finer, target)
+    gain = _square(coarser, target) - left
+    return gain > 0.0 and (left == 0.0 or bool(fdtrc(more, free, gain / more / (left / free)) < _CHANCE))
+
+
+def _with_misfit_named(found: Fit, target: Centrelines) -> Fit:
+    """The same fit, with a reason where neighbouring points are missed together, and by more than their error."""
+    residuals = found.residuals[0].reshape(target.samples, -1)
+    together = persistence(residuals)
+    off = np.sqrt(_square(found, target) / max(target.told(0), 1))
+    if 0 in found.reasons or not together or off <= (target.sigma or _FOLLOWED * _extent(target)):
+        return found
+    reason = (
+        "the basis does not follow the centreline: neighbouring points are missed together (correlation "
+        f"{together:.2f}), by {off:.2g} {'m' if target.camera is None else 'px'} on the root mean square; take more "
+        "functions"
+    )
+    return replace(found, reasons={**found.reasons, 0: reason})
+
+
+def _extent(target: Centrelines) -> float:
+    """Greatest extent of the points that were seen [m or px]."""
+    return float(np.ptp(np.asarray(target.points[0]), axis=0).max())
 
 
 def _evenly(line: FloatArray, samples: int, frame: int) -> FloatArray:

@@ -45,7 +45,7 @@ def fit(
     """Find unknowns with which equilibria look like targets, frame after frame.
 
     Least squares over the residuals of all targets divided by their sigma. Every frame begins with what the frame
-    before it found. Natural curvature is of each frame, all else of all of them.
+    before it found. Natural curvature and twist are of each frame, all else of all of them.
 
     The search ends in the local minimum that the first guess leads to; the covariance does not know of others. Where
     sigma is given and residuals are far beyond it, `Fit.reasons` says so: try other first guesses.
@@ -58,9 +58,9 @@ def fit(
     unknowns : sequence of tuples
         ``(rod, "natural_curvature", basis)``, with basis "constant", "linear" (its values at both ends), "segment" (one
         a stencil), or functions along the rod, array_like of shape (stencils, n); in space these count twice, for
-        both directors. ``(part, word)`` for a positive parameter of a part or of a tuple of parts, all multiplied by
-        one factor: youngs_modulus, density, bend_stiffness, line_density, ... of rods, mass, friction of an obstacle,
-        stiffness and damping of revolute joints and springs.
+        both directors. ``(rod, "natural_twist", basis)`` in space. ``(part, word)`` for a positive parameter of a part
+        or of a tuple of parts, all multiplied by one factor: youngs_modulus, density, bend_stiffness, line_density, ...
+        of rods, mass, friction of an obstacle, stiffness and damping of revolute joints and springs.
         ``(rod, "points", basis)`` for a rod as it was drawn, in a plane: by how much its edges are turned, over
         functions of the same kinds, (edges, n), as if the scene were built anew: natural curvature follows, and
         supports go where its nodes are drawn. ``(support, "position")`` and ``(support, "rotation")`` for poses.

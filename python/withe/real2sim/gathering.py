@@ -13,13 +13,15 @@ from withe.real2sim.results import Fit, Outlier, Unobservable
 from withe.real2sim.targets import Tags, Target
 from withe.real2sim.unknowns import Coordinates
 
-__all__ = ["gather"]
+__all__ = ["gather", "persistence"]
 
 FloatArray = npt.NDArray[np.float64]
 
 _MISFIT = 3.0  # times sigma: residuals beyond it, root of the mean square, are too great for it ...
 _BESIDE = 10.0  # times sigma, and what is left within the plane of a scene: targets do not belong to it
 _CHANCE = 1e-6  # ... if normal errors are as great with a probability below this
+_PERSISTENT = 5.0  # standard deviations of a correlation, beyond which residuals of successive frames are not noise
+_OF_SCALE = 0.01  # possible error over the scale of an unknown, from which on a reason names its cause
 _RESOLVED = 1e-6  # of the extent of all tags: what fits resolve, and usual errors are at least
 
 
@@ -30,8 +32,15 @@ def gather(
     solves: dict[int, int],
     rows: int,
     frames: int,
+    step_error: FloatArray | None = None,
 ) -> Fit:
-    """The result of a fit."""
+    """The result of a fit.
+
+    Parameters
+    ----------
+    step_error : ndarray of shape (residuals,), optional
+        Of a motion: error of its residuals that the time step makes.
+    """
     count = len(stills.names)
     coordinates = np.full((frames, count), np.nan)
     residuals = np.full((frames, rows), np.nan)
@@ -49,10 +58,22 @@ def gather(
     for frame, spread in _spreads(stills, with_data, own, common).items():
         covariance[frame] = spread
     told = {f: _told(targets, f, residuals, stills.simulation._session.world.plane_normal) for f in with_data}
-    covariance *= _variance(stills, targets, list(told.values())) * slopes[:, :, None] * slopes[:, None]
+    variance = _variance(stills, targets, list(told.values()))
+    systematic = {f: _systematic(each) for f, each in told.items()}
+    by_step: dict[int, FloatArray] = {}
+    for frame in with_data:
+        spread = covariance[frame].copy()
+        covariance[frame] = (variance + systematic[frame]) * spread
+        if step_error is not None:
+            by_step[frame] = np.linalg.pinv(with_data[frame].jacobian) @ step_error
+            covariance[frame] += np.outer(by_step[frame], by_step[frame])
+        known = np.diag(spread)[np.isfinite(np.diag(spread))]
+        systematic[frame] *= float(known.max(initial=0.0))
+    covariance *= slopes[:, :, None] * slopes[:, None]
     reasons = {f: "nothing was seen" for f in range(frames) if f not in solutions}
     reasons |= (
-        _misfits(stills, targets, told)
+        _of_discretisation(told, systematic, by_step)
+        | _misfits(stills, targets, told)
         | _off_plane(targets, told)
         | {f: s.reason for f, s in solutions.items() if s.reason}
     )
@@ -84,6 +105,7 @@ class _Told(NamedTuple):
     squares: float
     numbers_across: int = 0
     squares_across: float = 0.0
+    persistence: float = 0.0  # correlation of residuals of successive frames of a motion; 0 where chance explains it
 
     @property
     def beside(self) -> float:
@@ -100,13 +122,58 @@ def _told(targets: list[Target], fitted: int, residuals: FloatArray, normal: Flo
     rows = residuals[fitted].reshape(len(seen_in), -1)
     inside = np.nan_to_num(rows)
     if normal is None:
-        return _Told(numbers, float(np.sum(inside**2)))
+        return _Told(numbers, float(np.sum(inside**2)), persistence=persistence(rows))
     across = block_diag(*(target.across(normal) for target in targets))
     seen = np.isfinite(rows) @ across**2 > 1.0 - 1e-9
     beside = np.where(seen, inside @ across, 0.0)
     inside = inside - beside @ across.T
     lost = int(seen.sum())
-    return _Told(numbers - lost, float(np.sum(inside**2)), lost, float(np.sum(beside**2)))
+    together = persistence(np.where(np.isfinite(rows), inside, np.nan))
+    return _Told(numbers - lost, float(np.sum(inside**2)), lost, float(np.sum(beside**2)), together)
+
+
+def persistence(rows: FloatArray) -> float:
+    """Correlation of residuals of successive frames or points, shape (n, numbers) -> [-]; 0: chance explains it."""
+    first, second = rows[:-1].ravel(), rows[1:].ravel()
+    both = np.isfinite(first) & np.isfinite(second) & ((first != 0.0) | (second != 0.0))
+    first, second = first[both], second[both]
+    squares = 0.5 * float(first @ first + second @ second)
+    if squares == 0.0:
+        return 0.0
+    products = first * second
+    found = float(products.sum()) / squares
+    # The standard deviation of the sum of independent products is the root of the sum of their squares.
+    return found if found * squares > _PERSISTENT * np.sqrt(float(products @ products)) else 0.0
+
+
+def _systematic(told: _Told) -> float:
+    """Variance of the mean of correlated residuals beyond that of independent ones, times their number.
+
+    Kish's design effect, 1 + (n - 1) rho, with the mean square of the residuals [Kish: Survey sampling, 1965, 5.4].
+    """
+    return told.persistence * told.squares * (1.0 - 1.0 / max(told.numbers, 1))
+
+
+def _of_discretisation(
+    told: dict[int, _Told], systematic: dict[int, float], by_step: dict[int, FloatArray]
+) -> dict[int, str]:
+    """Motions of which the discretisation may move the unknowns by more than a hundredth of their scales."""
+    found = {}
+    for frame, each in told.items():
+        by_time = float(np.abs(by_step[frame]).max(initial=0.0)) if frame in by_step else 0.0
+        by_mesh = float(np.sqrt(systematic[frame]))
+        if by_time > _OF_SCALE and by_time >= 0.5 * by_mesh:
+            found[frame] = (
+                f"time step too long for this motion: half of it moves what is found by up to {100.0 * by_time:.2g} % "
+                "of its scale, which the sigmas count; take a shorter time_step"
+            )
+        elif by_mesh > _OF_SCALE:
+            found[frame] = (
+                "mesh too coarse for this motion, or a model that is not that of the targets: residuals of successive "
+                f"frames are correlated ({each.persistence:.2f}) and may move what is found by {100.0 * by_mesh:.2g} % "
+                "of its scale, which the sigmas count; try more nodes"
+            )
+    return found
 
 
 def _misfits(stills: Coordinates, targets: list[Target], told: dict[int, _Told]) -> dict[int, str]:
@@ -121,8 +188,8 @@ def _misfits(stills: Coordinates, targets: list[Target], told: dict[int, _Told])
         if free > 0 and each.squares > _MISFIT**2 * free and chdtrc(free, each.squares) < _CHANCE:
             found[frame] = (
                 f"residuals are {np.sqrt(each.squares / free):.2g} times sigma, too much for chance: a local minimum "
-                "(try another first guess or method), outliers, a model that is not that of the targets, or too small "
-                "a sigma"
+                "(try another first guess or method), outliers, a model that is not that of the targets (such as too "
+                "coarse a mesh), or too small a sigma"
             )
     return found
 

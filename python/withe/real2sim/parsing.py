@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from withe.real2sim.shape_unknowns import DrawnShape, NaturalCurvature, Pose
+from withe.real2sim.shape_unknowns import DrawnShape, NaturalCurvature, NaturalTwist, Pose
 from withe.real2sim.unknowns import POSITIVE, Parameter, Unknown
 from withe.simulation.overlaps import remaining
 from withe.simulation.simulation import Simulation
@@ -26,7 +26,7 @@ def parse_unknowns(
     """
     if isinstance(unknowns, str) or not isinstance(unknowns, Sequence):
         raise ValueError(f"{what} must be a list such as [(arm, 'natural_curvature', 'constant')], got {unknowns!r}")
-    shapes = {"natural_curvature": NaturalCurvature, "points": DrawnShape}
+    shapes = {"natural_curvature": NaturalCurvature, "natural_twist": NaturalTwist, "points": DrawnShape}
     found: list[Unknown] = []
     seen: set[tuple[str, str]] = set()
     for item in unknowns:
@@ -41,7 +41,7 @@ def parse_unknowns(
             unknown = Parameter(simulation, list(rod) if isinstance(rod, tuple | list) else [rod], word)
         else:
             words = ", ".join((*shapes, "position", "rotation", *POSITIVE))
-            raise ValueError(f"{what} must be of {words}, only the first two with a basis, got {item[1:]!r}")
+            raise ValueError(f"{what} must be of {words}, only the first three with a basis, got {item[1:]!r}")
         for name in unknown.rods:
             if (name, word) in seen:
                 raise ValueError(f"{what} must be different, got {word} of rod {name!r} twice")
@@ -59,9 +59,9 @@ def _check_shapes(unknowns: list[Unknown]) -> None:
         for other in unknowns:
             if isinstance(other, Pose) and other.rods[0] in shape.supports:
                 raise ValueError(f"points of {rod!r} move its supports: leave out {other.word} of {other.rods[0]!r}")
-            if isinstance(other, NaturalCurvature) and other.rods[0] == rod:
+            if isinstance(other, NaturalCurvature | NaturalTwist) and other.rods[0] == rod:
                 raise ValueError(
-                    f"points of {rod!r} set its natural_curvature: leave one of them out; where its base alone is "
+                    f"points of {rod!r} set its {other.word}: leave one of them out; where its base alone is "
                     "turned, take (support, 'rotation') instead of points"
                 )
 

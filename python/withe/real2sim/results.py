@@ -94,7 +94,8 @@ class Fit:
         Simulated less seen, in units of sigma, or of the target without one; NaN where nothing was seen.
     covariance : ndarray of shape (frames, unknowns, unknowns)
         Of the values, for independent errors of the targets. Their variance is that of sigma, or what all frames
-        leave, divided by the degrees of freedom; NaN without either, infinite where the targets tell nothing. In a
+        leave, divided by the degrees of freedom; NaN without either, infinite where the targets tell nothing. Of a
+        motion also for errors of its time step, and for what the residuals of successive frames have in common. In a
         planar scene what lies across its plane counts for neither. A camera counts for exact: with one that `calibrate`
         found, errors are greater, see there.
     solves : ndarray of int of shape (frames,)
@@ -106,7 +107,8 @@ class Fit:
         out of reach leaves a residual.
     reasons : dict of int to str
         Why frames did not converge, were skipped, or leave more than sigma explains, where it is given: a sum of
-        squares above 9 sigma^2 per degree of freedom, and above what chance exceeds once in a million frames.
+        squares above 9 sigma^2 per degree of freedom, and above what chance exceeds once in a million frames. Or which
+        motions have too coarse a mesh or too long a time step.
     unobservable : tuple of Unobservable
         Combinations of unknowns that the targets do not tell; print them.
     outliers : tuple of Outlier

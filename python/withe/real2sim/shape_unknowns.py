@@ -16,48 +16,76 @@ from withe.real2sim.unknowns import Unknown
 from withe.simulation.simulation import Simulation
 from withe.simulation.supports import find_support
 
-__all__ = ["DrawnShape", "NaturalCurvature", "Pose"]
+__all__ = ["DrawnShape", "NaturalCurvature", "NaturalTwist", "Pose"]
 
 FloatArray = npt.NDArray[np.float64]
 
 
-class NaturalCurvature(Unknown):
-    """Natural curvature of a rod as a sum of functions along it [1/m]."""
+class _NaturalStrain(Unknown):
+    """Natural curvature or twist of a rod as a sum of functions along it.
 
-    word = "natural_curvature"
+    Parameters
+    ----------
+    directions : ndarray of shape (n, components)
+        Components of the strain that are unknown, each with functions of its own.
+    axes : list of str
+        What tells them apart in names.
+    """
+
     per_frame = True
 
-    def __init__(self, simulation: Simulation, rod: Rod | str, basis: Any = "constant") -> None:
-        part = rod_part(simulation, rod)
+    def __init__(self, part: RodPart, basis: Any, directions: FloatArray, axes: list[str]) -> None:
         self._rod, self.rods = part.name, (part.name,)
         self.length = float(part.lengths.sum())
         functions, words = _basis(part, basis)
-        plane = turning_axis(simulation, part)
-        self._directions = np.eye(2) if plane is None else plane[0][None]
-        axes = [" towards d1", " towards d2"] if plane is None else [""]
-        self.names = tuple(f"natural_curvature of {part.name!r}{axis}{word}" for axis in axes for word in words)
-        fields = [functions.T[:, :, None] * direction for direction in self._directions]
+        self.names = tuple(f"{self.word} of {part.name!r}{axis}{word}" for axis in axes for word in words)
+        fields = [functions.T[:, :, None] * direction for direction in directions]
         self._rows = np.concatenate(fields).reshape(len(self.names), -1)  # one a function: components of each stencil
         self._inverse = np.linalg.pinv(self._rows.T)
         largest = np.abs(functions).max(axis=0)
         self.scales = np.tile(1.0 / (self.length * largest), len(axes))
 
     def read(self, simulation: Simulation) -> FloatArray:
-        """Coordinates of the nearest curvature that the functions make."""
+        """Coordinates of the nearest strain that the functions make."""
         return np.asarray(self._inverse @ simulation.get(self._rod, self.word).ravel())
 
     def write(self, simulation: Simulation, coordinates: FloatArray) -> None:
         """Set them."""
-        simulation.set(self._rod, natural_curvature=(coordinates @ self._rows).reshape(-1, 2))
+        strain = coordinates @ self._rows
+        simulation.set(self._rod, **{self.word: strain.reshape(np.shape(simulation.get(self._rod, self.word)))})
 
     @property
     def words(self) -> list[Any]:
-        """Natural curvature of the rod."""
+        """The natural strain of the rod."""
         return [(self._rod, self.word)]
 
     def chain(self, coordinates: FloatArray, found: list[list[Any]]) -> FloatArray:
         """What each function stands for."""
         return np.asarray(np.reshape(found[0], (len(found[0]), -1)) @ self._rows.T)
+
+
+class NaturalCurvature(_NaturalStrain):
+    """Natural curvature of a rod as a sum of functions along it [1/m]."""
+
+    word = "natural_curvature"
+
+    def __init__(self, simulation: Simulation, rod: Rod | str, basis: Any = "constant") -> None:
+        part = rod_part(simulation, rod)
+        plane = turning_axis(simulation, part)
+        directions = np.eye(2) if plane is None else plane[0][None]
+        super().__init__(part, basis, directions, [" towards d1", " towards d2"] if plane is None else [""])
+
+
+class NaturalTwist(_NaturalStrain):
+    """Natural twist of a rod as a sum of functions along it [rad/m]."""
+
+    word = "natural_twist"
+
+    def __init__(self, simulation: Simulation, rod: Rod | str, basis: Any = "constant") -> None:
+        part = rod_part(simulation, rod)
+        if turning_axis(simulation, part) is not None:
+            raise ValueError(f"natural_twist of {part.owner} cannot be unknown in a plane: build with planar=False")
+        super().__init__(part, basis, np.ones((1, 1)), [""])
 
 
 class DrawnShape(Unknown):
