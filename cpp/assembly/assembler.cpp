@@ -218,6 +218,14 @@ void Assembler::analyse() {
     }
 }
 
+void Assembler::multiply(const VectorX& x, VectorX& out) const {
+  const std::span<const double> values = std::as_const(*solver_).values();
+  out.setZero(pattern_.size);
+  for (int column = 0; column < pattern_.size; ++column)
+    for (int k = pattern_.column_starts[at(column)]; k < pattern_.column_starts[at(column) + 1]; ++k)
+      out[pattern_.row_indices[at(k)]] += values[static_cast<std::size_t>(entries_[at(k)])] * x[column];
+}
+
 void Assembler::multiply_transposed(const VectorX& x, VectorX& out) const {
   out.resize(pattern_.size);
   for (int column = 0; column < pattern_.size; ++column) out[column] = transposed_row(column, x);

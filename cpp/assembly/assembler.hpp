@@ -98,7 +98,8 @@ class Assembler {
   void turn_rows(int first, const Matrix3& by, std::span<double> values) const;
   void add_block(int first, const Matrix3& block, std::span<double> values) const;
 
-  /// out = A^T x with the solver's values; exact matrices only. `multiply_held`: of what supports hold alone.
+  /// out = A x, A^T x with the solver's values; exact matrices only. `multiply_held`: of what supports hold alone.
+  void multiply(const VectorX& x, VectorX& out) const;
   void multiply_transposed(const VectorX& x, VectorX& out) const;
   void multiply_held_transposed(const VectorX& x, VectorX& out) const;
 

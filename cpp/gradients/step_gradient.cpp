@@ -185,6 +185,17 @@ void StepGradient::pull_back(StateAdjoint& state, CoefficientAdjoint& by, HeldAd
   state.obstacles = std::move(adjoint.obstacles);
 }
 
+VectorX StepGradient::respond(const VectorX& residual, const VectorX& held) {
+  if (shifted_) throw std::invalid_argument(kSingular);
+  const Assembler& assembler = equations_.assembler();
+  assembler.multiply(held, columns_);
+  VectorX out = -residual - columns_;
+  assembler.project(out);
+  assembler.solver().solve({out.data(), static_cast<std::size_t>(out.size())});
+  assembler.project(out);
+  return out + held;
+}
+
 void StepGradient::add_work_along(const VectorX& motion, CoefficientAdjoint& by, HeldAdjoint& held) {
   const Model& model = equations_.model();
   const Assembler& assembler = equations_.assembler();

@@ -87,6 +87,12 @@ class StepGradient {
   /// [1/N]: of this step, by which the scalar goes besides. Throws std::invalid_argument where no gradient is known.
   void pull_back(StateAdjoint& state, CoefficientAdjoint& by, HeldAdjoint& held,
                  const ReactionAdjoint* reactions = nullptr, const VectorX* tensions = nullptr);
+  /// Of the last evaluation [N], [N m].
+  const VectorX& residual() const { return data_.residual; }
+  /// Of an equilibrium, forward mode, R_z dz = -dR: how the unknowns change where the residual, at fixed unknowns,
+  /// changes by `residual`, and what supports hold by `held` (zero elsewhere). Throws std::invalid_argument where no
+  /// state follows from what acts.
+  VectorX respond(const VectorX& residual, const VectorX& held);
   /// Of an equilibrium: adds the derivatives of the work of its residual over a motion.
   void add_work_along(const VectorX& motion, CoefficientAdjoint& by, HeldAdjoint& held);
 

@@ -7,6 +7,7 @@
 #include "geometry/rotation.hpp"
 #include "gradients/state_vector.hpp"
 #include "integrators/stiffness_signs.hpp"
+#include "model/edge_vectors.hpp"
 #include "world/implementation.hpp"
 
 namespace withe {
@@ -51,6 +52,33 @@ VectorX any_motion(const Model& model, const Assembler& assembler) {
 
 }  // namespace
 
+StepGradient& World::Implementation::begin_gradient(AtEquilibrium& at) const {
+  if (!static_gradient) {
+    Options statics = options;
+    statics.integrator = Integrator::statics;
+    static_gradient = std::make_unique<StepGradient>(model, equation_options(statics));
+  }
+  require(!has_rings(), std::string("no gradient is known of this equilibrium: ") + kRing);
+  StepGradient& gradient = *static_gradient;
+  at = {state, hand_poses()};
+  State& frames = at.frames;
+  if (!model.planar()) {
+    // Directors are measured from where they are, and so turn with their edges without a change of their angles.
+    Configuration configuration;
+    compute_configuration(model, state, state.q, configuration);
+    accept_configuration(model, state.q, configuration, frames);
+  }
+  gradient.begin({frames, parameters, StepRule::statics, 0.0, frames.q, nullptr, nullptr, &at.hands});
+  if (const HandForces* yielding = gradient.equations().hands()) require(!yielding->at_limit(state), kAtLimit);
+  const Contact* contact = gradient.equations().contact();
+  if (contact && contact->count() > 0) {
+    require(!contact->frictional(), kHeldByFriction);
+    require(contact->has_given_stiffness(state),
+            std::string("no gradient is known of this equilibrium: ") + kStiffness);
+  }
+  return gradient;
+}
+
 EquilibriumGradients World::equilibrium_gradients(const std::vector<ReadoutAdjoint>& by) const {
   const Implementation& self = *implementation_;
   const Model& model = self.model;
@@ -68,29 +96,8 @@ EquilibriumGradients World::equilibrium_gradients(const std::vector<ReadoutAdjoi
                                   error.what() + "; build it with planar=False");
     }
   }
-  if (!self.static_gradient) {
-    Options statics = self.options;
-    statics.integrator = Integrator::statics;
-    self.static_gradient = std::make_unique<StepGradient>(model, equation_options(statics));
-  }
-  require(!self.has_rings(), std::string("no gradient is known of this equilibrium: ") + kRing);
-  StepGradient& gradient = *self.static_gradient;
-  State frames = self.state;
-  const std::vector<HandPose> hands = self.hand_poses();
-  if (!model.planar()) {
-    // Directors are measured from where they are, and so turn with their edges without a change of their angles.
-    Configuration configuration;
-    compute_configuration(model, self.state, self.state.q, configuration);
-    accept_configuration(model, self.state.q, configuration, frames);
-  }
-  gradient.begin({frames, self.parameters, StepRule::statics, 0.0, frames.q, nullptr, nullptr, &hands});
-  if (const HandForces* yielding = gradient.equations().hands()) require(!yielding->at_limit(self.state), kAtLimit);
-  const Contact* contact = gradient.equations().contact();
-  if (contact && contact->count() > 0) {
-    require(!contact->frictional(), kHeldByFriction);
-    require(contact->has_given_stiffness(self.state),
-            std::string("no gradient is known of this equilibrium: ") + kStiffness);
-  }
+  Implementation::AtEquilibrium at;
+  StepGradient& gradient = self.begin_gradient(at);
   require(gradient.imbalance() < kBalanced,
           "the simulation is in no equilibrium, so that there is no gradient of one: call equilibrium() again");
   EquilibriumGradients out;
@@ -100,8 +107,8 @@ EquilibriumGradients World::equilibrium_gradients(const std::vector<ReadoutAdjoi
     HeldAdjoint held(model);
     add_unknowns(model, scalar, adjoint);
     if (scalar.needs_state())
-      add_readouts(model, gradient.equations().assembler(), self.parameters, frames, scalar, adjoint, coefficients);
-    const ReactionAdjoint reactions{scalar.reactions, hands};
+      add_readouts(model, gradient.equations().assembler(), self.parameters, at.frames, scalar, adjoint, coefficients);
+    const ReactionAdjoint reactions{scalar.reactions, at.hands};
     gradient.pull_back(adjoint, coefficients, held, scalar.has_reactions() ? &reactions : nullptr);
     out.scalars.push_back(self.equilibrium_gradient(coefficients, held));
   }
@@ -112,6 +119,53 @@ EquilibriumGradients World::equilibrium_gradients(const std::vector<ReadoutAdjoi
     HeldAdjoint held(model);
     gradient.add_work_along(motion, coefficients, held);
     out.works.push_back(self.equilibrium_gradient(coefficients, held));
+  }
+  return out;
+}
+
+VectorX World::equilibrium_residual() const {
+  const Implementation& self = *implementation_;
+  Implementation::AtEquilibrium at;
+  StepGradient& gradient = self.begin_gradient(at);
+  const Contact* contact = gradient.equations().contact();
+  require(!self.description.has_custom_force && (!contact || contact->count() == 0),
+          "forward derivatives are not known with custom forces, nor where rods touch");
+  return gradient.residual();
+}
+
+MatrixX World::support_directions(int support) const {
+  const Implementation& self = *implementation_;
+  const Model& model = self.model;
+  require(support >= 0 && at(support) < model.supports.size() && !model.supports[at(support)].yields(),
+          "forward derivatives are not known by the place of a hand that yields");
+  const std::vector<HandPose> hands = self.hand_poses();
+  MatrixX out = MatrixX::Zero(model.dof_count, 6);
+  VectorX held = VectorX::Zero(model.dof_count);
+  for (const Constraint& c : model.constraints)
+    for (int i = 0; i < c.size; ++i) {
+      // The transpose of what adjoints make of held unknowns, row by row.
+      held[c.first + i] = 1.0;
+      const Vector3 part = c.held(held);
+      held.segment(c.first, c.size) = part.head(c.size);
+      const PoseAdjoint by = by_poses(model, self.state.q, held, {}, {hands, self.state.hands});
+      out.row(c.first + i) << by.positions.row(support), by.rotations.row(support);
+      held.segment(c.first, c.size).setZero();
+    }
+  return out;
+}
+
+MatrixX World::equilibrium_responses(const MatrixX& residual, const MatrixX& held) const {
+  const Implementation& self = *implementation_;
+  const Model& model = self.model;
+  require(residual.rows() == model.dof_count && held.rows() == model.dof_count && held.cols() == residual.cols(),
+          "changes must have a row for each unknown of the scene");
+  Implementation::AtEquilibrium at;
+  StepGradient& gradient = self.begin_gradient(at);
+  MatrixX out(3 * model.node_count, residual.cols());
+  for (Eigen::Index k = 0; k < residual.cols(); ++k) {
+    const VectorX change = gradient.respond(residual.col(k), held.col(k));
+    for (int node = 0; node < model.node_count; ++node)
+      out.col(k).segment<3>(3 * node) = node_vector(model, change, node);
   }
   return out;
 }

@@ -188,6 +188,13 @@ struct World::Implementation : Running {
   /// Where hands are, per support.
   std::vector<HandPose> hand_poses() const;
   VectorX neutral_motion() const;
+  /// Prepares `static_gradient` for the equilibrium that the scene is in; what it refers to is in `at`. Throws
+  /// std::invalid_argument where no derivative is known.
+  struct AtEquilibrium {
+    State frames;
+    std::vector<HandPose> hands;
+  };
+  StepGradient& begin_gradient(AtEquilibrium& at) const;
   EquilibriumGradient equilibrium_gradient(const CoefficientAdjoint& coefficients, const HeldAdjoint& held) const;
   void find_hand_poses(std::vector<HandPose>& poses) const;
   static void release_hands(Equations& system);

@@ -321,6 +321,14 @@ class World {
   /// Of scalars whose derivatives by read-outs are given, in the equilibrium that the scene is in. Throws
   /// std::invalid_argument where it is in none, or where none is known.
   EquilibriumGradients equilibrium_gradients(const std::vector<ReadoutAdjoint>& by) const;
+  /// Forward mode, for few numbers and many read-outs: the residual of the equations of statics with what acts now, per
+  /// unknown; how unknowns that a support holds go with its place and a rotation vector, (unknowns, 6); and how nodes
+  /// move, (3 nodes, n), where the residual changes by the columns of one and what is held by those of the other. Throw
+  /// std::invalid_argument where that is not known: where rods touch, with custom forces, and as
+  /// `equilibrium_gradients`.
+  VectorX equilibrium_residual() const;
+  MatrixX support_directions(int support) const;
+  MatrixX equilibrium_responses(const MatrixX& residual, const MatrixX& held) const;
   /// Keeps the steps from here on, for gradients; nothing: no more.
   std::shared_ptr<Tape> start_tape();
   /// A frame has been taken of the run that is recorded.

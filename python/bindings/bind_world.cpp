@@ -473,6 +473,17 @@ void define_readouts(WorldClass& world) {
         return std::make_tuple(std::move(found.scalars), std::move(found.works));
       },
       py::arg("by"));
+  world.def("equilibrium_residual", [](const GuardedWorld& self) { return self.reading().equilibrium_residual(); });
+  world.def(
+      "support_directions",
+      [](const GuardedWorld& self, int support) { return self.reading().support_directions(support); },
+      py::arg("support"));
+  world.def(
+      "equilibrium_responses",
+      [](const GuardedWorld& self, const MatrixX& residual, const MatrixX& held) {
+        return self.reading().equilibrium_responses(residual, held);
+      },
+      py::arg("residual"), py::arg("held"));
   world.def("start_tape", [](GuardedWorld& self) { return self.changing().start_tape(); });
   world.def("note_moment", [](GuardedWorld& self) { self.changing().note_moment(); });
   world.def("stop_tape", [](GuardedWorld& self) { self.changing().stop_tape(); });

@@ -1063,6 +1063,15 @@ class World:
         """
         Follow a path of equilibria through limit points.
         """
+    def equilibrium_residual(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    def equilibrium_responses(
+        self,
+        residual: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+        held: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]: ...
+    def support_directions(
+        self, support: typing.SupportsInt | typing.SupportsIndex
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]: ...
     def feed(
         self, support: typing.SupportsInt | typing.SupportsIndex, rate: typing.SupportsFloat | typing.SupportsIndex
     ) -> None: ...

@@ -12,10 +12,12 @@ import numpy.typing as npt
 from withe import _core
 from withe.common import validation
 from withe.parts.handles import NodeHandle
-from withe.parts.kinds import SupportPart
+from withe.parts.kinds import JoinPart, LoadPart, MassPart, RodPart, SpringPart, SupportPart, TendonPart
 from withe.simulation.calls import Gradients, Ledger, RunJournal
 from withe.simulation.drawn import DrawnNodes, Moment
 from withe.simulation.losses import check_in_plane, readout_adjoints, readout_shape, spoken
+from withe.simulation.motion import POSE_WORDS
+from withe.simulation.parameters import get_value, set_values
 from withe.simulation.session import Session
 from withe.simulation.unknowns import (
     INITIAL_WORDS,
@@ -37,6 +39,15 @@ __all__ = [
 FloatArray = npt.NDArray[np.float64]
 
 _DRIVES = 1e-11  # share of the work over any motion, above which work over a neutral one is no rounding
+
+# Words in which the residual of statics is linear, beside loads and gravity.
+_LINEAR: dict[type[Any], tuple[str, ...]] = {
+    RodPart: ("youngs_modulus", "density"),
+    MassPart: ("mass",),
+    SpringPart: ("stiffness", "rest_length"),
+    TendonPart: ("tension",),
+    JoinPart: ("stiffness", "moment"),
+}
 
 Loss = npt.ArrayLike | Mapping[str, Any]
 """Derivatives of a scalar: by positions of every node, or by words of read-outs; see `Equilibrium.gradient`."""
@@ -124,11 +135,90 @@ def equilibrium_jacobian(session: Session, of: Any, wrt: Sequence[Unknown]) -> l
         shape = readout_shape(session, target, word)
         count = int(np.prod(shape))
         tables = {word: {target: np.eye(count).reshape(count, *shape)}}
+    if tables.keys() == {"positions"}:
+        rows = [session.directory.row(node)] if len(shape) == 1 else _rows_of(session, target)
+        if (forward := _forward_jacobian(session, np.asarray(rows), wrt)) is not None:
+            return [found.reshape(*shape, *found.shape[2:]) for found in forward]
     out = []
     for found in _gradients(session, readout_adjoints(session, tables, int(np.prod(shape))), wrt):
         values = np.array(found)
         out.append(values.reshape(*shape, *values.shape[1:]))
     return out
+
+
+def _rows_of(session: Session, rod: Any) -> npt.NDArray[np.int64]:
+    return session.directory.layout.rows(session.directory.rod(rod).index)
+
+
+def _forward_jacobian(session: Session, rows: npt.NDArray[np.int64], wrt: Sequence[Unknown]) -> list[FloatArray] | None:
+    """Derivatives of positions of nodes, one (nodes, 3, ...) for each of `wrt`, by one solve for each number of them.
+
+    None where the adjoint method takes fewer solves, or has to look closer: where the residual is not linear in a
+    number (its change is then no derivative), where rods touch, and where motions cost nothing.
+    """
+    if session.options.planar is not True and session.world.plane_normal is not None:
+        return None  # what the adjoint method is asked for may lead out of the plane
+    unknown_readers(session, wrt)  # refuses what cannot be
+    if session.world.equilibrium_gradients([])[1]:
+        return None
+    changes: list[FloatArray] = []
+    helds: list[FloatArray] = []
+    shapes: list[tuple[int, ...]] = []
+    try:
+        copy = session.copy()
+        start = np.array(copy.world.equilibrium_residual())
+        for unknown in wrt:
+            found = _directions(copy, unknown, start, 3 * len(rows) - sum(len(each) for each in changes))
+            if found is None:
+                return None
+            changes.append(found[0])
+            helds.append(found[1])
+            shapes.append(found[2])
+        moved = session.world.equilibrium_responses(np.concatenate(changes).T, np.concatenate(helds).T)
+    except ValueError:
+        return None  # the adjoint method says why, or knows more
+    by_rows = np.asarray(moved).reshape(-1, 3, moved.shape[1])[rows]
+    ends = np.cumsum([len(each) for each in changes])
+    parts = np.split(by_rows, ends[:-1], axis=2)
+    return [part.reshape(*part.shape[:2], *shape) for part, shape in zip(parts, shapes, strict=True)]
+
+
+def _directions(
+    copy: Session, unknown: Unknown, start: FloatArray, most: int
+) -> tuple[FloatArray, FloatArray, tuple[int, ...]] | None:
+    """Changes of the residual and of what supports hold by each number of an unknown, (n, unknowns), and its shape.
+
+    None where there are `most` numbers or more, or the residual is not linear in them.
+    """
+    target, word = (None, unknown) if isinstance(unknown, str) else unknown
+    if isinstance(target, tuple):
+        return None
+    part = None if target is None else copy.directory.find_any(target, "wrt")
+    if isinstance(part, SupportPart) and word in POSE_WORDS and most > 3:
+        index = copy.settings.supports[part.name][0]
+        held = np.array(copy.world.support_directions(index)).T[slice(0, 3) if word == "position" else slice(3, 6)]
+        return np.zeros_like(held), held, (3,)
+    is_linear = (
+        (part is None and word == "gravity")
+        or (isinstance(part, LoadPart) and word == part.kind)
+        or any(isinstance(part, kind) and word in words for kind, words in _LINEAR.items())
+    )
+    if not is_linear:
+        return None
+    value = np.array(get_value(copy, word, None) if part is None else get_value(copy, part.name, word), np.float64)
+    if value.size >= most or (isinstance(part, RodPart) and value.ndim > 0):
+        return None
+    name = None if part is None else part.name
+    size = float(np.abs(value).max()) or 1.0
+    set_values(copy, name, {word: value[()]})
+    if not np.array_equal(copy.world.equilibrium_residual(), start):
+        return None  # it sets more than its value, such as stiffnesses that were given after it
+    columns = np.zeros((value.size, len(start)))
+    for column, step in zip(columns, size * np.eye(value.size), strict=True):
+        set_values(copy, name, {word: (value + step.reshape(value.shape))[()]})
+        column[:] = (np.array(copy.world.equilibrium_residual()) - start) / size
+    set_values(copy, name, {word: value[()]})
+    return columns, np.zeros_like(columns), value.shape
 
 
 def _with_frame(value: Any) -> Any:
