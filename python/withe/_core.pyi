@@ -1069,9 +1069,6 @@ class World:
         residual: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
         held: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]: ...
-    def support_directions(
-        self, support: typing.SupportsInt | typing.SupportsIndex
-    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]: ...
     def feed(
         self, support: typing.SupportsInt | typing.SupportsIndex, rate: typing.SupportsFloat | typing.SupportsIndex
     ) -> None: ...
@@ -1205,6 +1202,9 @@ class World:
         Advance exactly `count` time steps.
         """
     def stop_tape(self) -> None: ...
+    def support_directions(
+        self, support: typing.SupportsInt | typing.SupportsIndex
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]: ...
     def support_position(
         self, support: typing.SupportsInt | typing.SupportsIndex
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...
