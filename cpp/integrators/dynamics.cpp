@@ -11,7 +11,6 @@
 #include "integrators/step_parts.hpp"
 #include "steps/elastic_forces.hpp"
 #include "steps/inertia.hpp"
-#include "steps/pressure_gains.hpp"
 
 namespace withe {
 namespace {
@@ -280,8 +279,7 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   work.mean = rate * work.change;
   find_end_velocity(equations, plan, state, work);
   if (euler && options.adaptive)
-    find_pressure_gains(equations.problem(), work.newton.data, equations.assembler(), work.velocity,
-                        work.pressure_gains);
+    find_pressure_gains(equations.problem(), work.newton.data, equations.assembler(), work.velocity, work.pressure);
   const double contact_loss = account(equations, parameters, plan, state, q1, work, result);
   VectorX& acceleration = work.mean;
   acceleration = rate * (work.velocity - state.v);

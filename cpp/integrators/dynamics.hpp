@@ -5,6 +5,7 @@
 #include "integrators/newton.hpp"
 #include "integrators/predictor.hpp"
 #include "integrators/squeezed.hpp"
+#include "steps/pressure_gains.hpp"
 
 namespace withe {
 
@@ -41,7 +42,7 @@ struct StepWorkspace {
   HeldTarget held;
   VectorX z, move, change, working, mean, velocity, held_velocity, held_acceleration, assumed, difference,
       whole_acceleration;
-  VectorX pressure_gains;  ///< per component, of a backward Euler step under `adaptive` [J]
+  PressureGains pressure;  ///< of a backward Euler step under `adaptive`
   Configuration after;
   State from, next;  ///< explicit steps
 };

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "model/edge_vectors.hpp"
+#include "steps/rounding.hpp"
 #include "steps/term.hpp"
 
 namespace withe {
@@ -25,10 +26,10 @@ bool add_turns(const StepProblem& problem, const StepData& data, VectorX& gains)
 }
 
 /// Adds what elastic energies grow by beyond the work of elastic forces at the end.
-void add_elastic_gains(const StepProblem& problem, StepData& data, const Assembler& assembler, VectorX& gains) {
+void add_elastic_gains(const StepProblem& problem, StepData& data, const Assembler& assembler, const VectorX& change,
+                       VectorX& gains) {
   const Model& model = problem.model;
   const ElasticCoefficients& k = problem.elastic;
-  const VectorX change = data.z - problem.start->q;
   Configuration& start = data.end_configuration;
   compute_configuration(model, *problem.start, problem.start->q, start);
   const Configuration& end = data.configuration;
@@ -54,12 +55,13 @@ void add_elastic_gains(const StepProblem& problem, StepData& data, const Assembl
 }  // namespace
 
 void find_pressure_gains(const StepProblem& problem, StepData& data, const Assembler& assembler, const VectorX& v1,
-                         VectorX& gains) {
+                         PressureGains& out) {
   const Model& model = problem.model;
+  auto& [gains, taken, change, momentum] = out;
   gains.setZero(model.component_count);
   if (!add_turns(problem, data, gains)) return;
-  VectorX taken = VectorX::Zero(model.component_count);  // from the motion of what is free, |v1 - v0|^2 / 2
-  VectorX change = v1 - problem.start->v, momentum;
+  taken.setZero(model.component_count);
+  change = v1 - problem.start->v;
   assembler.project(change);
   multiply(model, problem.mass, change, momentum);
   for (int i = 0; i < model.dof_count; ++i) taken[model.dof_component[at(i)]] += 0.5 * change[i] * momentum[i];
@@ -68,7 +70,11 @@ void find_pressure_gains(const StepProblem& problem, StepData& data, const Assem
     return;
   }
   gains = -taken;
-  add_elastic_gains(problem, data, assembler, gains);
+  change = data.z - problem.start->q;
+  add_elastic_gains(problem, data, assembler, change, gains);
+  // Energies round by forces times what positions round by.
+  for (int i = 0; i < model.dof_count; ++i)
+    gains[model.dof_component[at(i)]] -= kRounding * data.rounding.reach * data.magnitude[i];
 }
 
 }  // namespace withe

@@ -10,10 +10,16 @@
 
 namespace withe {
 
-/// What kinetic and elastic energy of each connected component grow by in a backward Euler step to the configuration of
-/// the data, with the velocities v1, beyond the work of the forces at its end [J]: none where it takes energy. Spoils
-/// the configuration at the end of `data`.
+/// What kinetic and elastic energy of each connected component grow by beyond the work of forces [J], and scratch.
+struct PressureGains {
+  VectorX gains;
+  VectorX taken;  ///< from the motion of what is free, |v1 - v0|^2 / 2
+  VectorX change, momentum;
+};
+
+/// Of a backward Euler step to the configuration of the data, with the velocities v1: no gains where it takes energy.
+/// Spoils the configuration at the end of `data`.
 void find_pressure_gains(const StepProblem& problem, StepData& data, const Assembler& assembler, const VectorX& v1,
-                         VectorX& gains);
+                         PressureGains& out);
 
 }  // namespace withe

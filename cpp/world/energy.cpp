@@ -203,7 +203,7 @@ Energy World::Implementation::rod_energy(int rod) const {
 
 /// Whether the backward Euler step just taken added too much to a component, of what that has now.
 bool World::Implementation::gains_under_pressure() {
-  const VectorX& gains = work.pressure_gains;
+  const VectorX& gains = work.pressure.gains;
   if ((gains.array() <= 0.0).all()) return false;
   ComponentEnergies& now = energy_scratch.components;
   find_component_energies(state, now);
