@@ -72,7 +72,7 @@ class PlausibilityWarning(UserWarning):
     - a rod of more than 100 m with a radius below 10 mm,
     - a density below 10 or above 30,000 kg/m^3 under gravity,
     - a Young's modulus below 100 Pa, of a rod that it cannot hold against its weight,
-    - a tendon whose offset is more than 20 radii of its rod, or one that pulls along a centreline,
+    - a tendon whose offset is more than 50 radii of its rod, or one that pulls along a centreline,
     - a rest angle or a roll of more than a full turn that is a multiple of 15, as angles in degrees are,
     - a time step above ten of the slowest periods of the scene, without a fluid or drag,
     - `withe.learning.Task.build` that draws random numbers without `redraw`, so that all robots are equal.

@@ -92,7 +92,7 @@ def test_a_slip_is_warned_of_once_with_the_number_and_what_it_may_be(slip):
         lambda: arm(material(density=1e-3), gravity=0.0),  # next to no mass, on purpose
         lambda: arm(material(youngs_modulus=50.0), length=1e-3, radius=1e-4),  # a scaled model that bears its weight
         lambda: add_tendon((0.0, 0.0)),
-        lambda: add_tendon((0.09, 0.0)),
+        lambda: add_tendon((0.15, 0.0)),  # disks along a thin backbone
         lambda: joint(4.0 * np.pi),
         lambda: turn(40.0 * np.pi),
         lambda: turn(9.0),

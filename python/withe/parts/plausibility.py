@@ -16,7 +16,7 @@ FloatArray = npt.NDArray[np.float64]
 
 _LONGEST = 100.0  # m
 _THIN = 1e-2  # m: radii that are said in mm
-_FARTHEST = 20.0  # offset of a tendon over the radius of its rod
+_FARTHEST = 50.0  # offset of a tendon over the radius of its rod: on disks along a thin backbone some 25, in mm 1000
 _DEGREES = 15.0  # that angles are mostly a whole multiple of, where they are in degrees
 
 
