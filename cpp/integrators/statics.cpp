@@ -250,7 +250,8 @@ class Statics {
     return true;
   }
 
-  /// Pseudo-transient: backward Euler from rest, over and over, with intervals that grow as the scene settles. Each
+  /// Pseudo-transient: backward Euler from rest, over and over, with intervals that grow as the scene settles. They are
+  /// no time: what resists rates does not act, so that equilibria do not depend on viscosity or drag. Each
   /// one minimises the potential plus M |z - q|^2 / (2 h^2), which is convex where the interval begins: Newton's method
   /// is not drawn back to a saddle, nor across it. Mixed Newton keeps slender rods from crawling. Where next to nothing
   /// moves any more, Newton's method without inertia ends it, unless it leads away, as back to a saddle.
@@ -301,7 +302,7 @@ class Statics {
 
   /// An interval of backward Euler from rest, which ends in z; of no length: equilibrium.
   NewtonResult solve_interval(double h, int border, NewtonResult& last) {
-    equations_.begin(state_, parameters_, h > 0.0 ? StepRule::backward_euler : StepRule::statics, h);
+    equations_.begin(state_, parameters_, h > 0.0 ? StepRule::settling : StepRule::statics, h);
     z_ = state_.q;
     NewtonResult r = newton_.solve(
         equations_, z_,

@@ -31,7 +31,7 @@ void Gravity::add_explicit(const StepProblem& problem, StepData& data, const Ass
 }
 
 void Drag::add(const StepProblem& problem, StepData& data, const Assembler& assembler, std::span<double> values) const {
-  if (!problem.parameters->dragged || !problem.moves()) return;
+  if (!problem.parameters->dragged || !problem.resists()) return;
   const int n = problem.model.dof_count;
   const double inverse = 1.0 / problem.interval;
   data.velocity = inverse * (data.z - problem.start->q);
@@ -54,7 +54,7 @@ void Drag::add_adjoint(const StepProblem& problem, const StepData& data, const A
 
 double Drag::dissipated(const StepProblem& problem, const StepData& data, const Assembler&,
                         const VectorX& change) const {
-  return problem.parameters->dragged && problem.moves() ? data.drag_force.dot(change) : 0.0;
+  return problem.parameters->dragged && problem.resists() ? data.drag_force.dot(change) : 0.0;
 }
 
 }  // namespace withe

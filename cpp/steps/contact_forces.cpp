@@ -45,10 +45,11 @@ void add_obstacle(const Model& model, const ContactPair& pair, const int (&dofs)
 ContactForces::ContactForces(const Model& model) : contact_(model) { rows_.set(contact_.surfaces(), contact_.near()); }
 
 void ContactForces::begin(StepProblem& problem) {
-  const Pressing pressing = problem.rule == StepRule::energy_momentum  ? Pressing::mean_direction
-                            : problem.rule == StepRule::midpoint       ? Pressing::mean
-                            : problem.rule == StepRule::backward_euler ? Pressing::end
-                                                                       : Pressing::still;
+  const bool at_end = problem.rule == StepRule::backward_euler || problem.rule == StepRule::settling;
+  const Pressing pressing = problem.rule == StepRule::energy_momentum ? Pressing::mean_direction
+                            : problem.rule == StepRule::midpoint      ? Pressing::mean
+                            : at_end                                  ? Pressing::end
+                                                                      : Pressing::still;
   contact_.begin(*problem.start, *problem.parameters, problem.slip_time, pressing);
 }
 

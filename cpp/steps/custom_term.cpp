@@ -24,7 +24,7 @@ void CustomTerm::find(const StepProblem& problem, StepData& data, Assembler& ass
     return;
   }
   data.velocity = data.z - problem.start->q;
-  data.velocity *= problem.moves() ? 1.0 / problem.interval : 0.0;
+  data.velocity *= problem.resists() ? 1.0 / problem.interval : 0.0;
   CustomForces now = respond(data.z, data.velocity, with_matrix);
   data.custom = applied_forces(problem.model, now.forces, now.moments);
   if (!with_matrix) return;
@@ -53,7 +53,7 @@ void CustomTerm::for_each_derivative(const StepProblem& problem, const Add& add)
         if (entry.value() != 0.0) add(static_cast<int>(entry.row()), column, factor * entry.value());
   };
   visit(found_.by_position, 1.0);
-  if (problem.moves()) visit(found_.by_velocity, 1.0 / problem.interval);
+  if (problem.resists()) visit(found_.by_velocity, 1.0 / problem.interval);
 }
 
 /// Whole nodes are coupled, so that what supports hold can be projected out.

@@ -130,7 +130,7 @@ ResistiveEdge ResistiveForces::edge_of(const StepProblem& problem, const StepDat
 
 void ResistiveForces::add(const StepProblem& problem, StepData& data, const Assembler& assembler,
                           std::span<double> values) const {
-  if (!problem.moves()) return;
+  if (!problem.resists()) return;
   Local local;
   for (int e = 0; e < problem.model.edge_count; ++e) {
     resistive_local(edge_of(problem, data, e), !values.empty(), local);

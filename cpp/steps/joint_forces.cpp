@@ -11,7 +11,7 @@ namespace {
 template <class Scalar>
 Scalar torque_on(const StepProblem& problem, const JointTorque& torque, const JointAngle& joint, const Scalar (&z)[2],
                  const Scalar (&start)[2]) {
-  const double rate = problem.moves() ? 1.0 / problem.interval : 0.0;
+  const double rate = problem.resists() ? 1.0 / problem.interval : 0.0;
   const Scalar angle = joint.sign * (z[0] - z[1]), before = joint.sign * (start[0] - start[1]);
   const Scalar out = torque_of(torque, angle, rate * (angle - before));
   if (!problem.conserves_energy() || joint.against < 0) return out;
@@ -103,7 +103,7 @@ void JointForces::add_adjoint(const StepProblem& problem, const StepData& data, 
 }
 
 void JointForces::add_rounding(const StepProblem& problem, StepData& data) const {
-  const double rate = problem.moves() ? 1.0 / problem.interval : 0.0;
+  const double rate = problem.resists() ? 1.0 / problem.interval : 0.0;
   for (int j = 0; j < table_.count(); ++j) {
     const JointAngle& joint = problem.model.joint_angles[at(j)];
     const JointTorque torque = joint_torque(*problem.parameters, problem.elastic, j);

@@ -26,7 +26,7 @@ SpringStart<double> start_of(const StepProblem& problem, int spring) {
                   : problem.in_middle()      ? SpringRule::middle
                                              : SpringRule::end,
           .d = between(problem.model, problem.start->q, spring),
-          .rate = problem.moves() ? 1.0 / problem.duration() : 0.0};
+          .rate = problem.resists() ? 1.0 / problem.duration() : 0.0};
 }
 
 Vec3d pull(const SpringForce<double>& force) { return force.tension * force.direction; }

@@ -20,8 +20,9 @@
 
 namespace withe {
 
-/// How one step goes from q0 to q1, and so what z is of it. An explicit step evaluates at its end alone.
-enum class StepRule { statics, backward_euler, midpoint, energy_momentum, verlet };
+/// How one step goes from q0 to q1, and so what z is of it. An explicit step evaluates at its end alone. `settling`:
+/// backward Euler on the way to an equilibrium, whose intervals are no time: inertia alone resists.
+enum class StepRule { statics, settling, backward_euler, midpoint, energy_momentum, verlet };
 
 /// Custom forces as the equations take them.
 struct AppliedForces {
@@ -61,7 +62,9 @@ struct StepProblem {
   bool in_middle() const { return rule == StepRule::midpoint || rule == StepRule::energy_momentum; }
   bool conserves_energy() const { return rule == StepRule::energy_momentum; }
   bool moves() const { return interval != 0.0; }
-  bool viscous_acts() const { return parameters->viscous && moves(); }
+  /// Whether resistance to rates acts: viscosity, drag, dampers.
+  bool resists() const { return moves() && rule != StepRule::settling; }
+  bool viscous_acts() const { return parameters->viscous && resists(); }
   /// Of the whole step [s].
   double duration() const { return in_middle() ? 2.0 * interval : interval; }
   /// q1 that goes with z, and by how much it changes with z.

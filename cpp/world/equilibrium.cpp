@@ -42,7 +42,6 @@ Equations& World::Implementation::statics() {
   return *static_equations;
 }
 
-/// Energy-momentum steps, which take over where plain midpoint gains energy.
 namespace {
 
 // A frame may turn by so much from the present state to the next on a path [rad]: rotations do not tell more than half
