@@ -125,8 +125,10 @@ def drift(number: int, integrator: str, time_step: float, seconds: float) -> flo
     simulation = held(number, integrator, time_step)
     first, _, _ = balances(simulation)
     worst = kinetic = 0.0
-    for _ in range(200):
-        simulation.step(round(seconds / time_step) // 200)
+    steps = round(seconds / time_step)
+    looks = min(steps, 200)
+    for _ in range(looks):
+        simulation.step(steps // looks)
         worst = max(worst, abs(balances(simulation)[0] - first))
         kinetic = max(kinetic, simulation.energy().kinetic)
     return worst / kinetic

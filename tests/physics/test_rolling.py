@@ -250,7 +250,7 @@ def test_a_cylinder_rolls_down_a_slope_as_fast_whatever_else_makes_steps_conserv
     """v = 2/3 g sin(a) t, while a rod far away tumbles so that all is stepped by energy-momentum steps."""
     simulation, rod = cylinder(40.0, beside_a_tumbling_rod=True)
     simulation.step(200)
-    assert simulation.statistics.energy_momentum_steps == 200
+    assert simulation.statistics.energy_momentum_steps == simulation.statistics.steps
     speed = 2.0 / 3.0 * G * np.sin(np.radians(40.0)) * simulation.time
     assert simulation.velocities(rod)[:, 0].mean() == pytest.approx(speed, rel=1e-3)
     assert simulation.spins(rod).mean() == pytest.approx(speed / 0.01, rel=1e-3)

@@ -42,6 +42,7 @@ def held(nodes, time_step, youngs_modulus, viscosity):
 
 def lift(simulation):
     """The other gripper takes the free end of what hangs, and lets go."""
+    simulation.equilibrium()
     other = simulation.pin("cable.end")
     simulation.move(other, (0.28, 0.0, 0.02))
     simulation.equilibrium()

@@ -250,7 +250,7 @@ def test_a_sheet_that_slips_in_the_jaw_says_so():
     mat = Paper(1.189, 0.841, 0.15, friction=0.6, thickness=3e-3)
     planned = plan(mat, progress=False)
     weak = SimulatedSheet(mat, **COARSE)
-    with pytest.warns(UserWarning, match=r"the sheet slipped by \d+\.\d mm in the jaw, .* force_limit"):
+    with pytest.warns(UserWarning, match=r"the sheet slipped by \d+\.\d mm in the jaw: .* force_limit"):
         found = weak.fold(planned, progress=False)
     assert found.failure is None
     assert found.slip > 0.02

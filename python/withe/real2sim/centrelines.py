@@ -242,7 +242,7 @@ def rest_shape(
     >>> hanging = scene.build(integrator="static")
     >>> found = withe.real2sim.rest_shape(hanging, arm, [(0, 0, 0), (0.15, 0, -0.03), (0.25, 0, -0.12)], ends=False)
     >>> found.names[0]
-    "natural_curvature of 'arm' at its start"
+    "natural_curvature of 'arm' [0]"
     """
     validation.choice(unknown, "unknown", ("natural_curvature", "points"))
     target = Centrelines([centreline], rod, camera, ends, sigma=sigma)
