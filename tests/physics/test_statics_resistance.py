@@ -1,4 +1,4 @@
-"""What resists motion has no part in an equilibrium, nor in the way there: viscosity, drag, dampers of joints and springs."""
+"""Viscosity, drag and dampers of joints and springs have no part in an equilibrium, nor in the way there."""
 
 import numpy as np
 import pytest
