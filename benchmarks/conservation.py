@@ -135,7 +135,7 @@ def drift(number: int, integrator: str, time_step: float, seconds: float) -> flo
 
 
 def add_held(report: Report, cases: int, seconds: float) -> None:
-    """What robots keep of their energy by the default integrator and by fourth order, whatever the step."""
+    """Report how far the energy of robots drifts by the default integrator and by fourth order, per time step."""
     rows, default = [], inspect.signature(withe.Scene.build).parameters["integrator"].default
     with bar(cases * 6, "robots") as shown:
         for integrator in (default, "fourth_order"):

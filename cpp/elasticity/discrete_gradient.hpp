@@ -88,13 +88,13 @@ DividedMoments<Scalar> divided_moments(const BendMeasure& measure, const Vec3<Sc
   return h;
 }
 
-/// How moments follow from the curvatures v in the directors of either frame and from the twist: factors with
+/// Moments that belong to the curvatures v in the directors of either frame, and to the twist: factors with
 /// sum_i (a_i D v_i(a) + b_i D v_i(b)) + twist D tau = E1 - E0.
 template <class Scalar>
 struct FrameMoments {
   Vec2<Scalar> a, b;
   Scalar twist;
-  /// By curvatures in the first frame at the end and by tau there; where asked for.
+  /// Derivatives by the curvatures in the first frame and by tau at the end of the step; unset without `second_too`.
   Vec2<Scalar> a_by[3], b_by[3];
   Scalar twist_by[3];
 };

@@ -23,7 +23,7 @@ void add_attachment(const StepProblem& problem, const StepData& data, const Asse
   add(discrete.backwards(), problem.start_configuration, problem.start->q);
 }
 
-/// By a half stencil's strain at the start, as the frame turns there and what is attached to it.
+/// Adds derivatives by turns of a half stencil's frame, and of what is attached to it, through the strain at the start.
 void add_start_turns(const StepProblem& problem, int h, const StencilAdjoint& part, const std::array<double, 3>& factor,
                      StepAdjoint& adjoint) {
   const Model& model = problem.model;

@@ -148,7 +148,7 @@ void HandForces::add_adjoint(const StepProblem& problem, const StepData& data, c
   }
 }
 
-/// Of rows^T times what the turn between an edge and what the hand has grasped does to the edge, over an
+/// Adds derivatives of rows^T times the forces on an edge by its turn against the hand's grasp, over an
 /// energy-momentum step. Returns its derivatives by the edge's unknowns at the end.
 std::array<double, kMaxLocal> HandForces::add_discrete_turn_adjoint(const StepProblem& problem, const StepData& data,
                                                                     int element, const double* rows,

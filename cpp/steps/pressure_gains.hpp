@@ -10,15 +10,15 @@
 
 namespace withe {
 
-/// What kinetic and elastic energy of each connected component grow by beyond the work of forces [J], and scratch.
+/// Growth of kinetic and elastic energy beyond the work of forces [J], per connected component, and scratch.
 struct PressureGains {
   VectorX gains;
   VectorX taken;  ///< from the motion of what is free, |v1 - v0|^2 / 2
   VectorX change, momentum;
 };
 
-/// Of a backward Euler step to the configuration of the data, with the velocities v1: no gains where it takes energy.
-/// Spoils the configuration at the end of `data`.
+/// Finds the gains of a backward Euler step to the configuration of the data, with the velocities v1. Gains are zero
+/// where the step takes energy. Overwrites the configuration at the end of `data`.
 void find_pressure_gains(const StepProblem& problem, StepData& data, const Assembler& assembler, const VectorX& v1,
                          PressureGains& out);
 

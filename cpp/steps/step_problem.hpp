@@ -20,8 +20,8 @@
 
 namespace withe {
 
-/// How one step goes from q0 to q1, and so what z is of it. An explicit step evaluates at its end alone. `settling`:
-/// backward Euler on the way to an equilibrium, whose intervals are no time: inertia alone resists.
+/// Rule of one step from q0 to q1, which defines z. An explicit step evaluates at its end alone. `settling` is backward
+/// Euler on the way to an equilibrium: its intervals are not physical time, and inertia alone resists.
 enum class StepRule { statics, settling, backward_euler, midpoint, energy_momentum, verlet };
 
 /// Custom forces as the equations take them.
@@ -62,7 +62,7 @@ struct StepProblem {
   bool in_middle() const { return rule == StepRule::midpoint || rule == StepRule::energy_momentum; }
   bool conserves_energy() const { return rule == StepRule::energy_momentum; }
   bool moves() const { return interval != 0.0; }
-  /// Whether resistance to rates acts: viscosity, drag, dampers.
+  /// True if forces that resist rates act: viscosity, drag, dampers.
   bool resists() const { return moves() && rule != StepRule::settling; }
   bool viscous_acts() const { return parameters->viscous && resists(); }
   /// Of the whole step [s].

@@ -46,7 +46,7 @@ class StencilAdjoint {
   }
   const double (&rows() const)[kMaxLocal] { return rows_; }
 
-  /// By how much a strain has changed, as viscosity takes it.
+  /// Change of a strain that viscosity acts on: over the step, or half of it under the midpoint rules.
   double change(int strain) const {
     return problem_.in_middle() ? 0.5 * (end.strain[strain] - start.strain[strain])
                                 : middle.strain[strain] - start.strain[strain];

@@ -48,7 +48,7 @@ double stretch_energy(const Model& model, const ElasticCoefficients& k, const Co
   return energy;
 }
 
-/// What stays as it is, but for the error of the integrator [J].
+/// Energy balance, which an exact integrator leaves constant [J].
 double balance_of(const Energy& e) { return e.total - e.work + e.dissipated; }
 
 /// Rounding error bound of a balance [J]. What rests has no energy but that of its weight.
