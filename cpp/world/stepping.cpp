@@ -266,8 +266,7 @@ void World::Implementation::commit_step() {
   cut_turn = cut_way = 0.0;
   statistics.steps += 1;
   steps_taken += 1;
-  if (options.integrator != Integrator::verlet && rule_of_step() == StepRule::energy_momentum)
-    statistics.energy_momentum_steps += 1;
+  if (rule_of_step() == StepRule::energy_momentum) statistics.energy_momentum_steps += 1;
   statistics.largest_turn = std::max(statistics.largest_turn, turned);
   retire_ramps();
 }
@@ -386,16 +385,7 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
   return true;
 }
 
-StepRule World::Implementation::rule_of_step() const {
-  switch (options.integrator) {
-    case Integrator::implicit_midpoint:
-      return StepRule::midpoint;
-    case Integrator::backward_euler:
-      return StepRule::backward_euler;
-    default:
-      return StepRule::energy_momentum;
-  }
-}
+StepRule World::Implementation::rule_of_step() const { return equation_options(options).rule; }
 
 StepResult World::Implementation::step_by_rule(double dt, int slot) {
   update_custom_force(*equations);
