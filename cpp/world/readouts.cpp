@@ -115,10 +115,8 @@ double tension(const Model& model, const Parameters& parameters, const Configura
 
 /// Whether axial forces are read out in the middle of the step, where those of a midpoint step are in balance: at its
 /// end an edge that has turned by w within it is longer by w^2 / 8 of its length, which its stiffness makes a force
-/// that has not acted. A part of a fourth-order step is in balance far from where the whole one ends.
-bool World::Implementation::tensions_in_middle() const {
-  return rule_of_step() == StepRule::midpoint && options.integrator != Integrator::fourth_order;
-}
+/// that has not acted.
+bool World::Implementation::tensions_in_middle() const { return rule_of_step() == StepRule::midpoint; }
 
 void World::Implementation::note_tensions() {
   tensions.resize(tensions_in_middle() ? model.edge_count : 0);
