@@ -4,6 +4,7 @@
 
 #include <numeric>
 
+#include "model/edge_vectors.hpp"
 #include "model/state.hpp"
 #include "states.hpp"
 
@@ -430,6 +431,21 @@ TEST(ComputeConfiguration, FollowsTwistOverManyTurns) {
     accept_configuration(model, q, c, state);
   }
   EXPECT_NEAR(c.bend_strain(0, 2), 20.0, 1e-12);
+}
+
+TEST(EdgeVectors, LieInThePlaneOfAPlanarSceneAndTouchNoOtherUnknowns) {
+  const Model model = build_model(flat_arc().scene, true);
+  const State state = initial_state(model);
+  Configuration c;
+  compute_configuration(model, state, state.q, c);
+  for (int e = 0; e < model.edge_count; ++e) {
+    const Vec3d along = (1.0 / c.edge[at(e)].inverse_length) * c.edge[at(e)].tangent;
+    EXPECT_NEAR((to_eigen(edge_vector(model, state.q, e)) - to_eigen(along)).norm(), 0.0, 1e-15);
+    VectorX rows = VectorX::Zero(model.dof_count);
+    add_to_edge(model, e, {1.0, 2.0, 3.0}, rows);
+    EXPECT_EQ(rows.cwiseAbs().sum(), 6.0);
+    EXPECT_EQ(rows(model.head_dof[at(e)] + 1), 2.0);
+  }
 }
 
 }  // namespace
