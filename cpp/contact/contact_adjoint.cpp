@@ -235,7 +235,7 @@ void add_impact(const ContactProblem& problem, const Touching& t, const Rows& ro
   if (find_record(problem.renewed, key) == nullptr && find_record(problem.start->contacts, key) != nullptr)
     out.approach += by_approach;
   else
-    add_approach_slopes(problem, t.pair, by_approach, out.start, out.velocity);
+    add_approach_slopes(problem, t, by_approach, out.start, out.velocity);
 }
 
 }  // namespace

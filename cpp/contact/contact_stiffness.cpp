@@ -379,7 +379,7 @@ void ContactStiffness::renew(ContactSet& start, std::vector<ContactRecord>& reco
     bool drawn = false, struck = false;
     if (const ContactRecord* known = find_record(problem_.start->contacts, t.pair.key, at_start)) {
       struck = known->approach == 0.0;
-      if (struck && !is_struck(t.pair)) continue;  // they rest until they have left each other
+      if (struck && !is_struck(t)) continue;  // they rest until they have left each other
       record = *known;
     } else {
       record.key = t.pair.key;
@@ -422,6 +422,8 @@ bool ContactStiffness::begins_anew(const Touching& t, bool struck, ContactRecord
     speed = std::max(speed, least_approach(problem_, pair));
   } else {
     const bool again = t.apart() && t.age > 0.0 && speed > 0.0;
+    // What went off, or was at rest, as the step began in which it met, may have turned round in that step already.
+    if (!struck) speed = std::abs(nearing(problem_, pair));
     if (!again && speed <= t.approach) return false;
   }
   record.approach = speed;
@@ -437,9 +439,13 @@ bool ContactStiffness::begins_anew(const Touching& t, bool struck, ContactRecord
   return true;
 }
 
-/// Whether the obstacle that a rod rests on jumps to a velocity at which it strikes the rod, which then parts by its
-/// restitution. What is elastic it sends off in any case.
-bool ContactStiffness::is_struck(const ContactPair& pair) const {
+/// Whether surfaces that rest strike each other: they have come apart, within the tolerance, and meet again; or the
+/// obstacle that a rod rests on jumps to a velocity at which it strikes the rod, which then parts by its restitution.
+/// What is elastic it sends off in any case.
+bool ContactStiffness::is_struck(const Touching& t) const {
+  const ContactPair& pair = t.pair;
+  if (t.apart() && (problem_.pressing >= Pressing::mean || pair.restitution < 1.0))
+    return approach_speed(problem_, pair) > rest_speed(problem_, pair);
   if (pair.key.b >= 0 || problem_.velocity.empty() || pair.restitution >= 1.0) return false;
   const Vec3d jump = problem_.velocity_of(pair) - problem_.start->obstacles[at(-1 - pair.key.b)].velocity;
   const double rest = rest_speed(problem_, pair);

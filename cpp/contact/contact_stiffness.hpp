@@ -59,7 +59,7 @@ class ContactStiffness {
  private:
   bool begins_at_rest(const Touching& t, ContactRecord& record) const;
   bool begins_anew(const Touching& t, bool struck, ContactRecord& record) const;
-  bool is_struck(const ContactPair& pair) const;
+  bool is_struck(const Touching& t) const;
   /// Whether it is near enough to press, and not there for its friction of the start alone.
   bool presses(const Touching& t) const;
   ContactRecord record(const Touching& t) const;

@@ -47,15 +47,25 @@ double smooth_slope(double x) { return x > 0.0 && x < 1.0 ? 6.0 * x * (1.0 - x) 
 /// turns round nothing of the speed is lost, which is the more the less is to be left.
 double steps_in_swing(double restitution) { return std::clamp(10.0 / std::max(restitution, 1e-3), 12.0, 40.0); }
 
-/// 1 for surfaces that have just met, 0 for those that rest on each other: of an impact that is over after so many
-/// swings.
-double share_within(const ContactProblem& problem, const Touching& t, double swings) {
+/// 1 for surfaces that have just met at a speed, 0 for those that rest on each other: of an impact that is over after
+/// so many swings.
+double share_within(const ContactProblem& problem, const Touching& t, double speed, double swings) {
   if (!(t.approach > 0.0)) return 0.0;
   const double over = swings * swing_time(problem, t) + kSteps * problem.duration;
-  return smooth_step(t.approach / rest_speed(problem, t.pair) - 1.0) * smooth_step(2.0 - t.age / over);
+  return smooth_step(speed / rest_speed(problem, t.pair) - 1.0) * smooth_step(2.0 - t.age / over);
 }
 
-double impact_share(const ContactProblem& problem, const Touching& t) { return share_within(problem, t, kSwings); }
+/// Mean speed in the step of surfaces on their way in, which may have rested, or gone off, as the step began; 0 of
+/// others [m/s].
+double speed_in_step(const ContactProblem& problem, const Touching& t) {
+  if (!(t.approach > 0.0) || t.age > 0.0 || problem.pressing < Pressing::mean) return 0.0;
+  return (start_distance(problem, t.pair) - t.proximity.distance) / problem.duration;
+}
+
+/// At which surfaces have met, by the end of the step.
+double speed_of_impact(const ContactProblem& problem, const Touching& t) {
+  return std::max(t.approach, speed_in_step(problem, t));
+}
 
 /// Whether the step begins with contacts of the same bodies.
 bool touches_already(const ContactProblem& problem, const ContactPair& pair) {
@@ -91,7 +101,7 @@ bool rolls(const ContactProblem& problem, const Touching& t) {
 /// What presses elastically in a step: 1 of surfaces that have just met, and where a rod rolls; 0 of those that rest on
 /// each other.
 double elastic_share(const ContactProblem& problem, const Touching& t) {
-  const double share = impact_share(problem, t);
+  const double share = share_within(problem, t, speed_of_impact(problem, t), kSwings);
   return share < 1.0 && problem.pressing >= Pressing::mean && rolls(problem, t) ? 1.0 : share;
 }
 
@@ -132,7 +142,8 @@ double swing_time(const ContactProblem& problem, const Touching& t) {
 }
 
 bool impact_lasts(const ContactProblem& problem, const Touching& t) {
-  return elastic_share(problem, t) > 0.0 || (t.pair.restitution < 1.0 && share_within(problem, t, kSwingsOut) > 0.0);
+  return elastic_share(problem, t) > 0.0 ||
+         (t.pair.restitution < 1.0 && share_within(problem, t, t.approach, kSwingsOut) > 0.0);
 }
 
 ElasticShareSlopes elastic_share_slopes(const ContactProblem& problem, const Touching& t) {
@@ -140,10 +151,10 @@ ElasticShareSlopes elastic_share_slopes(const ContactProblem& problem, const Tou
   if (!(t.approach > 0.0) || elastic_share(problem, t) == 1.0) return out;
   const double rest = rest_speed(problem, t.pair), swing = swing_time(problem, t),
                over = kSwings * swing + kSteps * problem.duration;
-  const double fast = t.approach / rest - 1.0, fresh = 2.0 - t.age / over;
+  const double speed = speed_of_impact(problem, t), fast = speed / rest - 1.0, fresh = 2.0 - t.age / over;
   const double by_fast = smooth_slope(fast) * smooth_step(fresh), by_fresh = smooth_step(fast) * smooth_slope(fresh);
-  out.approach = by_fast / rest;
-  const double by_rest = -by_fast * t.approach / (rest * rest);
+  (speed > t.approach ? out.way : out.approach) = by_fast / (speed > t.approach ? rest * problem.duration : rest);
+  const double by_rest = -by_fast * speed / (rest * rest);
   if (rest > problem.parameters->slip_tolerance)
     out.gravity = 0.5 * by_rest * rest / problem.parameters->gravity;
   else
@@ -165,10 +176,10 @@ double first_approach(const ContactProblem& problem, const ContactPair& pair) {
   return std::max(approach_speed(problem, pair), least_approach(problem, pair));
 }
 
-double approach_speed(const ContactProblem& problem, const ContactPair& pair) {
+double nearing(const ContactProblem& problem, const ContactPair& pair) {
   if (pair.curve()) {
     const CurveSlopes slopes = curve_slopes(pair.piece, problem.curve_at_start(pair));
-    return std::max(0.0, -curve_rate(problem, pair, slopes.distance));
+    return -curve_rate(problem, pair, slopes.distance);
   }
   Vec3d x[4], v[4];
   problem.bodies.end_points(pair, problem.start->v, v);
@@ -178,12 +189,15 @@ double approach_speed(const ContactProblem& problem, const ContactPair& pair) {
   end_weights(c.s, c.t, w);
   Vec3d rate{};
   for (int i = 0; i < 4; ++i) rate += w[i] * v[i];
-  return std::max(0.0, -dot(c.between, rate) / std::sqrt(std::max(dot(c.between, c.between), 1e-300)));
+  return -dot(c.between, rate) / std::sqrt(std::max(dot(c.between, c.between), 1e-300));
 }
 
-void add_approach_slopes(const ContactProblem& problem, const ContactPair& pair, double by,
+void add_approach_slopes(const ContactProblem& problem, const Touching& touching, double by,
                          double (&start)[kContactUnknowns], double (&velocity)[kContactUnknowns]) {
-  if (by == 0.0 || !(approach_speed(problem, pair) > 0.0)) return;
+  const ContactPair& pair = touching.pair;
+  const double near = nearing(problem, pair);
+  if (std::abs(near) != touching.approach) return;  // it is the least
+  if (near < 0.0) by = -by;
   Vec3d x[4], v[4];
   problem.bodies.end_points(pair, problem.start->v, v);
   const Vec3d moved = problem.velocity_of(pair);
@@ -228,12 +242,16 @@ void set_pressing(const ContactProblem& problem, Touching& t) {
   t.pressing = {t.energy.first, t.energy.second, 0.0};
   if (problem.pressing == Pressing::still) return;
   const double share = elastic_share(problem, t);
-  const double lost =
-      pair.restitution < 1.0 ? (1.0 - pair.restitution * pair.restitution) * share_within(problem, t, kSwingsOut) : 0.0;
+  const double lost = pair.restitution < 1.0 ? (1.0 - pair.restitution * pair.restitution) *
+                                                   share_within(problem, t, t.approach, kSwingsOut)
+                                             : 0.0;
   if (share == 0.0 && lost == 0.0) return;
   // Friction that goes with the force k E'(D0) asks for the same force at the end of the step before.
   const bool lags = problem.lags() && pair.friction > 0.0;
-  if (problem.pressing >= Pressing::mean && !lags) t.law.elastic = share;
+  if (problem.pressing >= Pressing::mean && !lags) {
+    t.law.elastic = share;
+    t.law.elastic_by_way = elastic_share_slopes(problem, t).way;
+  }
   t.law.restitution = std::sqrt(1.0 - lost);
   t.law.parting = kParting * std::max(t.law.restitution, kLeastParting) * t.approach * problem.duration;
   if (t.law.elastic == 0.0 && !(t.law.restitution < 1.0)) return;

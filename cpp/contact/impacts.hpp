@@ -1,6 +1,8 @@
 #pragma once
 /// Impacts: at which speed surfaces meet, how long they count as having just met, and what of them presses elastically.
 
+#include <algorithm>
+
 #include "contact/contact_problem.hpp"
 
 namespace withe {
@@ -12,8 +14,11 @@ double rest_speed(const ContactProblem& problem, const ContactPair& pair);
 double least_approach(const ContactProblem& problem, const ContactPair& pair);
 /// Of centrelines as the step begins [m].
 double start_distance(const ContactProblem& problem, const ContactPair& pair);
-/// At which surfaces near each other as the step begins [m/s].
-double approach_speed(const ContactProblem& problem, const ContactPair& pair);
+/// Rate at which surfaces near each other as the step begins; below zero where they part [m/s].
+double nearing(const ContactProblem& problem, const ContactPair& pair);
+inline double approach_speed(const ContactProblem& problem, const ContactPair& pair) {
+  return std::max(0.0, nearing(problem, pair));
+}
 /// Whether an impact is still on its way in at the end of a step: it has not pressed surfaces together yet, nor turned
 /// them round within the tolerance, where what is light enough rests.
 bool comes_near(const ContactProblem& problem, const Touching& t);
@@ -27,15 +32,16 @@ double swing_time(const ContactProblem& problem, const Touching& t);
 bool impact_lasts(const ContactProblem& problem, const Touching& t);
 /// Derivatives of how much presses elastically in a step, `PressingLaw::elastic`.
 struct ElasticShareSlopes {
-  double approach = 0;        ///< by the speed at which they met [s/m]
+  double approach = 0;        ///< by the speed of approach as the step begins [s/m]
+  double way = 0;             ///< by how much nearer surfaces come in the step [1/m]
   double slip_tolerance = 0;  ///< [s/m]
   double gravity = 0;         ///< by its size [s^2/m]
   double mass = 0;            ///< by what the contact holds up [1/kg]
 };
 ElasticShareSlopes elastic_share_slopes(const ContactProblem& problem, const Touching& t);
-/// Adds `by` times the derivatives of the approach speed by unknowns of a contact as the step begins, and by their
-/// rates.
-void add_approach_slopes(const ContactProblem& problem, const ContactPair& pair, double by,
+/// Adds `by` times the derivatives of the speed of approach that a contact has from the start of the step, by its
+/// unknowns there and by their rates.
+void add_approach_slopes(const ContactProblem& problem, const Touching& touching, double by,
                          double (&start)[kContactUnknowns], double (&velocity)[kContactUnknowns]);
 /// Whether a step of dt would be too long for where surfaces that meet push each other, or for what an impact loses by
 /// its restitution.

@@ -27,6 +27,7 @@ struct PressingLaw {
   double stiffness = 0;             ///< [N/m]
   double yielded = 0;               ///< [m]
   double elastic = 0;               ///< a [-]
+  double elastic_by_way = 0;        ///< its derivative by D0 - D1 [1/m]
   double restitution = 1;           ///< e [-]
   double parting = 0;               ///< way by which surfaces part in a step from which on e counts whole [m]
 
@@ -38,8 +39,9 @@ struct PressingLaw {
     PressingForce f{e.first, e.second, 0.0};
     if (elastic > 0.0) {
       const PressingForce mean = quotient(start, end, e);
-      const double rest = 1.0 - elastic;
-      f = {rest * f.first + elastic * mean.first, rest * f.by_end + elastic * mean.by_end, elastic * mean.by_start};
+      const double rest = 1.0 - elastic, by_way = elastic_by_way * (mean.first - f.first);
+      f = {rest * f.first + elastic * mean.first, rest * f.by_end + elastic * mean.by_end - by_way,
+           elastic * mean.by_start + by_way};
     }
     if (restitution < 1.0 && parting > 0.0) {
       const double u = std::clamp((end - start) / parting, 0.0, 1.0), lost = 1.0 - restitution * restitution;

@@ -149,3 +149,39 @@ def test_rods_that_meet_off_centre_part_along_the_line_of_their_centres(
     assert angle == pytest.approx(np.degrees(np.arcsin(off)), abs=2.5)
     assert np.linalg.norm(velocity) == pytest.approx(speed * np.sqrt(1.0 - off**2), abs=0.04 * speed)
     assert simulation.energy().total == pytest.approx(energy, rel=2e-3)
+
+
+def boxed(number: int, time_step: float, **contact: float) -> tuple[withe.Simulation, float]:
+    """A drawn rod that flies and turns in a drawn box without friction or gravity, and its energy [J]."""
+    random = np.random.default_rng([60, number])
+    scene, size = withe.Scene(gravity=(0, 0, 0)), random.uniform(0.1, 0.2, 3)
+    half = random.normal(size=3)
+    half *= 0.05 / np.linalg.norm(half)
+    material = withe.Material(youngs_modulus=10.0 ** random.uniform(6.0, 8.0), density=1000.0)
+    rod = scene.add_rod(
+        start=-half, end=half, nodes=int(random.integers(2, 12)), radius=random.uniform(2e-3, 6e-3), material=material
+    )
+    for normal in np.vstack([np.eye(3), -np.eye(3)]):
+        scene.add_plane(-size * normal, normal)
+    scene.enable_contact(**contact)
+    simulation = scene.build(time_step=time_step)
+    simulation.set_velocities(rod, random.normal(size=3))
+    return simulation, simulation.energy().total
+
+
+@pytest.mark.filterwarnings("ignore::withe.CoarseStepWarning")
+@pytest.mark.parametrize("contact", [{}, {"stiffness": 3e3}], ids=["", "stiffness"])
+@pytest.mark.parametrize("time_step", [5e-3, 1e-3])
+def test_elastic_rods_in_boxes_keep_their_energy_at_any_step(time_step: float, contact: dict[str, float]) -> None:
+    """Also where a rod turns or bends onto a wall in a step that it began on its way off.
+
+    In one box of a hundred a coarse step loses some percent: the curve of a rod turns on the wall so that no mean of
+    its directions at both ends does the work that contact gives.
+    """
+    lost = []
+    for number in range(12):
+        simulation, energy = boxed(number, time_step, **contact)
+        simulation.run(2.0, progress=False)
+        lost.append(abs(simulation.energy().dissipated) / energy)
+    assert sorted(lost)[-3] < 0.01
+    assert max(lost) < 0.05

@@ -259,9 +259,9 @@ class Contacts:
         -----
         Impacts are elastic by default. In implicit midpoint and energy-momentum steps the force of a step does as much
         work as contact stores [Gonzalez 1996; Laursen and Chawla 1997], so that they are elastic at any time step,
-        those of rods mostly to a thousandth, and steps are cut where two bodies that meet would pass around each other
-        within one; and rods that slide over each other are braked by friction alone. Backward Euler,
-        and "lagged" and "semi_explicit" friction, lose most of an impact shorter than a few steps, and nothing in the
+        those of rods mostly to a thousandth; seldom, once in some hundred impacts, a coarse step takes some percent. Steps
+        are cut where two bodies that meet would pass around each other within one; and rods that slide over each other
+        are braked by friction alone. Backward Euler, and "lagged" and "semi_explicit" friction, lose most of an impact shorter than a few steps, and nothing in the
         limit of short ones. A restitution e below 1 is the energetic coefficient: contact gives back e^2 of the work
         that pressed it together [Stronge 1990, Proc. R. Soc. A 431]; steps are cut until an impact is resolved, which
         takes hundreds of times as many where rods come to rest on balls and posts, unless ``adaptive=False`` or
