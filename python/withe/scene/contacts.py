@@ -259,20 +259,21 @@ class Contacts:
         -----
         Impacts are elastic by default. In implicit midpoint and energy-momentum steps the force of a step does as much
         work as contact stores [Gonzalez 1996; Laursen and Chawla 1997], so that they are elastic at any time step,
-        those of rods mostly to a thousandth; seldom, once in some hundred impacts, a coarse step takes some percent. Steps
-        are cut where two bodies that meet would pass around each other within one; and rods that slide over each other
-        are braked by friction alone. Backward Euler, and "lagged" and "semi_explicit" friction, lose most of an impact shorter than a few steps, and nothing in the
-        limit of short ones. A restitution e below 1 is the energetic coefficient: contact gives back e^2 of the work
-        that pressed it together [Stronge 1990, Proc. R. Soc. A 431]; steps are cut until an impact is resolved, which
-        takes hundreds of times as many where rods come to rest on balls and posts, unless ``adaptive=False`` or
-        `max_halvings` of `build` ends that. Weight works over the depth p too, v1^2 = e^2 v0^2 - (1 - e^2) 2 g p, which
-        is no longer e v0 for falls of some depths only. Rods shake within after an impact, so that as a whole they part
-        more slowly than e says. Surfaces that meet more slowly than sqrt(g r / 100), r the smaller radius, or than the
-        slip tolerance, rest on each other, and so do those that stay in contact for longer than an impact lasts. What
-        contact takes for good is part of `Simulation.energy().dissipated`, and what it stores is `.contact`.
-        Contact and friction between rods in flight keep their momenta in implicit midpoint and energy-momentum steps;
-        "lagged" and "semi_explicit" friction, which act where a step begins, keep the linear one, and the angular one
-        at first order in the step: to some thousandths in an impact of rods that cross, in steps of 2 ms.
+        those of rods mostly to a thousandth; seldom, once in some hundred impacts, a coarse step takes some percent.
+        Steps are cut where two bodies that meet would pass around each other within one; and rods that slide over each
+        other are braked by friction alone. Backward Euler, and "lagged" and "semi_explicit" friction, lose most of an
+        impact shorter than a few steps, and nothing in the limit of short ones. A restitution e below 1 is the
+        energetic coefficient: contact gives back e^2 of the work that pressed it together [Stronge 1990, Proc. R. Soc.
+        A 431]; steps are cut until an impact is resolved, which takes hundreds of times as many where rods come to rest
+        on balls and posts, unless ``adaptive=False`` or `max_halvings` of `build` ends that. Weight works over the
+        depth p too, v1^2 = e^2 v0^2 - (1 - e^2) 2 g p, which is no longer e v0 for falls of some depths only. Rods
+        shake within after an impact, so that as a whole they part more slowly than e says. Surfaces that meet more
+        slowly than sqrt(g r / 100), r the smaller radius, or than the slip tolerance, rest on each other, and so do
+        those that stay in contact for longer than an impact lasts. What contact takes for good is part of
+        `Simulation.energy().dissipated`, and what it stores is `.contact`. Contact and friction between rods in flight
+        keep their momenta in implicit midpoint and energy-momentum steps; "lagged" and "semi_explicit" friction, which
+        act where a step begins, keep the linear one, and the angular one at first order in the step: to some
+        thousandths in an impact of rods that cross, in steps of 2 ms.
 
         Examples
         --------
