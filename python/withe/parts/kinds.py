@@ -101,6 +101,7 @@ class RodPart:
     parameters: RodParameters
     natural_curvature: FloatArray  # (stencils, 2) [1/m]
     natural_twist: FloatArray  # (stencils,) [rad/m]
+    in_balance: bool = False  # whether its natural shape is to be found by which it is in balance as drawn
     drawing: Drawing | None = None  # None: its nodes were found, or its curvature depends on them otherwise
 
     @property

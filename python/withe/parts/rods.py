@@ -19,7 +19,7 @@ from withe.parts.sections import Circle, Section, SectionProperties, check_secti
 __all__ = ["Natural", "curvature_array", "curvature_given", "make_rod", "redrawn", "stretch_array", "twist_array"]
 
 FloatArray = npt.NDArray[np.float64]
-Natural = Literal["as_built", "straight"]
+Natural = Literal["as_built", "straight", "in_balance"]
 
 _MAX_NODES = 10_000_000
 _THICKEST = 10.0  # radius over length; stubs to which others are joined are thicker than long
@@ -69,7 +69,10 @@ def make_rod(
     parameters = _parameters(material, stiffness, line_density, properties, owner)
 
     validation.choice(natural, f"natural of {owner}", get_args(Natural))
-    as_built = natural == "as_built"
+    in_balance = natural == "in_balance"
+    if in_balance and (natural_curvature is not None or natural_twist is not None):
+        raise ValueError(f"natural='in_balance' finds the natural curvature and twist of {owner}: give neither")
+    as_built = natural != "straight"
     arcs = lengths
     if spacing is not None and as_built and natural_curvature is None:
         arcs = np.maximum(lengths, spacing)
@@ -85,7 +88,7 @@ def make_rod(
     if natural_twist is not None:
         twist = twist_array(natural_twist, voronoi, owner)
     as_drawn = None
-    if spacing is None and not (discrete and natural_curvature is not None):
+    if spacing is None and not in_balance and not (discrete and natural_curvature is not None):
         given = None if normal is None else np.array(normal, float)
         as_drawn = Drawing(given, as_built and natural_curvature is None, as_built and natural_twist is None)
     return RodPart(
@@ -104,6 +107,7 @@ def make_rod(
         parameters=parameters,
         natural_curvature=curvature,
         natural_twist=twist,
+        in_balance=in_balance,
     )
 
 

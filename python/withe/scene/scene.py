@@ -141,8 +141,9 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
             Stiffnesses instead of a material, with `line_density`.
         line_density : float or array_like of shape (edges,) [kg/m]
             Mass per length.
-        natural : {"as_built", "straight"}
-            Shape that is free of stress: the one drawn, or straight.
+        natural : {"as_built", "straight", "in_balance"}
+            Shape that is free of stress: the one drawn, or straight, or that with which the rod hangs as it is drawn,
+            under its weight and what loads, tendons and joints do as the scene is built.
         natural_curvature : array_like of shape (2,) or (stencils, 2) [1/m]
             Stress-free curvature towards d1 and d2 instead, that of the smooth rod.
         natural_twist : float or array_like of shape (stencils,) [rad/m]

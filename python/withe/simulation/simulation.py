@@ -21,6 +21,7 @@ from withe.parts.options import BuildOptions
 from withe.recording.record import Record
 from withe.recording.recorder import present
 from withe.simulation.control import Control
+from withe.simulation.in_balance import find_balance
 from withe.simulation.linearisation import Linearisation
 from withe.simulation.loads import RunningLoads
 from withe.simulation.loop import Run
@@ -77,7 +78,10 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
     @classmethod
     def _build(cls, directory: Directory, gravity: FloatArray, options: BuildOptions) -> Simulation:
         """A simulation of a directory that nobody else changes."""
+        in_balance = find_balance(directory, gravity, options)
         session = Session.begin(directory, gravity, options)
+        for rod, stretch in in_balance:
+            session.world.set_natural_stretch(rod, stretch, 0.0)
         find_friction_fields(session)
         stepping = Stepping(session)
         check_scene(stepping)
