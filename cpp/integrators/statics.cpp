@@ -30,8 +30,12 @@ constexpr double kSingular = 1e9;
 constexpr double kShortest = 1.0 / 64.0;
 // Where no edge turns, the path ends after so many cuts.
 constexpr int kMostCuts = 6, kMostCutsOfFriction = 12;
-// After so many iterations a point of the path is given up, but for those of the border of slip.
-constexpr int kMostIterations = 25;
+// Most iterations for a point of the path or an interval, beyond those of the border of slip. Where surfaces rub,
+// Newton's method may wander before it converges: rounding errors grow by some factor each iteration, and after 25 to
+// 40 of them decide where it ends.
+constexpr int kMostIterations = 16;
+// Corrections of a point that a ring may spoil: its rod sticks, slips, or slips the other way.
+constexpr int kKinks = 2;
 // A path has no more points than this: what a scene is torn along by a support that goes a thousand lengths away is
 // found by settling there.
 constexpr int kMostPoints = 1000;
@@ -147,10 +151,7 @@ class Statics {
     return true;
   }
 
-  int most_iterations() const {
-    const int most = options_.max_iterations;
-    return equations_.has_potential() ? std::min(kMostIterations, most) : most;
-  }
+  int most_iterations() const { return std::min(kMostIterations, options_.max_iterations); }
 
   /// Where Coulomb's friction holds a limp rod, the border of what slips goes on by a contact an iteration, and the
   /// solution follows when it has arrived: so many iterations are no sign that there is none.
@@ -186,15 +187,15 @@ class Statics {
   /// The point of the path at the factor `next`, predicted along the tangent.
   bool reach(double next, double increment, NewtonResult& last) {
     path_.go_to(next);
-    // Where surfaces meet, and where rods go through rings, corrections shrink less than on smooth paths.
-    const bool touching = (equations_.contact() && equations_.contact()->count() > 0) ||
-                          (equations_.hands() && equations_.hands()->rings().count() > 0);
-    Prediction prediction{.length = 0.0, .strict = !touching};
+    // Where surfaces meet, corrections shrink less than on smooth paths; rings have kinks.
+    const bool touching = equations_.contact() && equations_.contact()->count() > 0;
+    const int rings = equations_.hands() ? equations_.hands()->rings().count() : 0;
+    Prediction prediction{.length = 0.0, .strict = !touching, .kinks = kKinks * rings};
     bool predicted = tangent_.found;
     if (predicted) {
       step_ = increment * tangent_.rate;
       prediction.length = newton_.norms().displacement(step_);
-      if (next < 1.0 && !touching) prediction.enough = kOnTheWay * equations_.model().length_scale;
+      if (next < 1.0 && !touching && rings == 0) prediction.enough = kOnTheWay * equations_.model().length_scale;
       // Axial forces by the linear solution: those of the prediction are of edges that stretch as they turn.
       equations_.evaluate(state_.q, false, nullptr, work_.data);
       predict_axial_force(equations_.problem(), work_.data, step_, work_.axial_force);
