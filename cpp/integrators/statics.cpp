@@ -57,7 +57,7 @@ constexpr double kAlike = 1e-6;
 class Statics {
  public:
   Statics(Equations& equations, const Newton& newton, const Options& options, Parameters& parameters,
-          const NaturalShape* before, const Boundary& boundary, State& state, NewtonWorkspace& work)
+          const Actuation* before, const Boundary& boundary, State& state, NewtonWorkspace& work)
       : equations_(equations),
         newton_(newton),
         options_(options),
@@ -445,7 +445,7 @@ class Statics {
 }  // namespace
 
 StaticResult find_equilibrium(Equations& equations, const Newton& newton, const Options& options,
-                              Parameters& parameters, const NaturalShape* before, const Boundary& boundary,
+                              Parameters& parameters, const Actuation* before, const Boundary& boundary,
                               State& state, NewtonWorkspace& work) {
   return Statics(equations, newton, options, parameters, before, boundary, state, work).run();
 }

@@ -174,12 +174,12 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   const Lagged lagged_before = lagged();
   const MatrixX3 loads = parameters.loads;
   const double time = state.time + dt;
-  const bool reshaped_before = reshaped;
+  const bool actuation_changed_before = actuation_changed;
   if (actuated()) {
-    note_shape();
+    note_actuation();
     apply_ramps(time, configuration(), actuation_work);
   }
-  const NaturalShape shape = reshaped ? natural_shape(parameters) : NaturalShape{};
+  const Actuation wanted = actuation_changed ? actuation_of(parameters) : Actuation{};
   aim_supports(time);
   Equations& system = statics();
   update_custom_force(system);
@@ -189,9 +189,9 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
     release_obstacles(system);
     release_hands(system);
     static_cast<Moving&>(*this) = before;
-    if (reshaped) set_natural_between(model, shape, shape, 1.0, parameters);
+    if (actuation_changed) set_actuation_between(model, wanted, wanted, 1.0, parameters);
     apply_ramps(state.time);
-    reshaped = reshaped_before;
+    actuation_changed = actuation_changed_before;
     parameters.loads = loads;
     recall(lagged_before);  // and no more of `system`, which this may drop
   };
@@ -210,7 +210,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
     if (drifts(system))
       newton->balance(work.newton.data, r.newton);
     else
-      r = find_equilibrium(system, *newton, options, parameters, reshaped ? &shape_before : nullptr, boundary, state,
+      r = find_equilibrium(system, *newton, options, parameters, actuation_changed ? &actuation_before : nullptr, boundary, state,
                            work.newton);
     for (SupportMotion& m : target) m.roll.setZero();
     from = target;

@@ -116,7 +116,7 @@ struct World::Implementation : Running {
   Model model_of_active(Rebuild why);
   void drop_scratch();
   void begin_as_drawn();
-  void note_drawn_shape();
+  void note_drawn_actuation();
   void carry_over(const Model& old, Rebuild why);
   void keep_moments(const Model& old, const ElasticCoefficients& before);
   void make_plan();
@@ -161,7 +161,7 @@ struct World::Implementation : Running {
   void apply_ramps(double time, const Configuration& c, double& work);
   const Configuration& configuration() const;
   void retire_ramps();
-  void note_shape();
+  void note_actuation();
   bool actuated() const;
   bool turns_rods() const;
   void aim_supports(double time);

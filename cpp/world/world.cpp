@@ -364,7 +364,7 @@ void World::Implementation::set(std::span<const ParameterSetting> settings) {
     const bool curvature = setting.kind == ParameterKind::natural_curvature,
                twist = setting.kind == ParameterKind::natural_twist,
                stretch = setting.kind == ParameterKind::natural_stretch;
-    if (curvature || twist || stretch) note_shape();
+    if (curvature || twist || stretch || setting.kind == ParameterKind::tendon_tension) note_actuation();
     if (curvature) ramps[at(setting.rod)].curvature.active = false;
     if (twist) ramps[at(setting.rod)].twist.active = false;
     if (stretch) ramps[at(setting.rod)].stretch.active = false;
