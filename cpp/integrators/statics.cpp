@@ -57,11 +57,12 @@ constexpr double kAlike = 1e-6;
 class Statics {
  public:
   Statics(Equations& equations, const Newton& newton, const Options& options, Parameters& parameters,
-          const Actuation* before, const Boundary& boundary, State& state, NewtonWorkspace& work)
+          const Actuation* before, const Boundary& boundary, Saddles saddles, State& state, NewtonWorkspace& work)
       : equations_(equations),
         newton_(newton),
         options_(options),
         parameters_(parameters),
+        leaves_saddles_(saddles == Saddles::leave),
         state_(state),
         work_(work),
         path_(equations, newton, parameters, boundary, growing(equations, parameters, state, work, before), state,
@@ -82,7 +83,7 @@ class Statics {
     }
     if (!result.converged) return result;
     result.stable = stable(1.0);
-    for (int tries = 0; tries < 4 && !result.stable && equations_.has_potential_here(); ++tries) {
+    for (int tries = 0; leaves_saddles_ && tries < 4 && !result.stable && equations_.has_potential_here(); ++tries) {
       result.branch_changed = true;
       leave_saddle(1.0, tries);
       result.converged = settle(1.0, result) || (equations_.has_potential() && descend(1000, result.newton));
@@ -109,11 +110,11 @@ class Statics {
         path_.go_to(reached);
         path_.find_tangent(tangent_);
         ++last.iterations;
-        if (points == 1 && falls()) {
+        if (points == 1 && leaves_saddles_ && falls()) {
           if (!let_fall(reached, result)) return false;
           continue;
         }
-        if (reached > 0.0 && !firm()) {
+        if (leaves_saddles_ && reached > 0.0 && !firm()) {
           // A branch that was stable and is so no more is left where that happens.
           if (was_stable && equations_.has_potential() && !stable(reached)) {
             result.branch_changed = true;
@@ -431,6 +432,7 @@ class Statics {
   const Newton& newton_;
   const Options& options_;
   Parameters& parameters_;
+  bool leaves_saddles_;
   State& state_;
   NewtonWorkspace& work_;
   double energy_scale_ = 0.0;  ///< greatest potential met [J]
@@ -446,8 +448,8 @@ class Statics {
 
 StaticResult find_equilibrium(Equations& equations, const Newton& newton, const Options& options,
                               Parameters& parameters, const Actuation* before, const Boundary& boundary,
-                              State& state, NewtonWorkspace& work) {
-  return Statics(equations, newton, options, parameters, before, boundary, state, work).run();
+                              Saddles saddles, State& state, NewtonWorkspace& work) {
+  return Statics(equations, newton, options, parameters, before, boundary, saddles, state, work).run();
 }
 
 }  // namespace withe

@@ -21,6 +21,6 @@ struct StaticResult {
 /// state came with, if it has changed since.
 StaticResult find_equilibrium(Equations& equations, const Newton& newton, const Options& options,
                               Parameters& parameters, const Actuation* before, const Boundary& boundary,
-                              State& state, NewtonWorkspace& work);
+                              Saddles saddles, State& state, NewtonWorkspace& work);
 
 }  // namespace withe

@@ -138,11 +138,12 @@ bool World::Implementation::even_contact(Equations& system, bool arrived) {
 /// Where contact turns out too soft in an equilibrium, and is made stiffer, balance is sought anew from where the scene
 /// has settled; and where contact is far too stiff for its forces, or surfaces are deeper in each other than forces
 /// want them, if it makes them less so: not where what presses them does not yield.
-void World::Implementation::settle_contact(Equations& system, const Boundary& boundary, StaticResult& r) {
+void World::Implementation::settle_contact(Equations& system, const Boundary& boundary, Saddles saddles,
+                                           StaticResult& r) {
   Contact& contact = *system.contact();
   const auto again = [&] {
     const StaticResult before = r;
-    r = find_equilibrium(system, *newton, options, parameters, nullptr, boundary, state, work.newton);
+    r = find_equilibrium(system, *newton, options, parameters, nullptr, boundary, saddles, state, work.newton);
     r.branch_changed = r.branch_changed || before.branch_changed;
     r.newton.iterations += before.newton.iterations;
   };
@@ -168,7 +169,7 @@ void World::Implementation::settle_contact(Equations& system, const Boundary& bo
 }
 
 /// Equilibrium after `dt` (0: at the present time, with supports and actuation as they are).
-EquilibriumResult World::Implementation::equilibrium(double dt) {
+EquilibriumResult World::Implementation::equilibrium(double dt, Saddles saddles) {
   account_for_settings();
   const Moving before = *this;
   const Lagged lagged_before = lagged();
@@ -210,11 +211,11 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
     if (drifts(system))
       newton->balance(work.newton.data, r.newton);
     else
-      r = find_equilibrium(system, *newton, options, parameters, actuation_changed ? &actuation_before : nullptr, boundary, state,
-                           work.newton);
+      r = find_equilibrium(system, *newton, options, parameters, actuation_changed ? &actuation_before : nullptr,
+                           boundary, saddles, state, work.newton);
     for (SupportMotion& m : target) m.roll.setZero();
     from = target;
-    if (r.converged && system.contact()) settle_contact(system, boundary, r);
+    if (r.converged && system.contact()) settle_contact(system, boundary, saddles, r);
   } catch (...) {
     undo();
     throw;
@@ -232,12 +233,12 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   if (!release_left_rings()) {
     if (found.stable && buckles_out_of_plane()) {
       found.stable = false;
-      if (!plane_warning) plane_warning = kSideways;
+      if (!plane_warning && saddles == Saddles::leave) plane_warning = kSideways;
     }
     return found;
   }
   // Without a ring that it has left a rod goes on.
-  EquilibriumResult next = equilibrium(0.0);
+  EquilibriumResult next = equilibrium(0.0, saddles);
   next.iterations += found.iterations;
   next.branch_changed = true;
   return next;

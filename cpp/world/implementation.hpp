@@ -293,7 +293,7 @@ struct World::Implementation : Running {
   Wrench reaction_of(int support, const VectorX& held) const;
 
   // equilibrium.cpp
-  EquilibriumResult equilibrium(double dt);
+  EquilibriumResult equilibrium(double dt, Saddles saddles = Saddles::leave);
   /// A step of the static integrator, of dt and to `end`.
   void static_step(double end, double dt);
   void move_between(const std::vector<SupportMotion>& from, const std::vector<SupportMotion>& to, double factor);
@@ -306,7 +306,7 @@ struct World::Implementation : Running {
   bool buckles_out_of_plane();
   bool drifts(Equations& system);
   bool even_contact(Equations& system, bool arrived);
-  void settle_contact(Equations& system, const Boundary& boundary, StaticResult& r);
+  void settle_contact(Equations& system, const Boundary& boundary, Saddles saddles, StaticResult& r);
   void rest();
   Equations& statics();
   void refresh_reactions();

@@ -122,11 +122,11 @@ void World::advance_to(double time) {
   if (self.options.integrator == Integrator::verlet) self.check_explicit();
 }
 
-EquilibriumResult World::equilibrium() {
+EquilibriumResult World::equilibrium(Saddles saddles) {
   Implementation& self = *implementation_;
   const Timer timer(self.statistics.total_time);
   if (self.callback) self.callback(self.state.time, self.state.time);
-  return self.equilibrium(0.0);
+  return self.equilibrium(0.0, saddles);
 }
 
 void World::set_step_callback(const StepCallback& callback, bool prescribes) {
