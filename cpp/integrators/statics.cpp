@@ -71,29 +71,42 @@ class Statics {
 
   StaticResult run() {
     StaticResult result;
+    find(result);
+    if (!result.converged) note_imbalance(result.newton);
+    return result;
+  }
+
+ private:
+  void find(StaticResult& result) {
     const State start = state_;
     result.converged = follow(result);
     if (!result.converged) {
       result.branch_changed = true;
       path_.go_back(start, 0.0);
       path_.go_to(1.0);
-      if (!path_.hold(1.0, state_.q)) return result;
+      if (!path_.hold(1.0, state_.q)) return;
       path_.accept(state_.q);
       result.converged = settle(1.0, result) || (equations_.has_potential() && descend(1000, result.newton));
     }
-    if (!result.converged) return result;
+    if (!result.converged) return;
     result.stable = stable(1.0);
     for (int tries = 0; leaves_saddles_ && tries < 4 && !result.stable && equations_.has_potential_here(); ++tries) {
       result.branch_changed = true;
       leave_saddle(1.0, tries);
       result.converged = settle(1.0, result) || (equations_.has_potential() && descend(1000, result.newton));
-      if (!result.converged) return result;
+      if (!result.converged) return;
       result.stable = stable(1.0);
     }
-    return result;
   }
 
- private:
+  /// What is out of balance where the search has ended; residuals of its last interval have inertia.
+  void note_imbalance(NewtonResult& last) {
+    path_.go_to(1.0);
+    path_.evaluate(state_.q, false, nullptr);
+    newton_.balance(work_.data, last);
+    last.worst_row = newton_.worst_row(work_.data.residual);
+  }
+
   /// Follows the path from the present state to its end. False where not even a jump leads on.
   bool follow(StaticResult& result) {
     path_.start_out_of_balance();

@@ -102,9 +102,10 @@ void World::Implementation::rest() {
   work.newton.finest = INFINITY;
 }
 
-/// Whether nothing resists a translation along which forces do not sum to zero: no way off leads to equilibrium then.
+/// True if nothing resists a translation along which forces do not sum to zero: no way off leads to equilibrium then.
+/// Surfaces and custom forces may resist elsewhere.
 bool World::Implementation::drifts(Equations& system) {
-  if (system.contact()) return false;
+  if (system.contact() || description.has_custom_force) return false;
   for (const Support& s : model.supports)
     if (s.active) return false;
   system.begin(state, parameters, StepRule::statics, 0.0);
@@ -208,11 +209,13 @@ EquilibriumResult World::Implementation::equilibrium(double dt, Saddles saddles)
     aim_hands(system);
     VectorX reached = state.q;
     if (boundary.hold(0.0, 1.0, reached)) check_squeezed(system, reached, dt);
-    if (drifts(system))
+    if (drifts(system)) {
       newton->balance(work.newton.data, r.newton);
-    else
+      r.newton.worst_row = newton->worst_row(work.newton.data.residual);
+    } else {
       r = find_equilibrium(system, *newton, options, parameters, actuation_changed ? &actuation_before : nullptr,
                            boundary, saddles, state, work.newton);
+    }
     for (SupportMotion& m : target) m.roll.setZero();
     from = target;
     if (r.converged && system.contact()) settle_contact(system, boundary, saddles, r);
@@ -285,11 +288,13 @@ void World::Implementation::static_step(double end, double dt) {
 void World::Implementation::fail_equilibrium(const StaticResult& result, double dt) const {
   const bool held =
       std::any_of(model.supports.begin(), model.supports.end(), [](const Support& s) { return s.active; });
-  const bool lies = !description.contact.obstacles.empty();
+  const bool lies = !description.contact.obstacles.empty(), pulled = description.has_custom_force;
   fail(result.newton, dt,
        std::string("no static equilibrium was found") +
            (!held && lies     ? ", and nothing but contact holds the scene, where friction may not be enough: clamp or "
                                 "pin a node"
+            : !held && pulled ? ", and nothing but custom forces holds the scene: clamp or pin a node if they are not "
+                                "to hold it"
             : !held           ? ", and no support holds the scene: clamp or pin a node"
             : result.restless ? ": the scene does not come to rest; loads without a potential, as moments and follower "
                                 "forces, may drive it round for ever"
