@@ -28,6 +28,7 @@ struct Ring {
   bool holds = false;             ///< along the rod
   double friction = 0;            ///< mu [-]
   double force_limit = INFINITY;  ///< of a drive [N]
+  double rounding = 0;            ///< bound of the rounding error of u [m]
 
   bool slips() const { return friction > 0.0 || std::isfinite(force_limit); }
 };
@@ -51,7 +52,8 @@ Scalar ring_tension(const Ring& ring, const Scalar& u, const Scalar& arc_slope, 
     most = value_of(square) > 0.0 ? (ring.friction * ring.stiffness) * sqrt(square) : Scalar(0.0);
   }
   const Scalar limit = most * c.off_slope / (arc_slope * sqrt(dot(c.along, c.along)));
-  if (std::abs(value_of(elastic)) <= value_of(limit)) return elastic;
+  // Where nothing presses the limit is zero, and the sign of a u that is all rounding would decide what slips.
+  if (std::abs(value_of(elastic)) <= value_of(limit) + ring.stiffness * ring.rounding) return elastic;
   return value_of(elastic) > 0.0 ? limit : -1.0 * limit;
 }
 

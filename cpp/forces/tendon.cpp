@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 #include <optional>
+#include <span>
 #include <tuple>
 #include <utility>
 
@@ -140,6 +141,26 @@ SegmentUnknowns unknowns_of(const Model& model, const TendonSegment& segment) {
   return out;
 }
 
+/// Edges turn by less at frames, and by as much more at their other ends: so are the lengths of the pieces there, and
+/// the tendon stays as long. Pieces are those of one tendon.
+void share_spans(const Model& model, std::span<TendonSegment> pieces) {
+  for (std::size_t i = 0; i < pieces.size(); ++i)
+    for (int k : {0, 1}) {
+      const GuideSeat& seat = pieces[i].seat[k];
+      const bool alone = k == 0 ? i == 0 : i + 1 == pieces.size();
+      if (seat.half >= 0 || alone || !pieces[i].smooth) continue;
+      TendonSegment& next = pieces[k == 0 ? i - 1 : i + 1];
+      const bool frame_first = (k == 1) == (seat.sign > 0.0);
+      const auto half = std::find_if(model.half.begin(), model.half.end(), [&](const FrameStencil& h) {
+        return h.edge == seat.edge && h.frame_first == frame_first;
+      });
+      if (half == model.half.end() || !next.smooth) continue;
+      const double less = 0.5 - model.half_share(half - model.half.begin());
+      pieces[i].span[k] -= less;
+      next.span[1 - k] += less;
+    }
+}
+
 }  // namespace
 
 std::vector<TendonSegment> tendon_segments(const Model& model) {
@@ -157,6 +178,7 @@ std::vector<TendonSegment> tendon_segments(const Model& model) {
       out.push_back(segment);
     }
     ++number;
+    share_spans(model, std::span(out).last(tendon.guides.size() - 1));
   }
   return out;
 }
@@ -177,24 +199,25 @@ void add_local(const Model& model, const TendonSegment& segment, double tension,
     const EdgeFrame<double>& e = now.guide[k].frame;
     const Carried carried = carried_by(now, k, pull);
     const Vector3& m = carried.moment;
+    const double axial = segment.span[k] * pull.axial;
     auto rows = work.gradient.template segment<kTurns>(kTurns * k);
     if (seat.half >= 0) {
       rows = turn_of(model, segment, k, now.guide[k], q, c).transpose() * m;
     } else {
       const Vector3 t = to_eigen(e.tangent);
       const double about = m.dot(t);
-      rows.template head<3>() = e.inverse_length * m.cross(t) + about * to_eigen(e.spin) + pull.axial * t;
+      rows.template head<3>() = e.inverse_length * m.cross(t) + about * to_eigen(e.spin) + axial * t;
       rows(3) = about;
     }
     if constexpr (width == kStraight) work.gradient.template segment<3>(kSmooth + 3 * k) = direction(k) * pull.g;
     if (!by) continue;
-    work.own(k) += seat.half < 0 ? edge_curvature(e, by->turn[k], carried, pull.axial)
+    work.own(k) += seat.half < 0 ? edge_curvature(e, by->turn[k], carried, axial)
                                  : frame_curvature(model, seat, by->turn[k], carried, q, c);
   }
   if (by) {  // those of a pull are by one of two that are the same: half of all
     work.hessian.noalias() += 2.0 * (by->arms.transpose() * pull.by_g);
     if constexpr (width == kSmooth)
-      work.hessian.noalias() += 2.0 * (by->sum.transpose() * pull.by_y) + 4.0 * (by->span.transpose() * pull.by_axial);
+      work.hessian.noalias() += 2.0 * (by->sum.transpose() * pull.by_y) + 2.0 * (by->span.transpose() * pull.by_axial);
   }
   put(model, segment, work, with_matrix, out);
 }

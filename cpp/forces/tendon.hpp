@@ -5,9 +5,11 @@
 /// tendon's forces are minus the gradient of T L, with its length L, a sum over pieces from one guide to the next:
 ///   L = |p' - p|,   straight; or, between neighbours of one rod, with r = r' - r, s = t + t', p = s . r, B = p / |s|,
 ///   L^2 = (l + A)^2 + r^2 - B^2,   A = 4 B / 3 - p / 6,
-/// l from the middle of an edge to that of the next, or to the wall. That is what a tendon beside the smooth rod has
-/// there: where edges turn by phi towards it, A is -h phi but for phi^5, B the chord -2 h sin(phi / 2), and r^2 - B^2
-/// is what twist and winding add. p' - p would be shorter by l phi^2 / 8, no less than h phi on coarse meshes.
+/// l from the middle of an edge to that of the next, or to the wall: half of each edge, but 5/12 at a frame and 7/12 on
+/// the other side of that edge, as `Model::half_share` has it, for so do edges turn. That is what a tendon beside the
+/// smooth rod has there: where edges turn by phi towards it, A is -h phi but for phi^5, B the chord -2 h sin(phi / 2),
+/// and r^2 - B^2 is what twist and winding add. p' - p would be shorter by l phi^2 / 8, no less than h phi on coarse
+/// meshes.
 ///
 /// Forces are those of a step between two configurations, as means (of A, B, p, 1 / |s|, vectors, L), which for both
 /// the same are the gradient. With a = l + A, b = 4 a / 3 - B and m = b / |s| - a / 6,
@@ -54,6 +56,7 @@ struct TendonSegment {
   int tendon = 0;
   bool smooth = false;  ///< between neighbours of one rod
   GuideSeat seat[2];
+  double span[2] = {0.5, 0.5};  ///< parts of the lengths of its edges that l has
   SegmentUnknowns unknowns;
 };
 

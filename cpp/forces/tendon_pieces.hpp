@@ -152,7 +152,7 @@ struct Segment {
         apart(guide[1].point - guide[0].point),
         arms(guide[1].arm - guide[0].arm),
         sum(guide[0].tangent + guide[1].tangent),
-        span(0.5 * (guide[0].length + guide[1].length)),
+        span(of.span[0] * guide[0].length + of.span[1] * guide[1].length),
         size(sum.norm()),
         product(sum.dot(arms)),
         along(product / size),
@@ -211,13 +211,14 @@ struct Changes {
       } else {
         tangent[k] = -cross_matrix(guide.tangent) * turn[k];
         sum.template middleCols<kTurns>(kTurns * k) = tangent[k];
-        if (of.seat[k].half < 0) span.template segment<3>(kTurns * k) = 0.5 * to_eigen(guide.frame.tangent).transpose();
+        if (of.seat[k].half < 0)
+          span.template segment<3>(kTurns * k) = of.span[k] * to_eigen(guide.frame.tangent).transpose();
       }
     }
   }
 };
 
-/// Forces of a tension on arms (the second's; the first has the opposite), on tangents and on the length of each edge,
+/// Forces of a tension on arms (the second's; the first has the opposite), on tangents and on l,
 /// over a step from one segment to another, or at one where both are the same; and their derivatives by the second.
 template <int width>
 struct Pull {
@@ -251,7 +252,7 @@ struct Pull {
     const Vector3 by_arms = r + m * s, by_sum = m * r - beta * p * c * s;
     g = k * by_arms;
     y = k * by_sum;
-    axial = 0.5 * k * l;
+    axial = k * l;
     if (!by || b.length == 0.0) return;
     // Of the second's |s|, p, B and A, and of L and T / L; then of means.
     const Row<width> size = qb * (b.sum.transpose() * by->sum),
@@ -266,7 +267,7 @@ struct Pull {
     by_g = by_arms * d_k + k * (0.5 * by->arms + s * d_m + 0.5 * m * by->sum);
     by_y = by_sum * d_k + k * (r * d_m + 0.5 * m * by->arms - 0.5 * beta * p * c * by->sum -
                                s * (p * c * d_beta + 0.5 * beta * c * product + beta * p * d_c));
-    by_axial = 0.5 * (l * d_k + k * d_l);
+    by_axial = l * d_k + k * d_l;
   }
 };
 

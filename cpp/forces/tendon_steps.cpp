@@ -92,7 +92,8 @@ void add_discrete(const Model& model, const TendonSegment& segment, double tensi
     const double lengths = start.length + end.length;
     Vector3 along = Vector3::Zero();  // (e0 + e1) / (l0 + l1)
     if (axial) along = (start.length * to_eigen(start.frame.tangent) + end.length * t1) / lengths;
-    rows.template head<3>() += pull.axial * along;
+    const double share = segment.span[k];
+    rows.template head<3>() += share * pull.axial * along;
     if constexpr (width == kStraight) work.gradient.template segment<3>(kSmooth + 3 * k) = f;
     if (!with_matrix) continue;
     Columns<width> by_moment = direction(k) * cross_matrix(arm) * pull.by_g;
@@ -104,9 +105,9 @@ void add_discrete(const Model& model, const TendonSegment& segment, double tensi
     work.hessian.template middleRows<kTurns>(kTurns * k).noalias() += working.columns.transpose() * by_moment;
     work.own(k) += working.slopes;
     if (axial) {
-      work.hessian.template middleRows<3>(kTurns * k) += along * pull.by_axial;
+      work.hessian.template middleRows<3>(kTurns * k) += share * along * pull.by_axial;
       work.own(k).template topLeftCorner<3, 3>() +=
-          pull.axial / lengths * (Matrix3::Identity() - along * t1.transpose());
+          share * pull.axial / lengths * (Matrix3::Identity() - along * t1.transpose());
     }
     if constexpr (width == kStraight) work.hessian.template middleRows<3>(kSmooth + 3 * k) += direction(k) * pull.by_g;
   }

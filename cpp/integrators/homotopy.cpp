@@ -42,13 +42,13 @@ ActingPath growing_loads(Equations& equations, Parameters& parameters, const Sta
 }  // namespace
 
 ActingPath growing(Equations& equations, Parameters& parameters, const State& state, NewtonWorkspace& work,
-                   const NaturalShape* before) {
+                   const Actuation* before) {
   if (!before) return growing_loads(equations, parameters, state, work);
-  const ActingPath shape = [&model = equations.model(), from = *before, to = natural_shape(parameters)](
-                               double factor, Parameters& p) { set_natural_between(model, from, to, factor, p); };
-  shape(0.0, parameters);
-  return [shape, loads = growing_loads(equations, parameters, state, work)](double factor, Parameters& p) {
-    shape(factor, p);
+  const ActingPath actuation = [&model = equations.model(), from = *before, to = actuation_of(parameters)](
+                                   double factor, Parameters& p) { set_actuation_between(model, from, to, factor, p); };
+  actuation(0.0, parameters);
+  return [actuation, loads = growing_loads(equations, parameters, state, work)](double factor, Parameters& p) {
+    actuation(factor, p);
     if (loads) loads(factor, p);
   };
 }

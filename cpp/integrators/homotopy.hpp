@@ -1,12 +1,12 @@
 #pragma once
-/// Equilibria that go with a factor s, along which supports move, natural shapes and loads change:
+/// Equilibria that go with a factor s, along which supports move, natural shapes, tensions and loads change:
 ///   F(q, s) = grad V(q, s) - f(s) - (1 - s) r = 0, with the held unknowns of q where they are to be at s.
 /// r is what the start, s = 0, is out of balance by, so that the path begins there and ends, at s = 1, in equilibrium.
 
 #include <functional>
 
 #include "integrators/newton.hpp"
-#include "model/natural_shape.hpp"
+#include "model/actuation.hpp"
 
 namespace withe {
 
@@ -21,12 +21,12 @@ struct Boundary {
 /// Sets what acts at a factor; nothing where it all stays.
 using ActingPath = std::function<void(double factor, Parameters& parameters)>;
 
-/// Natural shapes from those `before` (if they have changed) to the present ones, so that rods bend by their muscles
-/// and are not bent to there; and loads that turn with the rod (moments, followers) from the share of them that the
-/// state carries already to all of them: a dead imbalance would pull where they do not. Other loads stay, as they are
-/// part of what is out of balance.
+/// Natural shapes and tensions from those `before` (if they have changed) to the present ones, so that rods bend by
+/// their muscles and tendons and are not bent to there; and loads that turn with the rod (moments, followers) from the
+/// share of them that the state carries already to all of them: a dead imbalance would pull where they do not. Other
+/// loads stay, as they are part of what is out of balance.
 ActingPath growing(Equations& equations, Parameters& parameters, const State& state, NewtonWorkspace& work,
-                   const NaturalShape* before);
+                   const Actuation* before);
 
 class Homotopy {
  public:

@@ -207,7 +207,8 @@ class Newton::Solve {
     // A step that is cut says nothing of where the solution is, unless all of it is within the tolerance.
     const bool near = shorten > 0.0 && length <= shorten * reuse_.tolerance();
     reuse_.note_step(shorten == 1.0 || near ? length : INFINITY);
-    return !how_.predicted || !how_.predicted->strict || !loses_path(*how_.predicted, reuse_, result_.iterations == 0);
+    if (!how_.predicted || !how_.predicted->strict) return true;
+    return !loses_path(*how_.predicted, reuse_, result_.iterations == 0) || ++kinks_met_ <= how_.predicted->kinks;
   }
 
   /// Whether nothing touches where the step begins and ends: then it is one as in a scene without surfaces.
@@ -235,7 +236,7 @@ class Newton::Solve {
   MatrixReuse reuse_;
   bool axial_known_;
   bool spare_matrix_ = false;  ///< made since the last factorisation
-  int whole_steps_ = 0;
+  int whole_steps_ = 0, kinks_met_ = 0;
   NewtonResult result_;
   Balance balance_;
   Stagnation stagnation_;

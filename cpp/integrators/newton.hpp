@@ -54,6 +54,7 @@ class Stagnation {
 struct Prediction {
   double length = 0;   ///< greatest displacement from the known solution [m]
   bool strict = true;  ///< whether to give up where the path may be lost
+  int kinks = 0;       ///< corrections that may fail so because forces have kinks
   double enough = 0;   ///< a correction after which no other is needed, for a point on the way [m]
 };
 

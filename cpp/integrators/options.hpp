@@ -15,6 +15,9 @@ enum class LineSearch {
   goldstein_price,  ///< [Choi, dissertation, Algorithm 4] on |F|^2 / 2
 };
 
+/// Whether an equilibrium is wanted that is stable, or the one that the path leads to.
+enum class Saddles { leave, keep };
+
 struct Options {
   Integrator integrator = Integrator::energy_momentum;
   double time_step = 5e-3;          ///< [s]

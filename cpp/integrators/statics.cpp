@@ -30,8 +30,12 @@ constexpr double kSingular = 1e9;
 constexpr double kShortest = 1.0 / 64.0;
 // Where no edge turns, the path ends after so many cuts.
 constexpr int kMostCuts = 6, kMostCutsOfFriction = 12;
-// After so many iterations a point of the path is given up, but for those of the border of slip.
-constexpr int kMostIterations = 25;
+// Most iterations for a point of the path or an interval, beyond those of the border of slip. Where surfaces rub,
+// Newton's method may wander before it converges: rounding errors grow by some factor each iteration, and after 25 to
+// 40 of them decide where it ends.
+constexpr int kMostIterations = 16;
+// Corrections of a point that a ring may spoil: its rod sticks, slips, or slips the other way.
+constexpr int kKinks = 2;
 // A path has no more points than this: what a scene is torn along by a support that goes a thousand lengths away is
 // found by settling there.
 constexpr int kMostPoints = 1000;
@@ -53,11 +57,12 @@ constexpr double kAlike = 1e-6;
 class Statics {
  public:
   Statics(Equations& equations, const Newton& newton, const Options& options, Parameters& parameters,
-          const NaturalShape* before, const Boundary& boundary, State& state, NewtonWorkspace& work)
+          const Actuation* before, const Boundary& boundary, Saddles saddles, State& state, NewtonWorkspace& work)
       : equations_(equations),
         newton_(newton),
         options_(options),
         parameters_(parameters),
+        leaves_saddles_(saddles == Saddles::leave),
         state_(state),
         work_(work),
         path_(equations, newton, parameters, boundary, growing(equations, parameters, state, work, before), state,
@@ -66,29 +71,42 @@ class Statics {
 
   StaticResult run() {
     StaticResult result;
+    find(result);
+    if (!result.converged) note_imbalance(result.newton);
+    return result;
+  }
+
+ private:
+  void find(StaticResult& result) {
     const State start = state_;
     result.converged = follow(result);
     if (!result.converged) {
       result.branch_changed = true;
       path_.go_back(start, 0.0);
       path_.go_to(1.0);
-      if (!path_.hold(1.0, state_.q)) return result;
+      if (!path_.hold(1.0, state_.q)) return;
       path_.accept(state_.q);
       result.converged = settle(1.0, result) || (equations_.has_potential() && descend(1000, result.newton));
     }
-    if (!result.converged) return result;
+    if (!result.converged) return;
     result.stable = stable(1.0);
-    for (int tries = 0; tries < 4 && !result.stable && equations_.has_potential_here(); ++tries) {
+    for (int tries = 0; leaves_saddles_ && tries < 4 && !result.stable && equations_.has_potential_here(); ++tries) {
       result.branch_changed = true;
       leave_saddle(1.0, tries);
       result.converged = settle(1.0, result) || (equations_.has_potential() && descend(1000, result.newton));
-      if (!result.converged) return result;
+      if (!result.converged) return;
       result.stable = stable(1.0);
     }
-    return result;
   }
 
- private:
+  /// What is out of balance where the search has ended; residuals of its last interval have inertia.
+  void note_imbalance(NewtonResult& last) {
+    path_.go_to(1.0);
+    path_.evaluate(state_.q, false, nullptr);
+    newton_.balance(work_.data, last);
+    last.worst_row = newton_.worst_row(work_.data.residual);
+  }
+
   /// Follows the path from the present state to its end. False where not even a jump leads on.
   bool follow(StaticResult& result) {
     path_.start_out_of_balance();
@@ -105,11 +123,11 @@ class Statics {
         path_.go_to(reached);
         path_.find_tangent(tangent_);
         ++last.iterations;
-        if (points == 1 && falls()) {
+        if (points == 1 && leaves_saddles_ && falls()) {
           if (!let_fall(reached, result)) return false;
           continue;
         }
-        if (reached > 0.0 && !firm()) {
+        if (leaves_saddles_ && reached > 0.0 && !firm()) {
           // A branch that was stable and is so no more is left where that happens.
           if (was_stable && equations_.has_potential() && !stable(reached)) {
             result.branch_changed = true;
@@ -147,10 +165,7 @@ class Statics {
     return true;
   }
 
-  int most_iterations() const {
-    const int most = options_.max_iterations;
-    return equations_.has_potential() ? std::min(kMostIterations, most) : most;
-  }
+  int most_iterations() const { return std::min(kMostIterations, options_.max_iterations); }
 
   /// Where Coulomb's friction holds a limp rod, the border of what slips goes on by a contact an iteration, and the
   /// solution follows when it has arrived: so many iterations are no sign that there is none.
@@ -186,15 +201,15 @@ class Statics {
   /// The point of the path at the factor `next`, predicted along the tangent.
   bool reach(double next, double increment, NewtonResult& last) {
     path_.go_to(next);
-    // Where surfaces meet, and where rods go through rings, corrections shrink less than on smooth paths.
-    const bool touching = (equations_.contact() && equations_.contact()->count() > 0) ||
-                          (equations_.hands() && equations_.hands()->rings().count() > 0);
-    Prediction prediction{.length = 0.0, .strict = !touching};
+    // Where surfaces meet, corrections shrink less than on smooth paths; rings have kinks.
+    const bool touching = equations_.contact() && equations_.contact()->count() > 0;
+    const int rings = equations_.hands() ? equations_.hands()->rings().count() : 0;
+    Prediction prediction{.length = 0.0, .strict = !touching, .kinks = kKinks * rings};
     bool predicted = tangent_.found;
     if (predicted) {
       step_ = increment * tangent_.rate;
       prediction.length = newton_.norms().displacement(step_);
-      if (next < 1.0 && !touching) prediction.enough = kOnTheWay * equations_.model().length_scale;
+      if (next < 1.0 && !touching && rings == 0) prediction.enough = kOnTheWay * equations_.model().length_scale;
       // Axial forces by the linear solution: those of the prediction are of edges that stretch as they turn.
       equations_.evaluate(state_.q, false, nullptr, work_.data);
       predict_axial_force(equations_.problem(), work_.data, step_, work_.axial_force);
@@ -430,6 +445,7 @@ class Statics {
   const Newton& newton_;
   const Options& options_;
   Parameters& parameters_;
+  bool leaves_saddles_;
   State& state_;
   NewtonWorkspace& work_;
   double energy_scale_ = 0.0;  ///< greatest potential met [J]
@@ -444,9 +460,9 @@ class Statics {
 }  // namespace
 
 StaticResult find_equilibrium(Equations& equations, const Newton& newton, const Options& options,
-                              Parameters& parameters, const NaturalShape* before, const Boundary& boundary,
-                              State& state, NewtonWorkspace& work) {
-  return Statics(equations, newton, options, parameters, before, boundary, state, work).run();
+                              Parameters& parameters, const Actuation* before, const Boundary& boundary,
+                              Saddles saddles, State& state, NewtonWorkspace& work) {
+  return Statics(equations, newton, options, parameters, before, boundary, saddles, state, work).run();
 }
 
 }  // namespace withe

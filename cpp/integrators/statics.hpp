@@ -15,12 +15,12 @@ struct StaticResult {
 };
 
 /// Brings `state` to equilibrium, with supports where `boundary` has them at 1. Loads that are out of
-/// balance at the start, natural shapes and the motion of supports are let in as `Homotopy` has it, in steps in which
-/// no edge turns far. Stiffness of contacts follows their forces, also those that are found: where surfaces are too
-/// deep in each other they are in balance no more (`Contact::presses_alike`). `before`: natural shapes that the state
-/// came with, if they have changed since.
+/// balance at the start, natural shapes, tensions and the motion of supports are let in as `Homotopy` has it, in steps
+/// in which no edge turns far. Stiffness of contacts follows their forces, also those that are found: where surfaces
+/// are too deep in each other they are in balance no more (`Contact::presses_alike`). `before`: actuation that the
+/// state came with, if it has changed since.
 StaticResult find_equilibrium(Equations& equations, const Newton& newton, const Options& options,
-                              Parameters& parameters, const NaturalShape* before, const Boundary& boundary,
-                              State& state, NewtonWorkspace& work);
+                              Parameters& parameters, const Actuation* before, const Boundary& boundary,
+                              Saddles saddles, State& state, NewtonWorkspace& work);
 
 }  // namespace withe

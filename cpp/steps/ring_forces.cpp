@@ -10,9 +10,11 @@
 namespace withe {
 namespace {
 
-Ring ring_of(const Support& support) {
+/// `reach`: greatest distance from the origin of what its places are found from [m].
+Ring ring_of(const Support& support, double reach) {
   const HandDescription& hand = support.description.hand;
-  return {hand.stiffness[0], hand.feeds || hand.friction > 0.0, hand.friction, hand.force_limit};
+  return {hand.stiffness[0], hand.feeds || hand.friction > 0.0, hand.friction, hand.force_limit,
+          kRounding * (reach + support.curve.whole)};
 }
 
 Vector3 centre_of(const HandState& hand) { return hand.position + hand.rotation * hand.points.front(); }
@@ -22,9 +24,10 @@ RingStep step_of(const Model& model, const StepProblem& problem, const std::vect
   const HandState& start = problem.start->hands[at(support)];
   const Vector3 from = centre_of(start);
   const double fed = start.ring.fed;
-  if (end.empty()) return {ring_of(s), s.curve, start.ring, from, from, fed, fed};
+  if (end.empty()) return {ring_of(s, from.norm()), s.curve, start.ring, from, from, fed, fed};
   const HandPose& to = end[at(support)];
-  return {ring_of(s), s.curve, start.ring, from, to.position + to.rotation * start.points.front(), fed, to.fed};
+  const Vector3 centre = to.position + to.rotation * start.points.front();
+  return {ring_of(s, centre.norm()), s.curve, start.ring, from, centre, fed, to.fed};
 }
 
 /// Where forces of a step act that ends at q1.
@@ -91,7 +94,7 @@ RingForces::RingForces(const Model& model) : model_(model) {
     const Support& support = model.supports[s];
     if (!support.active || !support.slides()) continue;
     rings_.push_back({static_cast<int>(s), static_cast<int>(dofs.size()) / (3 * n)});
-    slips_ = slips_ || ring_of(support).slips();
+    slips_ = slips_ || ring_of(support, 0.0).slips();
     for (int i = 0; i < support.curve.pieces(); ++i)
       for (int node : support.curve.piece(i).node)
         for (int k = 0; k < n; ++k) dofs.push_back(node < 0 ? -1 : model.node_dof[at(node)] + k);
@@ -122,7 +125,7 @@ void RingForces::add_rounding(const StepProblem& problem, StepData& data) const 
     const HandState& start = problem.start->hands[at(held.support)];
     if (start.ring.left) continue;
     const Support& support = model_.supports[at(held.support)];
-    const double by = kRounding * ring_of(support).stiffness * data.rounding.reach;
+    const double by = kRounding * support.description.hand.stiffness[0] * data.rounding.reach;
     const SplinePlace place =
         nearest_place(support.curve, start.ring.place, NodePlaces{model_, data.z}, centre_of(start));
     const int* dofs = table_.dofs(held.first_element + own_piece(support.curve, place.piece));
@@ -181,9 +184,9 @@ double RingForces::accept(State& state) const {
 Passage passage_of(const Model& model, const State& state, int support) {
   const Support& s = model.supports[at(support)];
   const HandState& hand = state.hands[at(support)];
-  const Ring ring = ring_of(s);
   const NodePlaces nodes{model, state.q};
   const Vector3 centre = centre_of(hand);
+  const Ring ring = ring_of(s, centre.norm());
   Passage out;
   out.place = nearest_place(s.curve, hand.ring.place, nodes, centre);
   const SplinePoint<double> point = point_at(s.curve, out.place, nodes, centre);

@@ -175,24 +175,24 @@ void World::Implementation::begin_as_drawn() {
         node_position(model, state.q, model.supports[s].node);
     if (model.supports[s].is_hand()) grasp(static_cast<int>(s));
   }
-  note_drawn_shape();
+  note_drawn_actuation();
 }
 
-/// Where rods are not drawn as they are free of stress.
-void World::Implementation::note_drawn_shape() {
+/// Notes where rods are not drawn as they are free of stress, or tendons pull from the start.
+void World::Implementation::note_drawn_actuation() {
   constexpr double kRounded = 1e-9;  // [rad] of a stencil
-  const NaturalShape now = natural_shape(parameters);
-  shape_before = relaxed_shape(model, parameters, configuration());
+  const Actuation now = actuation_of(parameters);
+  actuation_before = relaxed_actuation(model, parameters, configuration());
   double apart = 0.0;
   for (std::size_t r = 0; r < now.curvature.size(); ++r) {
     if (now.twist[r].size() == 0) continue;
     const VectorX& voronoi = model.rod_voronoi[r];
-    const MatrixX2 bent = now.curvature[r] - shape_before.curvature[r];
-    const VectorX twisted = now.twist[r] - shape_before.twist[r];
+    const MatrixX2 bent = now.curvature[r] - actuation_before.curvature[r];
+    const VectorX twisted = now.twist[r] - actuation_before.twist[r];
     apart = std::max({apart, (voronoi.asDiagonal() * bent).cwiseAbs().maxCoeff(),
                       voronoi.cwiseProduct(twisted).cwiseAbs().maxCoeff()});
   }
-  reshaped = apart > kRounded;
+  actuation_changed = apart > kRounded || !now.tension.isZero(0.0);
 }
 
 /// The running state, of another model.

@@ -102,9 +102,10 @@ void World::Implementation::rest() {
   work.newton.finest = INFINITY;
 }
 
-/// Whether nothing resists a translation along which forces do not sum to zero: no way off leads to equilibrium then.
+/// True if nothing resists a translation along which forces do not sum to zero: no way off leads to equilibrium then.
+/// Surfaces and custom forces may resist elsewhere.
 bool World::Implementation::drifts(Equations& system) {
-  if (system.contact()) return false;
+  if (system.contact() || description.has_custom_force) return false;
   for (const Support& s : model.supports)
     if (s.active) return false;
   system.begin(state, parameters, StepRule::statics, 0.0);
@@ -138,11 +139,12 @@ bool World::Implementation::even_contact(Equations& system, bool arrived) {
 /// Where contact turns out too soft in an equilibrium, and is made stiffer, balance is sought anew from where the scene
 /// has settled; and where contact is far too stiff for its forces, or surfaces are deeper in each other than forces
 /// want them, if it makes them less so: not where what presses them does not yield.
-void World::Implementation::settle_contact(Equations& system, const Boundary& boundary, StaticResult& r) {
+void World::Implementation::settle_contact(Equations& system, const Boundary& boundary, Saddles saddles,
+                                           StaticResult& r) {
   Contact& contact = *system.contact();
   const auto again = [&] {
     const StaticResult before = r;
-    r = find_equilibrium(system, *newton, options, parameters, nullptr, boundary, state, work.newton);
+    r = find_equilibrium(system, *newton, options, parameters, nullptr, boundary, saddles, state, work.newton);
     r.branch_changed = r.branch_changed || before.branch_changed;
     r.newton.iterations += before.newton.iterations;
   };
@@ -168,18 +170,18 @@ void World::Implementation::settle_contact(Equations& system, const Boundary& bo
 }
 
 /// Equilibrium after `dt` (0: at the present time, with supports and actuation as they are).
-EquilibriumResult World::Implementation::equilibrium(double dt) {
+EquilibriumResult World::Implementation::equilibrium(double dt, Saddles saddles) {
   account_for_settings();
   const Moving before = *this;
   const Lagged lagged_before = lagged();
   const MatrixX3 loads = parameters.loads;
   const double time = state.time + dt;
-  const bool reshaped_before = reshaped;
+  const bool actuation_changed_before = actuation_changed;
   if (actuated()) {
-    note_shape();
+    note_actuation();
     apply_ramps(time, configuration(), actuation_work);
   }
-  const NaturalShape shape = reshaped ? natural_shape(parameters) : NaturalShape{};
+  const Actuation wanted = actuation_changed ? actuation_of(parameters) : Actuation{};
   aim_supports(time);
   Equations& system = statics();
   update_custom_force(system);
@@ -189,9 +191,9 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
     release_obstacles(system);
     release_hands(system);
     static_cast<Moving&>(*this) = before;
-    if (reshaped) set_natural_between(model, shape, shape, 1.0, parameters);
+    if (actuation_changed) set_actuation_between(model, wanted, wanted, 1.0, parameters);
     apply_ramps(state.time);
-    reshaped = reshaped_before;
+    actuation_changed = actuation_changed_before;
     parameters.loads = loads;
     recall(lagged_before);  // and no more of `system`, which this may drop
   };
@@ -207,14 +209,16 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
     aim_hands(system);
     VectorX reached = state.q;
     if (boundary.hold(0.0, 1.0, reached)) check_squeezed(system, reached, dt);
-    if (drifts(system))
+    if (drifts(system)) {
       newton->balance(work.newton.data, r.newton);
-    else
-      r = find_equilibrium(system, *newton, options, parameters, reshaped ? &shape_before : nullptr, boundary, state,
-                           work.newton);
+      r.newton.worst_row = newton->worst_row(work.newton.data.residual);
+    } else {
+      r = find_equilibrium(system, *newton, options, parameters, actuation_changed ? &actuation_before : nullptr,
+                           boundary, saddles, state, work.newton);
+    }
     for (SupportMotion& m : target) m.roll.setZero();
     from = target;
-    if (r.converged && system.contact()) settle_contact(system, boundary, r);
+    if (r.converged && system.contact()) settle_contact(system, boundary, saddles, r);
   } catch (...) {
     undo();
     throw;
@@ -232,12 +236,12 @@ EquilibriumResult World::Implementation::equilibrium(double dt) {
   if (!release_left_rings()) {
     if (found.stable && buckles_out_of_plane()) {
       found.stable = false;
-      if (!plane_warning) plane_warning = kSideways;
+      if (!plane_warning && saddles == Saddles::leave) plane_warning = kSideways;
     }
     return found;
   }
   // Without a ring that it has left a rod goes on.
-  EquilibriumResult next = equilibrium(0.0);
+  EquilibriumResult next = equilibrium(0.0, saddles);
   next.iterations += found.iterations;
   next.branch_changed = true;
   return next;
@@ -284,11 +288,13 @@ void World::Implementation::static_step(double end, double dt) {
 void World::Implementation::fail_equilibrium(const StaticResult& result, double dt) const {
   const bool held =
       std::any_of(model.supports.begin(), model.supports.end(), [](const Support& s) { return s.active; });
-  const bool lies = !description.contact.obstacles.empty();
+  const bool lies = !description.contact.obstacles.empty(), pulled = description.has_custom_force;
   fail(result.newton, dt,
        std::string("no static equilibrium was found") +
            (!held && lies     ? ", and nothing but contact holds the scene, where friction may not be enough: clamp or "
                                 "pin a node"
+            : !held && pulled ? ", and nothing but custom forces holds the scene: clamp or pin a node if they are not "
+                                "to hold it"
             : !held           ? ", and no support holds the scene: clamp or pin a node"
             : result.restless ? ": the scene does not come to rest; loads without a potential, as moments and follower "
                                 "forces, may drive it round for ever"

@@ -77,7 +77,7 @@ void exchange(Archive& io, Span& span) {
 
 template <class Archive>
 void exchange(Archive& io, const Model& model, Settings& settings) {
-  auto& [parameters, ramps, obstacle_motions, shape_before, reshaped] = settings;
+  auto& [parameters, ramps, obstacle_motions, actuation_before, actuation_changed] = settings;
   exchange(io, model, parameters);
   const auto exchange_ramp = [&](auto& ramp) {
     auto& [from, to, start, end, active] = ramp;
@@ -89,9 +89,9 @@ void exchange(Archive& io, const Model& model, Settings& settings) {
     for (ObstacleWay* way : {&from, &to}) io(way->shift), io(way->turn);
     exchange(io, shift), exchange(io, turn);
   }
-  for (MatrixX2& curvature : shape_before.curvature) io(curvature);
-  for (VectorX& twist : shape_before.twist) io(twist);
-  io(shape_before.stretch), io(reshaped);
+  for (MatrixX2& curvature : actuation_before.curvature) io(curvature);
+  for (VectorX& twist : actuation_before.twist) io(twist);
+  io(actuation_before.stretch), io(actuation_before.tension), io(actuation_changed);
 }
 
 template <class Archive>

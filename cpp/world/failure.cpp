@@ -171,9 +171,9 @@ std::string World::Implementation::what_to_try() const {
 void World::Implementation::fail(const NewtonResult& r, double dt, const std::string& what,
                                  const std::string& hint) const {
   const Place place = place_of(r.worst_row);
-  throw ConvergenceFailure(what + " (time " + text(state.time, 6) + " s, step " + text(dt) + " s, residual " +
-                               text(r.residual) + " N" + place.words + ")" + crushed() +
-                               "; the world is left in its last accepted state. " +
+  throw ConvergenceFailure(what + " (time " + text(state.time, 6) + " s" +
+                               (dt > 0.0 ? ", step " + text(dt) + " s" : "") + ", residual " + text(r.residual) + " N" +
+                               place.words + ")" + crushed() + "; the world is left in its last accepted state. " +
                                (hint.empty() ? what_to_try() : hint),
                            state.time, dt, place.rod, place.node, r.residual);
 }

@@ -116,7 +116,7 @@ struct World::Implementation : Running {
   Model model_of_active(Rebuild why);
   void drop_scratch();
   void begin_as_drawn();
-  void note_drawn_shape();
+  void note_drawn_actuation();
   void carry_over(const Model& old, Rebuild why);
   void keep_moments(const Model& old, const ElasticCoefficients& before);
   void make_plan();
@@ -161,7 +161,7 @@ struct World::Implementation : Running {
   void apply_ramps(double time, const Configuration& c, double& work);
   const Configuration& configuration() const;
   void retire_ramps();
-  void note_shape();
+  void note_actuation();
   bool actuated() const;
   bool turns_rods() const;
   void aim_supports(double time);
@@ -293,7 +293,7 @@ struct World::Implementation : Running {
   Wrench reaction_of(int support, const VectorX& held) const;
 
   // equilibrium.cpp
-  EquilibriumResult equilibrium(double dt);
+  EquilibriumResult equilibrium(double dt, Saddles saddles = Saddles::leave);
   /// A step of the static integrator, of dt and to `end`.
   void static_step(double end, double dt);
   void move_between(const std::vector<SupportMotion>& from, const std::vector<SupportMotion>& to, double factor);
@@ -306,7 +306,7 @@ struct World::Implementation : Running {
   bool buckles_out_of_plane();
   bool drifts(Equations& system);
   bool even_contact(Equations& system, bool arrived);
-  void settle_contact(Equations& system, const Boundary& boundary, StaticResult& r);
+  void settle_contact(Equations& system, const Boundary& boundary, Saddles saddles, StaticResult& r);
   void rest();
   Equations& statics();
   void refresh_reactions();

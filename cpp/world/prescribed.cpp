@@ -27,15 +27,15 @@ Eigen::VectorBlock<VectorX> World::Implementation::natural_stretch(int rod) {
   return parameters.edge_natural_stretch.segment(first, model.rod_first_edge[at(rod) + 1] - first);
 }
 
-/// What is free of stress is about to change.
-void World::Implementation::note_shape() {
-  if (!reshaped) shape_before = natural_shape(parameters);
-  reshaped = true;
+/// Notes the actuation that the state came with, before it changes.
+void World::Implementation::note_actuation() {
+  if (!actuation_changed) actuation_before = actuation_of(parameters);
+  actuation_changed = true;
 }
 
 /// The state has moved with the present shapes; those that have come to their end are at rest from now on.
 void World::Implementation::retire_ramps() {
-  reshaped = false;
+  actuation_changed = false;
   for (NaturalRamp& ramp : ramps) {
     ramp.curvature.retire(state.time);
     ramp.twist.retire(state.time);

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "integrators/dynamics.hpp"
-#include "model/natural_shape.hpp"
+#include "model/actuation.hpp"
 #include "world/world.hpp"
 
 namespace withe {
@@ -101,8 +101,8 @@ struct Settings {
   Parameters parameters;
   std::vector<NaturalRamp> ramps;
   std::vector<ObstacleMotion> obstacle_motions;  ///< none until one moves
-  NaturalShape shape_before;                     ///< with which the state last moved,
-  bool reshaped = false;                         ///< where another has been set since, or it was drawn otherwise
+  Actuation actuation_before;                    ///< with which the state last moved
+  bool actuation_changed = false;                ///< since then, or since the scene was drawn, which is free of stress
 };
 
 /// What a step changes, and returns to where it is taken back.

@@ -195,7 +195,7 @@ void give_sizes(World::Implementation& self) {
     for (VectorX* v : {&ramp.stretch.from, &ramp.stretch.to})
       if (v->size() != rod.rest_lengths.size()) v->setOnes(rod.rest_lengths.size());
   }
-  if (self.shape_before.curvature.empty()) self.shape_before = natural_shape(self.parameters);
+  if (self.actuation_before.curvature.empty()) self.actuation_before = actuation_of(self.parameters);
   self.predictor.resize(self.model.dof_count);
   for (VectorX* v : {&self.reaction_residual, &self.reaction_place})
     if (v->size() != self.model.dof_count) v->setZero(self.model.dof_count);

@@ -122,11 +122,11 @@ void World::advance_to(double time) {
   if (self.options.integrator == Integrator::verlet) self.check_explicit();
 }
 
-EquilibriumResult World::equilibrium() {
+EquilibriumResult World::equilibrium(Saddles saddles) {
   Implementation& self = *implementation_;
   const Timer timer(self.statistics.total_time);
   if (self.callback) self.callback(self.state.time, self.state.time);
-  return self.equilibrium(0.0);
+  return self.equilibrium(0.0, saddles);
 }
 
 void World::set_step_callback(const StepCallback& callback, bool prescribes) {
@@ -364,7 +364,7 @@ void World::Implementation::set(std::span<const ParameterSetting> settings) {
     const bool curvature = setting.kind == ParameterKind::natural_curvature,
                twist = setting.kind == ParameterKind::natural_twist,
                stretch = setting.kind == ParameterKind::natural_stretch;
-    if (curvature || twist || stretch) note_shape();
+    if (curvature || twist || stretch || setting.kind == ParameterKind::tendon_tension) note_actuation();
     if (curvature) ramps[at(setting.rod)].curvature.active = false;
     if (twist) ramps[at(setting.rod)].twist.active = false;
     if (stretch) ramps[at(setting.rod)].stretch.active = false;

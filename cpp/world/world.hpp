@@ -207,7 +207,7 @@ class World {
   void step(int count = 1);
   /// Advances to `time`, with time_steps stretched or shortened evenly to land on it.
   void advance_to(double time);
-  EquilibriumResult equilibrium();
+  EquilibriumResult equilibrium(Saddles saddles = Saddles::leave);
   /// Follows a path of equilibria through limit points, to its last point.
   EquilibriumPath equilibrium_path(const PathOptions& wanted);
   /// From another thread or a signal: ends a running step() or equilibrium() within one Newton iteration (throws

@@ -2,8 +2,8 @@
 #include <pybind11/stl.h>
 
 #include "bindings.hpp"
+#include "model/actuation.hpp"
 #include "model/model.hpp"
-#include "model/natural_shape.hpp"
 
 namespace withe::bindings {
 namespace {

@@ -243,10 +243,11 @@ void define_steps(WorldClass& world) {
       py::arg("time"), py::arg("callback"), py::arg("forces"), "Advance to a time [s].");
   world.def(
       "equilibrium",
-      [](GuardedWorld& self, const py::object& callback, const py::object& forces) {
-        return self.run([](World& w) { return w.equilibrium(); }, callback, forces);
+      [](GuardedWorld& self, bool stable, const py::object& callback, const py::object& forces) {
+        const Saddles saddles = stable ? Saddles::leave : Saddles::keep;
+        return self.run([saddles](World& w) { return w.equilibrium(saddles); }, callback, forces);
       },
-      py::arg("callback"), py::arg("forces"), "Find the static equilibrium.");
+      py::arg("stable"), py::arg("callback"), py::arg("forces"), "Find the static equilibrium.");
   world.def(
       "equilibrium_path",
       [](GuardedWorld& self, const std::vector<int>& loads, double start, double end, int most_points, double turn,

@@ -365,3 +365,83 @@ def test_muscles_move_a_heavy_arm_along_its_branch_at_once_and_in_steps(shape, a
         getattr(small, f"set_{word}")(arm, value, over=100.0)
     small.step(100)
     np.testing.assert_allclose(simulation.positions(arm), small.positions(arm), atol=1e-8)
+
+
+@pytest.mark.parametrize("share", [0.15, 0.45, 0.75])
+def test_a_tendon_bends_an_arm_along_its_branch_at_once_and_in_steps(share):
+    """By up to 8.4 rad in one call: the tension grows along the path, and its forces turn with the arm."""
+    length, offset, bend = 0.28, 0.025, 8e-3
+
+    def bent(steps):
+        scene = rods.weightless()
+        arm = scene.add_rod(
+            start=(0, 0, 0),
+            end=(length, 0, 0),
+            nodes=71,
+            radius=1e-3,
+            normal=(0, 0, 1),
+            stiffness=rods.stiffness(stretch=1e6, bend=bend, twist=bend),
+            line_density=1.0,
+        )
+        scene.clamp(arm.start)
+        tendon = scene.add_tendon(arm, offset=(offset, 0.0), tension=0.0)
+        simulation = scene.build(integrator="static", planar=True)
+        for k in range(1, steps + 1):
+            simulation.set(tendon, tension=share * bend / offset**2 * k / steps)
+            found = simulation.equilibrium()
+            assert found.stable
+            assert not found.branch_changed
+        return simulation.positions(arm)
+
+    assert bent(1) == pytest.approx(bent(10), abs=1e-9 * length)
+
+
+def pulled_arm(seed, steps):
+    """An arm with muscles, a tendon, loads and perhaps a hinge; all grow in so many calls. Flags, and positions."""
+    rng = np.random.default_rng([61, seed])
+    radius, length, young = rng.uniform(2e-3, 5e-3), 0.2, 10 ** rng.uniform(5.5, 6.5)
+    rubber = withe.Material(youngs_modulus=young, poisson_ratio=0.4, density=1000.0)
+    bend = young * np.pi * radius**4 / 4
+    planar = bool(rng.random() < 0.5)
+    scene = rods.weightless()
+    nodes = int(rng.integers(8, 30))
+    arm = scene.add_rod(
+        start=(0, 0, 0), end=(length, 0, 0), nodes=nodes, radius=radius, material=rubber, normal=(0, 0, 1)
+    )
+    scene.clamp(arm.start)
+    tip = arm.end
+    if rng.random() < 0.4:
+        end = (1.6 * length, 0.0, 0.2 * length * rng.normal())
+        hand = scene.add_rod(
+            start=(length, 0, 0), end=end, nodes=nodes, radius=radius, material=rubber, normal=(0, 1, 0)
+        )
+        scene.join(arm.end, hand.start, "revolute", axis=(0, 1, 0), stiffness=bend / length * rng.uniform(0.3, 3.0))
+        tip = hand.end
+    offset = radius * rng.uniform(1.5, 4.0)
+    tendon = scene.add_tendon(arm, offset=(offset, 0.0 if planar else 0.3 * offset * rng.normal()), tension=0.0)
+    load = scene.add_force(tip, (0, 0, 0))
+    force = rng.normal(size=3) * (1.0, not planar, 1.0) * bend / length**2 * rng.uniform(0.0, 3.0)
+    curvature = rng.normal() * np.pi / length * rng.uniform(0.0, 1.5)
+    tension = min(bend / offset / length * rng.uniform(0.0, 6.0), 0.8 * bend / offset**2)
+    weight = 9.81 * rng.random() * rng.integers(0, 2)
+    simulation = scene.build(integrator="static", planar=planar)
+    changes = []
+    for k in range(1, steps + 1):
+        part = k / steps
+        simulation.set(arm, natural_curvature=(part * curvature, 0.0))
+        simulation.set(load, force=part * force)
+        simulation.set(tendon, tension=part * tension)
+        simulation.set(gravity=(0.0, 0.0, -part * weight))
+        changes.append(simulation.equilibrium().branch_changed)
+    return any(changes), simulation.positions() / length
+
+
+def test_one_call_goes_where_ten_calls_do_and_reports_a_jump_only_where_they_meet_one():
+    jumps = 0
+    for seed in range(60):
+        (at_once, there), (in_steps, reached) = pulled_arm(seed, 1), pulled_arm(seed, 10)
+        jumps += in_steps
+        if not in_steps:
+            assert not at_once, f"seed {seed}"
+            assert there == pytest.approx(reached, abs=1e-6), f"seed {seed}"
+    assert jumps < 10

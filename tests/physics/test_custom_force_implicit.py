@@ -321,3 +321,51 @@ def test_linearising_changes_nothing_that_follows(integrator):
                 simulation.linearise()
         ends.append((*simulation.positions(rod).ravel(), *vars(simulation.energy()).values()))
     np.testing.assert_array_equal(ends[0], ends[1])
+
+
+@pytest.mark.parametrize("planar", [True, False])
+@pytest.mark.parametrize("kind", ["ground", "cubic"])
+@pytest.mark.parametrize("seed", range(3))
+def test_springs_that_resist_only_elsewhere_hold_a_scene(kind, planar, seed):
+    """Ground that a bar falls onto, and springs without stiffness where the bar is drawn."""
+    rng = np.random.default_rng([83, seed])
+    stiffness, height = 10 ** rng.uniform(1.5, 3.0), rng.uniform(0.0, 0.05)
+    scene = withe.Scene(gravity=(0, 0, -9.81))
+    rod = bar(scene, start=(0, 0, height if kind == "ground" else 0.0), nodes=9)
+    drawn = np.linspace((0.0, 0.0, 0.0), (LENGTH, 0.0, 0.0), 9)
+
+    def force(_t, x, _v):
+        if kind == "ground":
+            return np.stack([0 * x[:, 0], 0 * x[:, 0], -stiffness * np.minimum(x[:, 2], 0.0)], axis=1)
+        stretch = x - drawn
+        return -1e6 * stiffness * stretch * (stretch**2).sum(axis=1, keepdims=True)
+
+    def jacobian(_t, x, _v):
+        stretch = x - drawn
+        if kind == "ground":
+            blocks = [-stiffness * (z < 0.0) * np.diag((0.0, 0.0, 1.0)) for z in x[:, 2]]
+        else:
+            blocks = [-1e6 * stiffness * (d @ d * np.eye(3) + 2.0 * np.outer(d, d)) for d in stretch]
+        return sparse.block_diag(blocks, format="csr"), sparse.csr_array((27, 27))
+
+    scene.add_custom_force(force, jacobian=jacobian)
+    simulation = scene.build(integrator="static", planar=planar)
+    found = simulation.equilibrium()
+    assert found.stable
+    holding = force(0.0, simulation.positions(rod), None).sum(axis=0)
+    np.testing.assert_allclose(holding, (0.0, 0.0, MASS * 9.81), atol=1e-7 * MASS * 9.81)
+
+
+def test_where_no_equilibrium_is_found_the_error_tells_the_force_that_is_out_of_balance():
+    scene = withe.Scene(gravity=(0, 0, -9.81))
+    bar(scene)
+    scene.add_custom_force(
+        lambda t, x, v: 0.0 * x, jacobian=lambda t, x, v: (sparse.csr_array((9, 9)), sparse.csr_array((9, 9)))
+    )
+    simulation = scene.build(integrator="static")
+    with pytest.raises(
+        withe.ConvergenceError, match=r"nothing but custom forces holds.*\(time 0 s, residual"
+    ) as failure:
+        simulation.equilibrium()
+    assert failure.value.residual == pytest.approx(0.5 * MASS * 9.81, rel=1e-6)
+    assert failure.value.node == 1

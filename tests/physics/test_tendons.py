@@ -71,6 +71,32 @@ def test_a_straight_tendon_bends_a_rod_to_an_arc(planar, offset):
     assert_order(np.array(errors), order=2.0, slack=0.2)
 
 
+@pytest.mark.parametrize("planar", [True, False])
+@pytest.mark.parametrize("twigs", [(), (20, 45)], ids=["bare", "with twigs"])
+def test_a_tendon_bends_its_rod_until_nothing_of_it_is_left(planar, twigs):
+    """A tendon of length L (1 - q), q = T h^2 / EI, leaves a stable arc of curvature q / h for every q below 1.
+
+    At a frame (a clamp, or a node where another rod is joined) an edge turns by 5/12 of an edge's turn and by 13/12 at
+    its other end, so that a piece of tendon as long as the edge would be used up at q = 12/13.
+    """
+    offset = 0.025
+    soft = {"stiffness": rods.stiffness(bend=EI, twist=GJ, stretch=1e7), "line_density": 0.1, "radius": 5e-3}
+    scene = rods.weightless()
+    rod = scene.add_rod(start=(0, 0, 0), end=(0, 0, LENGTH), nodes=61, normal=(1, 0, 0), **soft)
+    for node in twigs:
+        root = np.array((0.0, 0.0, LENGTH * node / 60))
+        scene.join(rod.node(node), scene.add_rod(start=root, end=root - (0.02, 0, 0), nodes=4, **soft).start)
+    scene.clamp(rod.start)
+    tendon = scene.add_tendon(rod, offset=(offset, 0), tension=0.0)
+    simulation = scene.build(integrator="static", planar=planar)
+    for q in (0.5, 0.9, 0.95, 0.99):
+        simulation.set(tendon, tension=q * EI / offset**2)
+        found = simulation.equilibrium()
+        assert found.stable
+        assert not found.branch_changed
+        np.testing.assert_allclose(np.abs(simulation.curvatures(rod)[:, 0]), q / offset, rtol=1e-4)
+
+
 @pytest.mark.parametrize("nodes", [11, 21, 41])
 def test_arcs_have_the_curvature_of_theory_to_fourth_order_in_the_turn_of_an_edge(nodes):
     scene = rods.weightless()

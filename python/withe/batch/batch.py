@@ -230,13 +230,15 @@ class Batch(Setting, Reading):
             loop.go(self._advance, bar.update)
         return loop.record
 
-    def equilibrium(self, lanes: npt.ArrayLike | None = None) -> Equilibria:
+    def equilibrium(self, lanes: npt.ArrayLike | None = None, *, stable: bool = True) -> Equilibria:
         """Find the static equilibria that the present states lead to, and go there; see `Simulation.equilibrium`.
 
         Parameters
         ----------
         lanes : array_like of shape (n,), bool, or of numbers, optional
             Which simulations; all by default.
+        stable : bool
+            If False, equilibria that are not stable are returned where paths lead to them.
 
         Returns
         -------
@@ -259,7 +261,7 @@ class Batch(Setting, Reading):
         def find(simulation: Simulation) -> Equilibrium | ConvergenceError:
             with located_at(place), each_cause_once(heard):
                 try:
-                    return simulation.equilibrium()
+                    return simulation.equilibrium(stable=stable)
                 except ConvergenceError as error:
                     return error
 

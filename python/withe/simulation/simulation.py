@@ -127,7 +127,7 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
         self._stepping.step(validation.integer(count, "number of steps", 0, _MAX_STEPS))
 
     @overload
-    def equilibrium(self) -> Equilibrium: ...
+    def equilibrium(self, *, stable: bool = True) -> Equilibrium: ...
 
     @overload
     def equilibrium(
@@ -144,6 +144,7 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
     def equilibrium(
         self,
         *,
+        stable: bool = True,
         path: Literal["arc_length"] | None = None,
         load: Load | str | Sequence[Load | str] | None = None,
         start: float = 0.0,
@@ -153,15 +154,27 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
     ) -> Equilibrium | EquilibriumPath:
         """Find the static equilibrium that the present state leads to, and go there. Time stands still.
 
-        So what was told to be reached after a while (`over`) stays where it is now; a warning says so where it has not
-        begun.
+        Targets that are still ramping (`over=`) are frozen at their current value; a warning tells of ramps that have
+        not begun.
 
-        Supports that were moved go to their places, natural shapes that were set grow from those that the state last
-        moved with (from the drawn shape at first), and loads that were changed come in, along the branch of equilibria
-        that begins at the present state, in steps in which no edge turns far. Where that branch ends (at a limit point)
-        or is not stable any more, the scene goes on dynamically: then `branch_changed` is true. Saddles are left, so
-        that a straight column that carries too much buckles. A scene that is solved in a plane stays in it, with an
-        `OutOfPlaneWarning` where it would not stay in space.
+        The solver follows the branch of equilibria that begins at the present state, in steps in which no edge turns
+        far. Where that branch ends (at a limit point) or is not stable any more, the scene goes on dynamically: then
+        `branch_changed` is true. Saddles are left, so that a straight column that carries too much buckles, unless
+        ``stable=False``. A scene that is solved in a plane stays in it, with an `OutOfPlaneWarning` where it would not
+        stay in space.
+
+        All changes since the last equilibrium come in together, each in proportion to one factor from 0 to 1. The order
+        in which they were made in Python does not matter. With the factor
+
+        - supports and grippers go from where they are to where they were moved, in straight lines and even turns;
+        - natural shapes and tensions of tendons grow from those that the state last moved with (at first from the drawn
+          shape and slack tendons);
+        - moments and follower forces grow from the share of them that the state balances;
+        - the forces that are out of balance at the present state (of changed loads, gravity, moduli and obstacles) come
+          in as dead forces.
+
+        Obstacles that were moved are at their new places from the start. Where the order of changes matters, call
+        `equilibrium` after each of them: ``move``, ``equilibrium``, ``set``, ``equilibrium``.
 
         With ``path="arc_length"`` the branch is followed through limit points, stable or not, by pseudo-arc-length
         continuation [Riks 1979, Int. J. Solids Struct. 15; Crisfield 1981, Comput. Struct. 13], and all its points are
@@ -169,6 +182,12 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
 
         Parameters
         ----------
+        stable : bool
+            If False, an equilibrium that is not stable is returned where the path leads to one: the straight shape of a
+            column that carries more than Euler's load, an arch in the shape of an M. The result says so in
+            `Equilibrium.stable`. Draw or set the rods near the shape that is wanted. At a limit point, where no
+            equilibrium is near, the scene goes on dynamically all the same. A path by arc length follows branches that
+            are not stable in any case.
         path : "arc_length", optional
         load : Load, str, or several, optional
             Loads whose present values the load factor multiplies. Without any, the factor is that of all that has been
@@ -217,7 +236,7 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
         self._stepping.refuse_in_run("equilibrium")
         self._session.world.check_idle()
         if path is None:
-            return self._stepping.equilibrium()
+            return self._stepping.equilibrium(stable)
         validation.choice(path, "path", ("arc_length",))
         functions = self._session.settings.functions
         return self._stepping.path(path_options(self._session.directory, functions, load, start, to, steps, turn))

@@ -77,8 +77,8 @@ class Stepping:
         with self._convergence():
             self.session.world.advance_to(time, step_callback(self.session), force_function(self.session))
 
-    def equilibrium(self) -> Equilibrium:
-        """Go to the equilibrium that the present state leads to."""
+    def equilibrium(self, stable: bool) -> Equilibrium:
+        """Go to the equilibrium that the present state leads to; see `Simulation.equilibrium`."""
         world = self.session.world
         begun = [name for (_, name), time in self.session.settings.ramps.items() if time == world.time]
         if begun:
@@ -89,7 +89,7 @@ class Stepping:
             )
         apply_functions(self.session, world.time, world.time)
         with self._convergence():
-            found = world.equilibrium(None, force_function(self.session))
+            found = world.equilibrium(stable, None, force_function(self.session))
         stability: Stability = "stable" if found.stable else "diverges"
         if not found.decided:
             stability = self.linearise().stability

@@ -1,4 +1,4 @@
-#include "model/natural_shape.hpp"
+#include "model/actuation.hpp"
 
 #include <algorithm>
 #include <iterator>
@@ -7,8 +7,8 @@
 
 namespace withe {
 
-NaturalShape natural_shape(const Parameters& p) {
-  return {p.natural_curvature, p.natural_twist, p.edge_natural_stretch};
+Actuation actuation_of(const Parameters& p) {
+  return {p.natural_curvature, p.natural_twist, p.edge_natural_stretch, p.tendon_tension};
 }
 
 MatrixX3 drawn_strains(const MatrixX3& tangents, const MatrixX3& directors, bool closed) {
@@ -26,8 +26,9 @@ MatrixX3 drawn_strains(const MatrixX3& tangents, const MatrixX3& directors, bool
   return out;
 }
 
-NaturalShape relaxed_shape(const Model& model, const Parameters& p, const Configuration& c) {
-  NaturalShape out = natural_shape(p);
+Actuation relaxed_actuation(const Model& model, const Parameters& p, const Configuration& c) {
+  Actuation out = actuation_of(p);
+  out.tension.setZero();
   for (std::size_t r = 0; r < model.place.size(); ++r)
     for (std::size_t s = 0; s < model.place[r].size(); ++s) {
       const StencilPlace& place = model.place[r][s];
@@ -58,14 +59,15 @@ NaturalShape relaxed_shape(const Model& model, const Parameters& p, const Config
   return out;
 }
 
-void set_natural_between(const Model& model, const NaturalShape& from, const NaturalShape& to, double fraction,
-                         Parameters& p) {
+void set_actuation_between(const Model& model, const Actuation& from, const Actuation& to, double fraction,
+                           Parameters& p) {
   const double rest = 1.0 - fraction;
   for (std::size_t r = 0; r < p.natural_curvature.size(); ++r) {
     p.natural_curvature[r] = rest * from.curvature[r] + fraction * to.curvature[r];
     p.natural_twist[r] = rest * from.twist[r] + fraction * to.twist[r];
   }
   p.edge_natural_stretch = rest * from.stretch + fraction * to.stretch;
+  p.tendon_tension = rest * from.tension + fraction * to.tension;
   update_natural(model, p);
 }
 
