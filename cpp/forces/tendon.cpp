@@ -247,6 +247,22 @@ double segment_length(const Model& model, const TendonSegment& segment, const Ve
   return segment_at(model, segment, q, c).length;
 }
 
+double free_end_compliance(const Model& model, const Parameters& parameters, const TendonSegment& segment) {
+  double sum = 0.0;
+  for (int k : {0, 1}) {
+    const GuideSeat &seat = segment.seat[k], &before = segment.seat[1 - k];
+    if (seat.half >= 0 || seat.share == 0.5 || before.share != 0.5 || before.edge != seat.edge) continue;
+    const int node = (seat.share == 0.0 ? model.tail_dof : model.head_dof)[at(seat.edge)];
+    const auto meet = std::count(model.tail_dof.begin(), model.tail_dof.end(), node) +
+                      std::count(model.head_dof.begin(), model.head_dof.end(), node);
+    if (meet > 1) continue;
+    const Vector2 bend = bend_of(model, parameters, seat.edge);
+    for (int axis = 0; axis < (model.planar() ? 1 : 2); ++axis)
+      sum += 0.5 * model.edge_arc(seat.edge) * seat.offset[axis] * seat.offset[axis] / bend[axis];
+  }
+  return sum;
+}
+
 MatrixX3 guide_points(const Model& model, int tendon, const VectorX& q, const Configuration& c) {
   const TendonDescription& of = model.description.tendons[at(tendon)];
   MatrixX3 out(of.offsets.rows(), 3);

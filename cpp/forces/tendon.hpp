@@ -77,6 +77,9 @@ Vector3 guide_hinge_axis(const Model& model, const TendonSegment& segment, int e
 
 /// L [m].
 double segment_length(const Model& model, const TendonSegment& segment, const VectorX& q, const Configuration& c);
+/// How much half an edge at a free end, which rods' energy has straight, shortens the piece along it as it bends, over
+/// the tension: that of an arc under the moment T r, r^2 l / (2 EI) [m/N].
+double free_end_compliance(const Model& model, const Parameters& parameters, const TendonSegment& segment);
 /// Where the guides of a tendon are, in the axes of space [m].
 MatrixX3 guide_points(const Model& model, int tendon, const VectorX& q, const Configuration& c);
 

@@ -155,7 +155,9 @@ double World::tendon_length(int tendon) const {
   const int wanted = checked_tendon(self.model, tendon);
   double length = 0.0;
   for (const TendonSegment& segment : tendon_segments(self.model))
-    if (segment.tendon == wanted) length += segment_length(self.model, segment, self.state.q, self.configuration());
+    if (segment.tendon == wanted)
+      length += segment_length(self.model, segment, self.state.q, self.configuration()) -
+                self.parameters.tendon_tension(wanted) * free_end_compliance(self.model, self.parameters, segment);
   return length;
 }
 

@@ -71,6 +71,32 @@ def test_a_straight_tendon_bends_a_rod_to_an_arc(planar, offset):
     assert_order(np.array(errors), order=2.0, slack=0.2)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_what_a_motor_takes_in_of_a_straight_tendon_is_that_of_an_arc_on_any_mesh(seed):
+    """Of a section of least energy; half an edge at the free end counts as the arc that it is."""
+    random = np.random.default_rng([62, seed])
+    bend, offset = random.uniform(2e-3, 8e-3, 2), random.uniform(-8e-3, 8e-3, 2)
+    curvature = TENSION * offset / bend
+    for nodes in (4, 11, 41):
+        scene = rods.weightless()
+        stiffness = withe.Stiffness(stretch=1e9, bend=tuple(bend), twist=1e3)
+        rod = scene.add_rod(
+            start=(0, 0, 0),
+            end=(0, 0, LENGTH),
+            nodes=nodes,
+            normal=(1, 0, 0),
+            stiffness=stiffness,
+            line_density=0.1,
+            radius=5e-3,
+        )
+        scene.clamp(rod.start)
+        tendon = scene.add_tendon(rod, offset=tuple(offset), tension=TENSION)
+        simulation, _ = settle(scene)
+        taken = LENGTH - simulation.tendon_length(tendon)
+        turn = LENGTH / (nodes - 1) * np.linalg.norm(curvature)
+        assert taken == pytest.approx(LENGTH * curvature @ offset, rel=0.2 * turn**2 + 1e-5)
+
+
 @pytest.mark.parametrize("planar", [True, False])
 @pytest.mark.parametrize("twigs", [(), (20, 45)], ids=["bare", "with twigs"])
 def test_a_tendon_bends_its_rod_until_nothing_of_it_is_left(planar, twigs):

@@ -115,8 +115,8 @@ class Measurements:
     def tendon_length(self, tendon: Tendon | str) -> float:
         """From its first guide to its last, along a tendon [m]: what a motor that shortens it has to take in.
 
-        Forces are minus the gradient of the tension times this. Half an edge at a free end is straight, as in all of
-        the rod's energy: of an arc what is taken in is short by 1 / (2 edges) of itself there.
+        Forces are minus the gradient of the tension times this. Half an edge at a free end is straight in the rod's
+        energy; counted is the arc l / 2 as which it bends under the tension T at an offset r, T r^2 l / (2 EI).
 
         Raises
         ------
