@@ -33,7 +33,7 @@ constexpr int kMostCuts = 6, kMostCutsOfFriction = 12;
 // Most iterations for a point of the path or an interval, beyond those of the border of slip. Where surfaces rub,
 // Newton's method may wander before it converges: rounding errors grow by some factor each iteration, and after 25 to
 // 40 of them decide where it ends.
-constexpr int kMostIterations = 16;
+constexpr int kMostIterations = 20;
 // Corrections of a point that a ring may spoil: its rod sticks, slips, or slips the other way.
 constexpr int kKinks = 2;
 // A path has no more points than this: what a scene is torn along by a support that goes a thousand lengths away is

@@ -103,9 +103,9 @@ void World::Implementation::rest() {
 }
 
 /// True if nothing resists a translation along which forces do not sum to zero: no way off leads to equilibrium then.
-/// Surfaces and custom forces may resist elsewhere.
+/// Surfaces, and custom forces with a Jacobian, may resist elsewhere.
 bool World::Implementation::drifts(Equations& system) {
-  if (system.contact() || description.has_custom_force) return false;
+  if (system.contact() || description.custom_implicit) return false;
   for (const Support& s : model.supports)
     if (s.active) return false;
   system.begin(state, parameters, StepRule::statics, 0.0);
@@ -288,7 +288,7 @@ void World::Implementation::static_step(double end, double dt) {
 void World::Implementation::fail_equilibrium(const StaticResult& result, double dt) const {
   const bool held =
       std::any_of(model.supports.begin(), model.supports.end(), [](const Support& s) { return s.active; });
-  const bool lies = !description.contact.obstacles.empty(), pulled = description.has_custom_force;
+  const bool lies = !description.contact.obstacles.empty(), pulled = description.custom_implicit;
   fail(result.newton, dt,
        std::string("no static equilibrium was found") +
            (!held && lies     ? ", and nothing but contact holds the scene, where friction may not be enough: clamp or "

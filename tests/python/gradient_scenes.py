@@ -109,7 +109,7 @@ def settings(drawn, random):
             yield (drawn.hinge, word), 1.0, lambda h, w=word, v=value: sim.set(drawn.hinge, **{w: v + h}), 2e-2 * value
     if drawn.damping:
         yield (drawn.hinge, "damping"), 1.0, lambda h: sim.set(drawn.hinge, damping=drawn.damping + h), 2e-5
-    yield "gravity", np.array([0, 0, 1.0]), lambda h: sim.set(None, gravity=(0, 0, -9.81 + h)), 1e-3
+    yield "gravity", np.array([0, 0, 1.0]), lambda h: sim.set(None, gravity=(0, 0, -9.81 + h)), 2e-3
 
 
 def move_with_directors(simulation, rod, way):
