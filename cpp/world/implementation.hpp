@@ -139,7 +139,6 @@ struct World::Implementation : Running {
   VectorX placed(const std::vector<RodState>& rods);
   void place_rods(const std::vector<RodState>& rods);
   void place_directors(const RodState& rod, const VectorX& q, const Configuration& before);
-  void keep_held_velocities(const VectorX& before);
   void set_rates(const std::vector<RodState>& rods);
   void relax_joints(const std::vector<bool>& is_told);
   void turn_frames(const std::vector<bool>& is_told);
