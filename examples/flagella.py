@@ -48,6 +48,7 @@ def build(
     scene = withe.Scene(gravity=(0.0, 0.0, 0.0))
     rubber = withe.Material(youngs_modulus=3e6, poisson_ratio=0.5, density=1000.0)
     scene.add_fluid(VISCOSITY, model=fluid, regularization=REGULARIZATION, wavelength=TURN_LENGTH)
+    scene.enable_contact(rods=False)  # flagella_contact.py lets them touch
     angles = 2.0 * np.pi * HEIGHT / PITCH * np.linspace(0.0, 1.0, NODES)
     helix = np.stack([RADIUS * np.cos(angles), -RADIUS * np.sin(angles), -PITCH * angles / (2.0 * np.pi)], axis=1)
     place = 0.5 * SIDE / np.sin(np.pi / count)

@@ -28,12 +28,22 @@ void set_start(const State& state, double duration, ContactProblem& problem) {
   problem.find_offsets();
 }
 
+/// Distance of a straight edge from an obstacle [m].
+double edge_distance(const Obstacle& o, const Vec3d& tail, const Vec3d& head) {
+  if (o.kind == ObstacleKind::plane) return std::min(height_above(o, tail), height_above(o, head));
+  constexpr double kStrictlyConvex = 1e-12;  // of the edge's length squared: closest points of what is parallel
+  const Vec3d way = head - tail;
+  const double weight = kStrictlyConvex * dot(way, way);
+  const Vec3d between = closest_points(tail, head, o.point, o.other, weight, weight).between;
+  return std::sqrt(dot(between, between));
+}
+
 ContactReport report_of(const ContactProblem& problem, const Touching& t) {
   const ContactPair& pair = t.pair;
   ContactReport r;
   r.key = pair.key;
   r.distance = t.proximity.distance;
-  r.gap = t.proximity.distance - pair.radii();
+  r.gap = r.edge_gap = t.proximity.distance - pair.radii();
   r.s = t.proximity.points.s;
   r.t = t.proximity.points.t;
   r.normal = t.proximity.normal;
@@ -45,7 +55,10 @@ ContactReport report_of(const ContactProblem& problem, const Touching& t) {
   Vec3d on_a = x[0] + r.s * (x[1] - x[0]);
   if (pair.curve()) {
     on_a = curve_point(*pair.piece.weights, x, t.proximity.points.s);
-    r.key.a = pair.piece.edge[pair.piece.weights->edges > 1 && r.s > 0.0];
+    const int edge = pair.piece.weights->edges > 1 && r.s > 0.0 ? 1 : 0;
+    r.key.a = pair.piece.edge[edge];
+    if (!problem.fixed(pair))  // else the curve presses by its whole depth from the start
+      r.edge_gap = edge_distance(problem.bodies.obstacle(pair), x[edge], x[edge + 1]) - pair.radii();
     r.s = pair.piece.weights->along(t.proximity.points.s);
   }
   r.point = on_a - (pair.radius_a + 0.5 * r.gap) * r.normal;

@@ -26,11 +26,16 @@ struct ContactReport {
   ContactKey key;
   double distance = 0;      ///< of the centrelines, or of a centreline and the obstacle [m]
   double gap = 0;           ///< of the surfaces [m]
+  double edge_gap = 0;      ///< of the surfaces, by the straight edge where a curve touches in its place [m]
   double s = 0, t = 0;      ///< along the edges
   Vec3d point{}, normal{};  ///< between the surfaces; from b to a
   double force = 0;         ///< normal force [N]
   Vec3d friction{};         ///< on a [N]
   bool sticking = false;
+
+  /// Overlap of surfaces as they are drawn [m]. The curve of a rod swings out beside a corner of its edges, by up to an
+  /// eighth of the second difference of the nodes, and begins at rest there.
+  double drawn_depth() const { return -std::max(gap, edge_gap); }
 };
 
 /// Contact of a state that stays as it is, obstacles too: scratch of read-outs.
@@ -49,6 +54,8 @@ class Contact {
   Contact& operator=(const Contact&) = delete;
 
   const Surfaces& surfaces() const { return surfaces_; }
+  /// True if the stiffness of the pair is a number that the scene gives.
+  bool has_given_stiffness(const ContactPair& pair) const { return problem_.fixed(pair); }
   /// Whether friction is there at all, and its Jacobian unsymmetric.
   bool frictional() const { return surfaces_.frictional(); }
   bool unsymmetric() const { return problem_.unsymmetric(); }

@@ -18,4 +18,8 @@ struct Squeezed {
 /// together with another, which becomes as much deeper as it is relieved. `slope` and `other` are scratch.
 Squeezed squeezed_contact(const Equations& equations, VectorX& slope, VectorX& other);
 
+/// The first contacts of a rod with obstacles on opposite sides that leave it less room than it is thick, by more than
+/// rounding, where their stiffness is not given.
+Squeezed opposite_contacts(const Equations& equations, VectorX& slope, VectorX& other);
+
 }  // namespace withe

@@ -209,7 +209,9 @@ struct ContactPairDescription {
 };
 
 struct ContactDescription {
-  bool rods = false;             ///< whether rods touch each other and themselves
+  bool rods = false;  ///< whether rods touch each other and themselves
+  /// True if the scene does not say whether rods touch: a warning then names rods that pass through each other.
+  bool warns_of_crossings = false;
   double friction = 0;           ///< coefficient between rods [-]
   MatrixX3 obstacle_friction;    ///< per obstacle, of rods that slide towards their end, their start, across [-]
   VectorX obstacle_rolling;      ///< per obstacle, of rolling friction over a rod's radius [-]; empty: none

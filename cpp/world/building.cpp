@@ -111,7 +111,9 @@ World::Implementation::Implementation(const Implementation& other, Unbuilt /*unu
       impact_warning(other.impact_warning),
       branch_warning(other.branch_warning),
       plane_warning(other.plane_warning),
-      drift_warning(other.drift_warning) {
+      drift_warning(other.drift_warning),
+      crossing_warning(other.crossing_warning),
+      squeeze_warning(other.squeeze_warning) {
   work.newton.counters = other.work.newton.counters;
   listen();
 }

@@ -57,7 +57,7 @@ void World::Implementation::check_overlap() const {
   const ContactReport* deepest = nullptr;
   const std::vector<ContactReport> reports = contact->report(state, parameters);
   const bool bars = description.contact.law == ContactLaw::barrier;  // which is infinite where surfaces touch
-  double depth = bars ? 0.0 : kDeepest;
+  double depth = bars ? 0.0 : kDeepest, overlap = 0.0;
   const auto bodies = [&](const ContactKey& key) {
     return std::pair(model.edge_rod[at(key.a)], key.b < 0 ? key.b : model.edge_rod[at(key.b)]);
   };
@@ -67,8 +67,10 @@ void World::Implementation::check_overlap() const {
     const double radius = r.key.b < 0
                               ? contact->surfaces().radius(r.key.a)
                               : std::min(contact->surfaces().radius(r.key.a), contact->surfaces().radius(r.key.b));
-    if (-r.gap <= depth * radius && !(bars && r.gap <= 0.0)) continue;
-    depth = -r.gap / radius;
+    const double drawn = bars ? -r.gap : r.drawn_depth();
+    if (drawn <= depth * radius && !(bars && r.gap <= 0.0)) continue;
+    depth = drawn / radius;
+    overlap = drawn;
     deepest = &r;
   }
   if (deepest == nullptr) return;
@@ -87,7 +89,7 @@ void World::Implementation::check_overlap() const {
                 "draw them apart, or leave the pair out with ignore_contact"
           : std::string(" m at the start: ") + (meet ? "join the nodes that meet there, " : "") +
                 "draw them apart, leave the pair out with ignore_contact, or take enable_contact(overlap='separate')";
-  require(false, name(deepest->key.a) + " and " + other + " overlap by " + text(0.0 - deepest->gap) + advice);
+  require(false, name(deepest->key.a) + " and " + other + " overlap by " + text(0.0 + overlap) + advice);
 }
 
 }  // namespace withe

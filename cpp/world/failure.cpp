@@ -125,16 +125,16 @@ void World::Implementation::check_resolution() {
 }
 
 void Warnings::add(const Warnings& other) {
-  for (std::string Warnings::* each :
-       {&Warnings::mesh, &Warnings::steps, &Warnings::impact, &Warnings::branch, &Warnings::plane, &Warnings::drift})
+  for (std::string Warnings::* each : {&Warnings::mesh, &Warnings::steps, &Warnings::impact, &Warnings::branch,
+                                       &Warnings::plane, &Warnings::drift, &Warnings::crossing, &Warnings::squeeze})
     if ((this->*each).empty()) this->*each = other.*each;
 }
 
 Warnings World::take_warnings() {
   const auto take = [](std::optional<std::string>& warning) { return warning ? std::exchange(*warning, {}) : ""; };
   Implementation& self = *implementation_;
-  return {take(self.mesh_warning),   take(self.step_warning),  take(self.impact_warning),
-          take(self.branch_warning), take(self.plane_warning), take(self.drift_warning)};
+  return {take(self.mesh_warning),  take(self.step_warning),  take(self.impact_warning),   take(self.branch_warning),
+          take(self.plane_warning), take(self.drift_warning), take(self.crossing_warning), take(self.squeeze_warning)};
 }
 
 /// What may help where steps do not converge, by what is the matter; one sentence.

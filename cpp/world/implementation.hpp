@@ -5,6 +5,7 @@
 
 #include "integrators/statics.hpp"
 #include "model/edge_vectors.hpp"
+#include "world/crossings.hpp"
 #include "world/running.hpp"
 
 namespace withe {
@@ -86,12 +87,15 @@ struct World::Implementation : Running {
   bool spatial = false;  ///< left its plane while running
   /// Of a mesh too coarse for the motion, and empty once it was heard; none yet where there was no reason.
   std::optional<std::string> mesh_warning;
-  std::optional<std::string> step_warning;    ///< likewise, of steps too long for the motion
-  std::optional<std::string> impact_warning;  ///< likewise, of steps too long for an impact
-  std::optional<std::string> branch_warning;  ///< likewise, of a static step that left its branch
-  std::optional<std::string> plane_warning;   ///< likewise, of an equilibrium that is unstable out of its plane
-  std::optional<std::string> drift_warning;   ///< likewise, of an integrator that changes the energy
-  std::vector<LeftRing> left_rings;           ///< not heard of yet
+  std::optional<std::string> step_warning;        ///< likewise, of steps too long for the motion
+  std::optional<std::string> impact_warning;      ///< likewise, of steps too long for an impact
+  std::optional<std::string> branch_warning;      ///< likewise, of a static step that left its branch
+  std::optional<std::string> plane_warning;       ///< likewise, of an equilibrium that is unstable out of its plane
+  std::optional<std::string> drift_warning;       ///< likewise, of an integrator that changes the energy
+  std::optional<std::string> crossing_warning;    ///< likewise, of rods that pass through each other
+  std::optional<std::string> squeeze_warning;     ///< likewise, of obstacles that squeeze a rod by no given stiffness
+  std::unique_ptr<CrossingWatch> crossing_watch;  ///< made when first needed
+  std::vector<LeftRing> left_rings;               ///< not heard of yet
   NewtonResult last_newton;
 
   // lagged.cpp
@@ -139,7 +143,6 @@ struct World::Implementation : Running {
   VectorX placed(const std::vector<RodState>& rods);
   void place_rods(const std::vector<RodState>& rods);
   void place_directors(const RodState& rod, const VectorX& q, const Configuration& before);
-  void keep_held_velocities(const VectorX& before);
   void set_rates(const std::vector<RodState>& rods);
   void relax_joints(const std::vector<bool>& is_told);
   void turn_frames(const std::vector<bool>& is_told);
@@ -264,6 +267,7 @@ struct World::Implementation : Running {
                          const std::string& hint = "") const;
 
   // squeezed.cpp
+  void check_squeeze();
   void check_squeezed(Equations& system, const VectorX& q, double dt);
   [[noreturn]] void fail_squeezed(const Equations& system, const Squeezed& squeezed, double dt) const;
 
@@ -349,6 +353,10 @@ struct World::Implementation : Running {
   std::string longest_explicit_step();
   void check_explicit();
   void check_drift();
+
+  // crossings.cpp
+  void begin_crossing_watch();
+  void check_crossings();
 };
 
 /// Puts a node in space into a configuration vector.

@@ -275,13 +275,7 @@ void World::Implementation::relax_joints(const std::vector<bool>& is_told) {
   }
 }
 
-/// What is held goes on with its support, whatever velocities have been set.
-void World::Implementation::keep_held_velocities(const VectorX& before) {
-  equations->assembler().set_held_part(before, state.v);
-}
-
 void World::Implementation::set_rates(const std::vector<RodState>& rods) {
-  const VectorX before = state.v;
   std::vector<bool> is_told(at(model.edge_count), false);
   for (const RodState& rod : rods) {
     const int first = model.rod_first_edge[at(rod.rod)], end = model.rod_first_edge[at(rod.rod) + 1];
@@ -300,7 +294,6 @@ void World::Implementation::set_rates(const std::vector<RodState>& rods) {
         state.v(model.edge_dof[at(first + static_cast<int>(e))]) = rod.spins(e);
   }
   turn_frames(is_told);
-  keep_held_velocities(before);
   forget_motion();
 }
 

@@ -3,6 +3,7 @@
 #include "integrators/squeezed.hpp"
 
 #include <algorithm>
+#include <numbers>
 
 #include "common/text.hpp"
 #include "world/implementation.hpp"
@@ -16,6 +17,29 @@ void World::Implementation::check_squeezed(Equations& system, const VectorX& q, 
   system.begin(state, parameters, StepRule::statics, 0.0);
   system.contact()->update(q);
   if (const Squeezed found = squeezed_contact(system, work.change, work.mean)) fail_squeezed(system, found, dt);
+}
+
+/// Warns once of two obstacles that press on both sides of a rod with a stiffness of contact that nobody has given.
+void World::Implementation::check_squeeze() {
+  const Contact* contact = equations->contact();
+  if (contact == nullptr || squeeze_warning || description.contact.obstacles.size() < 2) return;
+  const Squeezed found = opposite_contacts(*equations, work.change, work.mean);
+  if (!found) return;
+  const Touching &a = contact->contacts()[found.contact], &b = contact->contacts()[found.against];
+  const auto other = [&](const Touching& t) {
+    return t.pair.key.b < 0 ? "'" + description.contact.obstacles[at(-1 - t.pair.key.b)].name + "'"
+                            : "rod '" + description.rods[at(model.edge_rod[at(t.pair.key.b)])].name + "'";
+  };
+  const int edge = a.pair.key.a;
+  const double radius = contact->surfaces().radius(edge);
+  const double modulus = parameters.edge_stretch(edge) / (std::numbers::pi * radius * radius);
+  squeeze_warning = "Rod '" + description.rods[at(model.edge_rod[at(edge)])].name + "' is squeezed between " +
+                    other(a) + " and " + other(b) + " (time " + text(state.time, 6) +
+                    " s): neither of them yields, so that their force follows from the stiffness of contact, and none "
+                    "is given. Take stiffness= in scene.enable_contact: half of Young's modulus times the length of an "
+                    "edge is " +
+                    text(0.5 * modulus * model.edge_arc(edge), 2) +
+                    " N/m here. Or press with what yields, such as a hand with stiffness=.";
 }
 
 void World::Implementation::fail_squeezed(const Equations& system, const Squeezed& squeezed, double dt) const {

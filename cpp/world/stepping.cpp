@@ -36,6 +36,7 @@ void World::Implementation::advance(double duration) {
   const double base = state.time;
   account_for_settings();
   if (!first_energy) begin_energy_watch();
+  begin_crossing_watch();
   motions_before = motions;
   mark();
   if (!options.adaptive && !options.tolerance) level = 0;
@@ -55,7 +56,9 @@ void World::Implementation::advance(double duration) {
     throw;
   }
   if (steps_taken % kEnergyPeriod == 0) check_energy();
+  if (steps_taken % kEnergyPeriod == 0) check_squeeze();
   if (steps_taken % kResolutionPeriod == 0) check_resolution();
+  check_crossings();
 }
 
 void World::Implementation::advance_in_parts(double duration) {

@@ -484,7 +484,6 @@ void World::set_velocities(const MatrixX3& velocities) {
     const VectorX off = velocities * self.model.plane->normal;
     if (off.cwiseAbs().maxCoeff() > 1e-9 * velocities.cwiseAbs().maxCoeff()) self.leave_plane("a velocity");
   }
-  const VectorX before = self.state.v;
   for (int i = 0; i < self.model.node_count; ++i) {
     const int dof = self.model.node_dof[at(i)];
     const Vector3 v = velocities.row(i);
@@ -493,7 +492,6 @@ void World::set_velocities(const MatrixX3& velocities) {
     else
       self.state.v.segment<3>(dof) = v;
   }
-  self.keep_held_velocities(before);
   self.forget_motion();
 }
 

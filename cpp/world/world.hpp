@@ -77,12 +77,14 @@ struct Momentum {
 
 /// What is wrong with how a scene is run, each said once; empty where nothing is, or where it was heard.
 struct Warnings {
-  std::string mesh;    ///< it is too coarse for the motion
-  std::string steps;   ///< they are too long for it
-  std::string impact;  ///< they are too long for one
-  std::string branch;  ///< a static step has left it
-  std::string plane;   ///< an equilibrium in it is not stable against motions out of it
-  std::string drift;   ///< the integrator changes the energy
+  std::string mesh;      ///< it is too coarse for the motion
+  std::string steps;     ///< they are too long for it
+  std::string impact;    ///< they are too long for one
+  std::string branch;    ///< a static step has left it
+  std::string plane;     ///< an equilibrium in it is not stable against motions out of it
+  std::string drift;     ///< the integrator changes the energy
+  std::string crossing;  ///< rods pass through each other
+  std::string squeeze;   ///< obstacles squeeze a rod by a stiffness of contact that is not given
 
   /// Takes what is not said yet from others.
   void add(const Warnings& other);

@@ -80,6 +80,7 @@ void register_contact(py::module_& module) {
   py::class_<ContactDescription> contact(module, "ContactDescription", "What touches, and how.");
   contact.def(py::init<>())
       .def_readwrite("rods", &ContactDescription::rods)
+      .def_readwrite("warns_of_crossings", &ContactDescription::warns_of_crossings)
       .def_readwrite("friction", &ContactDescription::friction)
       .def_readwrite("obstacle_friction", &ContactDescription::obstacle_friction)
       .def_readwrite("obstacle_rolling", &ContactDescription::obstacle_rolling)

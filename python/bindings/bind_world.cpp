@@ -112,6 +112,8 @@ void register_results(py::module_& module) {
       .def_readonly("impact", &Warnings::impact)
       .def_readonly("branch", &Warnings::branch)
       .def_readonly("drift", &Warnings::drift)
+      .def_readonly("crossing", &Warnings::crossing)
+      .def_readonly("squeeze", &Warnings::squeeze)
       .def_readonly("plane", &Warnings::plane);
   py::class_<Linearisation>(module, "Linearisation", "Equations linearised about the present configuration.")
       .def_property_readonly("geometric", [](const Linearisation& self) { return self.geometric; })

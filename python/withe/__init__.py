@@ -22,6 +22,8 @@ from withe.errors import (
     OutOfPlaneWarning,
     PlausibilityWarning,
     RingLeftWarning,
+    RodCrossingWarning,
+    SqueezedRodWarning,
 )
 from withe.parts.friction_fields import FrictionMap
 from withe.parts.handles import (
@@ -81,11 +83,13 @@ __all__ = [
     "Rectangle",
     "RingLeftWarning",
     "Rod",
+    "RodCrossingWarning",
     "RodEnergy",
     "Scene",
     "Simulation",
     "Snapshot",
     "Spring",
+    "SqueezedRodWarning",
     "Statistics",
     "Stiffness",
     "Support",

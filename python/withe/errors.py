@@ -11,6 +11,8 @@ __all__ = [
     "OutOfPlaneWarning",
     "PlausibilityWarning",
     "RingLeftWarning",
+    "RodCrossingWarning",
+    "SqueezedRodWarning",
 ]
 
 
@@ -83,6 +85,26 @@ class PlausibilityWarning(UserWarning):
 
 class RingLeftWarning(UserWarning):
     """An end of a rod has passed out of a ring that let it slide: the ring is released."""
+
+
+class RodCrossingWarning(UserWarning):
+    """Two rods pass through each other, as nothing said whether rods touch.
+
+    ``scene.enable_contact()`` lets rods touch each other, ``scene.enable_contact(rods=False)`` lets them pass. The
+    engine compares rods after each time step, and warns once a simulation when centrelines are nearer than half the sum
+    of the contact radii. It leaves out rods that share a node, that overlap at the start, or that are in
+    `Scene.ignore_contact`.
+    """
+
+
+class SqueezedRodWarning(UserWarning):
+    """Two obstacles squeeze a rod by a stiffness of contact that is not given.
+
+    Obstacles do not yield, and a rod has no stiffness across its section, so that only the stiffness of contact says
+    how hard they press. A round section resists with about Young's modulus times the length in contact times the
+    depth: half of Young's modulus times the length of an edge is that as `stiffness` of `Scene.enable_contact`. Given
+    once a simulation, within 16 steps, where obstacles leave less room than the rod is thick.
+    """
 
 
 class ConvergenceError(RuntimeError):

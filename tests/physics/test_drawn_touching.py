@@ -109,3 +109,44 @@ def test_a_contact_whose_stiffness_is_given_keeps_its_law():
     force = scene.build(time_step=1e-3).contacts()["normal_force"]
     expected = 2e4 * (np.log(2.0) / 15.0 * 0.1 * RADIUS) * 0.5
     assert force.max() == pytest.approx(expected, rel=1e-3)
+
+
+def kinked(fresh, dip=0.0):
+    """A rod that lies on a plane up to a kink and rises from there at up to 80 degrees, turned in space with it."""
+    nodes, length, radius = int(fresh.integers(7, 60)), fresh.uniform(0.2, 2.0), fresh.uniform(1e-3, 5e-3)
+    rise, corner = fresh.uniform(0.1, 1.4), int(fresh.integers(2, nodes - 2))
+    along = np.linspace(0.0, length, nodes)
+    beyond = np.maximum(along - along[corner], 0.0)
+    points = np.stack(
+        [along - (1.0 - np.cos(rise)) * beyond, 0.0 * along, radius - dip * radius + np.sin(rise) * beyond]
+    )
+    axes = np.linalg.qr(fresh.normal(size=(3, 3)))[0]
+    weight = 1000.0 * np.pi * radius**2 * 9.81
+    scene = withe.Scene(gravity=-9.81 * axes[:, 2])
+    scene.add_rod(points=points.T @ axes.T, radius=radius, material=material(10.0 ** fresh.uniform(6, 9)), name="rope")
+    scene.add_plane(point=(0, 0, 0), normal=axes[:, 2])
+    return scene, weight * length, radius
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_rod_that_is_drawn_kinked_on_a_plane_begins_at_rest(seed):
+    """Its curve swings below the corner of its edges, where nothing presses; its edges touch and do not overlap."""
+    scene, weight, radius = kinked(np.random.default_rng(seed))
+    simulation = scene.build(time_step=1e-3)
+    assert simulation.contacts()["normal_force"].sum() < 1.5 * weight
+    before = simulation.energy()
+    assert before.contact < 0.01 * weight * radius
+    simulation.step(20)
+    after = simulation.energy()
+    gained = after.total + after.dissipated - before.total - before.dissipated
+    assert gained < 1e-3 * weight * 0.5 * 9.81 * simulation.time**2
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_kinked_rod_whose_edges_overlap_a_plane_is_refused(seed):
+    fresh = np.random.default_rng(seed)
+    dip = fresh.uniform(0.05, 0.5)
+    scene, _, radius = kinked(fresh, dip)
+    with pytest.raises(ValueError, match="of rod 'rope' and 'plane 1' overlap by") as refused:
+        scene.build(time_step=1e-3)
+    assert float(str(refused.value).split("overlap by ")[1].split()[0]) == pytest.approx(dip * radius, rel=1e-2)

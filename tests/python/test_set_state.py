@@ -154,8 +154,10 @@ def test_supports_are_not_moved_and_nothing_changes_where_they_would_be():
     bent = simulation.positions(arm)
     bent[1:, 2] += 0.1 * (bent[1:, 0] - bent[0, 0])
     simulation.set_state(arm, bent, np.ones((len(bent), 3)) * (0.1, 0, 0))
-    assert np.array_equal(simulation.velocities(arm)[0], (0, 0, 0))
+    assert np.array_equal(simulation.velocities(arm)[0], (0.1, 0, 0))
     simulation.step(5)
+    assert np.array_equal(simulation.velocities(arm)[0], (0, 0, 0))
+    assert simulation.positions(arm)[0] == pytest.approx(bent[0], abs=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -138,7 +138,8 @@ def describe_contact(directory: Directory) -> _core.ContactDescription:
     """
     settings: ContactSettings = directory.contact
     contact = _core.ContactDescription()
-    contact.rods = settings.rods
+    contact.rods = bool(settings.rods)
+    contact.warns_of_crossings = settings.rods is None
     contact.friction = settings.friction
     contact.restitution = settings.restitution
     contact.law = settings.model

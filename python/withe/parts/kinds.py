@@ -275,7 +275,7 @@ class PairSettings:
 class ContactSettings:
     """Whether rods touch, and how."""
 
-    rods: bool = False
+    rods: bool | None = None  # None: not said
     friction: float = 0.0
     restitution: float = 1.0
     model: ContactModel = "imcv2"

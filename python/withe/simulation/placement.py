@@ -278,7 +278,7 @@ class Placement:
             The first director of the first edge follows by the smallest turn. Nodes that a support holds must stay, or
             go to the position to which `move` moved the support without `over`.
         velocities : array_like of shape (nodes, 3) or (3,) [m/s]
-            Those of nodes that are held stay as they are.
+            A support that moves otherwise stops the nodes that it holds, or carries them along, in the next step.
         twist : float or array_like of shape (stencils,) [rad/m]
             As `twists` reads it. By default that of now; a closed rod spreads evenly what new positions
             change of it, so that it is closed again.
@@ -302,7 +302,11 @@ class Placement:
         set_state(self._session, rod, positions, velocities, twist, directors, spins)
 
     def set_velocities(self, rod: Rod | str | None, velocities: npt.ArrayLike) -> None:
-        """Set the velocities of the nodes of a rod; those that are held go on as their supports do.
+        """Set the velocities of the nodes of a rod.
+
+        A support that moves otherwise stops the nodes that it holds, or carries them along, in the next step:
+        `reaction` contains that impulse divided by the duration of the time step. A rod and its support that move
+        together from the start need both: the velocities here and the way of the support by `move(path=)`.
 
         Parameters
         ----------

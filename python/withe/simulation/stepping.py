@@ -16,6 +16,8 @@ from withe.errors import (
     EnergyDriftWarning,
     OutOfPlaneWarning,
     RingLeftWarning,
+    RodCrossingWarning,
+    SqueezedRodWarning,
 )
 from withe.recording.recorder import Recorder
 from withe.simulation.functions import apply_functions, force_function, step_callback
@@ -204,6 +206,10 @@ def pass_on(sessions: Sequence[Session], found: _core.Warnings) -> None:
             warn(coarse, CoarseStepWarning, cause)
     if found.drift:
         warn(found.drift, EnergyDriftWarning)
+    if found.crossing:
+        warn(found.crossing, RodCrossingWarning)
+    if found.squeeze:
+        warn(found.squeeze, SqueezedRodWarning)
     if found.branch:
         warn(found.branch, BranchChangedWarning)
     if found.plane:
