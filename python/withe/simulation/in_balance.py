@@ -8,7 +8,6 @@ from functools import partial
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import cho_factor, cho_solve
 
 from withe.parts.directory import Directory
 from withe.parts.kinds import RodPart
@@ -90,6 +89,8 @@ def _put_in_balance(session: Session, strains: list[_Strains]) -> None:
     energy that does: y = -B^T m, B B^T m = K^-1 r, B = K^-1 A. Beside clamps, which bend by what the stencil next to
     them is free of stress at, u is least squares, and of second order in the length of an edge.
     """
+    from scipy.linalg import cho_factor, cho_solve
+
     world, columns, least = session.world, _columns(session, strains), np.inf
     ends = np.cumsum([kind.value.size for kind in strains])
     for _ in range(_MOST_ITERATIONS):
