@@ -27,9 +27,9 @@ struct PressingLaw {
   double stiffness = 0;             ///< [N/m]
   double yielded = 0;               ///< [m]
   double elastic = 0;               ///< a [-]
-  double elastic_by_way = 0;        ///< its derivative by D0 - D1 [1/m]
   double restitution = 1;           ///< e [-]
   double parting = 0;               ///< way by which surfaces part in a step from which on e counts whole [m]
+  double elastic_by_way = 0;        ///< derivative of a by D0 - D1 [1/m]
 
   /// E at a distance, for unit stiffness.
   ContactEnergy energy(double distance) const { return contact_energy(law, distance + yielded, radii, tolerance); }
