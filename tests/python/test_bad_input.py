@@ -103,7 +103,10 @@ RODS = [
         "bend stiffness of rod 'arm' must have shape (2,) or (4, 2)",
     ),
     (lambda: rod(**STIFF, stiffness=stiff(viscous_time=-1)), "viscous_time of rod 'arm' must not be negative, got -1"),
-    (lambda: rod(natural="curly"), "natural of rod 'arm' must be 'as_built' or 'straight' or 'in_balance', got 'curly'"),
+    (
+        lambda: rod(natural="curly"),
+        "natural of rod 'arm' must be 'as_built' or 'straight' or 'in_balance', got 'curly'",
+    ),
     (
         lambda: rod(natural_curvature=1.0),
         "natural_curvature of rod 'arm' must have shape (2,) or (3, 2), got a single number",
