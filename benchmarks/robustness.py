@@ -253,7 +253,10 @@ def main() -> None:
         report,
         cases,
         verdicts,
-        {"method": ("method", METHODS), "event": ("event", sorted({case.event for case in cases}))},
+        {
+            "method": ("method", tuple(dict.fromkeys(METHODS))),
+            "event": ("event", sorted({case.event for case in cases})),
+        },
         {
             "method": lambda c: c.method,
             "event": lambda c: c.event,
