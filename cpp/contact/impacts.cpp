@@ -153,7 +153,10 @@ ElasticShareSlopes elastic_share_slopes(const ContactProblem& problem, const Tou
                over = kSwings * swing + kSteps * problem.duration;
   const double speed = speed_of_impact(problem, t), fast = speed / rest - 1.0, fresh = 2.0 - t.age / over;
   const double by_fast = smooth_slope(fast) * smooth_step(fresh), by_fresh = smooth_step(fast) * smooth_slope(fresh);
-  (speed > t.approach ? out.way : out.approach) = by_fast / (speed > t.approach ? rest * problem.duration : rest);
+  if (speed > t.approach)
+    out.way = by_fast / (rest * problem.duration);
+  else
+    out.approach = by_fast / rest;
   const double by_rest = -by_fast * speed / (rest * rest);
   if (rest > problem.parameters->slip_tolerance)
     out.gravity = 0.5 * by_rest * rest / problem.parameters->gravity;
@@ -194,6 +197,7 @@ double nearing(const ContactProblem& problem, const ContactPair& pair) {
 
 void add_approach_slopes(const ContactProblem& problem, const Touching& touching, double by,
                          double (&start)[kContactUnknowns], double (&velocity)[kContactUnknowns]) {
+  if (by == 0.0) return;
   const ContactPair& pair = touching.pair;
   const double near = nearing(problem, pair);
   if (std::abs(near) != touching.approach) return;  // it is the least
@@ -250,7 +254,7 @@ void set_pressing(const ContactProblem& problem, Touching& t) {
   const bool lags = problem.lags() && pair.friction > 0.0;
   if (problem.pressing >= Pressing::mean && !lags) {
     t.law.elastic = share;
-    t.law.elastic_by_way = elastic_share_slopes(problem, t).way;
+    if (share < 1.0) t.law.elastic_by_way = elastic_share_slopes(problem, t).way;
   }
   t.law.restitution = std::sqrt(1.0 - lost);
   t.law.parting = kParting * std::max(t.law.restitution, kLeastParting) * t.approach * problem.duration;

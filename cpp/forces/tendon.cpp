@@ -82,14 +82,19 @@ Neighbours neighbours_of(const Model& model) {
   return out;
 }
 
+/// The stencil between a frame and an edge, at the edge's tail where the frame comes first; -1: none.
+int half_at(const Model& model, int edge, bool frame_first) {
+  for (std::size_t h = 0; h < model.half.size(); ++h)
+    if (model.half[h].edge == edge && model.half[h].frame_first == frame_first) return static_cast<int>(h);
+  return -1;
+}
+
 GuideSeat seat_of(const Model& model, const TendonGuide& guide, const Vector2& offset) {
   GuideSeat seat;
   seat.edge = model.rod_first_edge[at(guide.rod)] + guide.edge;
   seat.share = guide.place == GuidePlace::start ? 0.0 : guide.place == GuidePlace::end ? 1.0 : 0.5;
   seat.offset = offset;
-  for (std::size_t h = 0; guide.place != GuidePlace::middle && h < model.half.size(); ++h)
-    if (model.half[h].edge == seat.edge && model.half[h].frame_first == (guide.place == GuidePlace::start))
-      seat.half = static_cast<int>(h);
+  if (guide.place != GuidePlace::middle) seat.half = half_at(model, seat.edge, guide.place == GuidePlace::start);
   if (!model.planar()) return seat;
   const Vector3 t = to_eigen(model.initial_tangent[at(seat.edge)]),
                 d1 = model.description.rods[at(guide.rod)].directors.row(guide.edge),
@@ -150,12 +155,9 @@ void share_spans(const Model& model, std::span<TendonSegment> pieces) {
       const bool alone = k == 0 ? i == 0 : i + 1 == pieces.size();
       if (seat.half >= 0 || alone || !pieces[i].smooth) continue;
       TendonSegment& next = pieces[k == 0 ? i - 1 : i + 1];
-      const bool frame_first = (k == 1) == (seat.sign > 0.0);
-      const auto half = std::find_if(model.half.begin(), model.half.end(), [&](const FrameStencil& h) {
-        return h.edge == seat.edge && h.frame_first == frame_first;
-      });
-      if (half == model.half.end() || !next.smooth) continue;
-      const double less = 0.5 - model.half_share(half - model.half.begin());
+      const int half = half_at(model, seat.edge, (k == 1) == (seat.sign > 0.0));
+      if (half < 0 || !next.smooth) continue;
+      const double less = 0.5 - model.half_share(half);
       pieces[i].span[k] -= less;
       next.span[1 - k] += less;
     }

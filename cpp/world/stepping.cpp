@@ -55,8 +55,10 @@ void World::Implementation::advance(double duration) {
     }
     throw;
   }
-  if (steps_taken % kEnergyPeriod == 0) check_energy();
-  if (steps_taken % kEnergyPeriod == 0) check_squeeze();
+  if (steps_taken % kEnergyPeriod == 0) {
+    check_energy();
+    check_squeeze();
+  }
   if (steps_taken % kResolutionPeriod == 0) check_resolution();
   check_crossings();
 }
