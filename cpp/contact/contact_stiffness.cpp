@@ -422,7 +422,7 @@ bool ContactStiffness::begins_anew(const Touching& t, bool struck, ContactRecord
     speed = std::max(speed, least_approach(problem_, pair));
   } else {
     const bool again = t.apart() && t.age > 0.0 && speed > 0.0;
-    // What went off, or was at rest, as the step began in which it met, may have turned round in that step already.
+    // Surfaces that met in the last step may have turned round in it: then their speed is that at which they part.
     if (!struck) speed = std::abs(nearing(problem_, pair));
     if (!again && speed <= t.approach) return false;
   }
@@ -439,9 +439,9 @@ bool ContactStiffness::begins_anew(const Touching& t, bool struck, ContactRecord
   return true;
 }
 
-/// Whether surfaces that rest strike each other: they have come apart, within the tolerance, and meet again; or the
-/// obstacle that a rod rests on jumps to a velocity at which it strikes the rod, which then parts by its restitution.
-/// What is elastic it sends off in any case.
+/// True if two resting surfaces strike each other in this step. Either they have come apart, within the tolerance of
+/// contact, and approach faster than they rest; or the obstacle under a rod jumps to a velocity that strikes the rod.
+/// In the second case only a restitution below 1 needs the impact: an elastic contact throws the rod off as it is.
 bool ContactStiffness::is_struck(const Touching& t) const {
   const ContactPair& pair = t.pair;
   if (t.apart() && (problem_.pressing >= Pressing::mean || pair.restitution < 1.0))

@@ -55,14 +55,14 @@ double share_within(const ContactProblem& problem, const Touching& t, double spe
   return smooth_step(speed / rest_speed(problem, t.pair) - 1.0) * smooth_step(2.0 - t.age / over);
 }
 
-/// Mean speed in the step of surfaces on their way in, which may have rested, or gone off, as the step began; 0 of
-/// others [m/s].
+/// Mean speed of approach over the step, of surfaces on their way in [m/s]; 0 of others. As the step began they may
+/// have been at rest, or on their way off.
 double speed_in_step(const ContactProblem& problem, const Touching& t) {
   if (!(t.approach > 0.0) || t.age > 0.0 || problem.pressing < Pressing::mean) return 0.0;
   return (start_distance(problem, t.pair) - t.proximity.distance) / problem.duration;
 }
 
-/// At which surfaces have met, by the end of the step.
+/// Speed of an impact by the end of the step [m/s].
 double speed_of_impact(const ContactProblem& problem, const Touching& t) {
   return std::max(t.approach, speed_in_step(problem, t));
 }

@@ -82,7 +82,7 @@ Neighbours neighbours_of(const Model& model) {
   return out;
 }
 
-/// The stencil between a frame and an edge, at the edge's tail where the frame comes first; -1: none.
+/// Index of the stencil between an edge and the frame at its tail (`frame_first`) or at its head; -1 if there is none.
 int half_at(const Model& model, int edge, bool frame_first) {
   for (std::size_t h = 0; h < model.half.size(); ++h)
     if (model.half[h].edge == edge && model.half[h].frame_first == frame_first) return static_cast<int>(h);
@@ -146,8 +146,8 @@ SegmentUnknowns unknowns_of(const Model& model, const TendonSegment& segment) {
   return out;
 }
 
-/// Edges turn by less at frames, and by as much more at their other ends: so are the lengths of the pieces there, and
-/// the tendon stays as long. Pieces are those of one tendon.
+/// Sets the spans of the pieces of one tendon beside frames. An edge turns less at a frame, and as much more at its
+/// other end (`Model::half_share`); the two pieces there divide the edge in the same shares.
 void share_spans(const Model& model, std::span<TendonSegment> pieces) {
   for (std::size_t i = 0; i < pieces.size(); ++i)
     for (int k : {0, 1}) {

@@ -77,8 +77,8 @@ Vector3 guide_hinge_axis(const Model& model, const TendonSegment& segment, int e
 
 /// L [m].
 double segment_length(const Model& model, const TendonSegment& segment, const VectorX& q, const Configuration& c);
-/// How much half an edge at a free end, which rods' energy has straight, shortens the piece along it as it bends, over
-/// the tension: that of an arc under the moment T r, r^2 l / (2 EI) [m/N].
+/// Shortening of a segment by the bending of half an edge at a free end, per tension [m/N]: r^2 l / (2 EI), that of an
+/// arc of length l / 2 under the moment T r. The elastic energy has no stencil there, so that L does not contain it.
 double free_end_compliance(const Model& model, const Parameters& parameters, const TendonSegment& segment);
 /// Where the guides of a tendon are, in the axes of space [m].
 MatrixX3 guide_points(const Model& model, int tendon, const VectorX& q, const Configuration& c);

@@ -15,7 +15,7 @@ enum class LineSearch {
   goldstein_price,  ///< [Choi, dissertation, Algorithm 4] on |F|^2 / 2
 };
 
-/// Whether an equilibrium is wanted that is stable, or the one that the path leads to.
+/// What the static solver does at an equilibrium that is not stable: leave it for a stable one, or return it.
 enum class Saddles { leave, keep };
 
 struct Options {

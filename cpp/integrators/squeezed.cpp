@@ -18,7 +18,7 @@ constexpr double kNearlyFree = 0.2;
 /// Depth at which surfaces are drawn touching, to rounding, over the smaller radius.
 constexpr double kTouching = 1e-4;
 
-/// How much deeper surfaces are in each other than `allowed` of the smaller radius [m].
+/// Depth of two surfaces in each other beyond `allowed`, a share of the smaller radius [m].
 double excess(const Touching& t, double allowed) {
   return t.pair.radii() - t.proximity.distance - allowed * t.pair.small_radius();
 }

@@ -99,7 +99,8 @@ class Statics {
     }
   }
 
-  /// What is out of balance where the search has ended; residuals of its last interval have inertia.
+  /// Sets the residual and its worst row to those of static balance at the end of the search. The residual of the last
+  /// interval contains inertia.
   void note_imbalance(NewtonResult& last) {
     path_.go_to(1.0);
     path_.evaluate(state_.q, false, nullptr);

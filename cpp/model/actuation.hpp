@@ -1,5 +1,5 @@
 #pragma once
-/// What a user actuates rods by: their shapes free of stress and the tensions of tendons; and ways from one to another.
+/// Actuation: the stress-free shapes of rods and the tensions of tendons, and linear interpolation between two of them.
 
 #include <vector>
 
@@ -11,7 +11,7 @@ namespace withe {
 /// Values of `natural_curvature`, `natural_twist`, `edge_natural_stretch` and `tendon_tension`.
 struct Actuation {
   std::vector<MatrixX2> curvature;  ///< per rod and stencil [1/m]
-  std::vector<VectorX> twist;       ///< likewise [rad/m]
+  std::vector<VectorX> twist;       ///< per rod and stencil [rad/m]
   VectorX stretch;                  ///< per edge [-]
   VectorX tension;                  ///< per tendon [N]
 };

@@ -85,15 +85,15 @@ struct World::Implementation : Running {
   std::atomic<bool> interrupted{false};
   double separated = 0;  ///< how far overlapping rods were moved before the start [m]
   bool spatial = false;  ///< left its plane while running
-  /// Of a mesh too coarse for the motion, and empty once it was heard; none yet where there was no reason.
-  std::optional<std::string> mesh_warning;
-  std::optional<std::string> step_warning;        ///< likewise, of steps too long for the motion
-  std::optional<std::string> impact_warning;      ///< likewise, of steps too long for an impact
-  std::optional<std::string> branch_warning;      ///< likewise, of a static step that left its branch
-  std::optional<std::string> plane_warning;       ///< likewise, of an equilibrium that is unstable out of its plane
-  std::optional<std::string> drift_warning;       ///< likewise, of an integrator that changes the energy
-  std::optional<std::string> crossing_warning;    ///< likewise, of rods that pass through each other
-  std::optional<std::string> squeeze_warning;     ///< likewise, of obstacles that squeeze a rod by no given stiffness
+  /// Messages of warnings, each given once: no value before its reason occurs, and empty after Python has read it.
+  std::optional<std::string> mesh_warning;        ///< the mesh is too coarse for the motion
+  std::optional<std::string> step_warning;        ///< steps are too long for the motion
+  std::optional<std::string> impact_warning;      ///< steps are too long for an impact
+  std::optional<std::string> branch_warning;      ///< a static step has left its branch
+  std::optional<std::string> plane_warning;       ///< an equilibrium is unstable out of its plane
+  std::optional<std::string> drift_warning;       ///< the integrator changes the energy
+  std::optional<std::string> crossing_warning;    ///< rods pass through each other
+  std::optional<std::string> squeeze_warning;     ///< obstacles squeeze a rod, and no contact stiffness is given
   std::unique_ptr<CrossingWatch> crossing_watch;  ///< made when first needed
   std::vector<LeftRing> left_rings;               ///< not heard of yet
   NewtonResult last_newton;
