@@ -296,8 +296,8 @@ double Contact::accept(State& state, double spare) {
   return put_in;
 }
 
-void Contact::accept_at_rest(State& state, bool arrived) {
-  ContactStiffness(problem_).accept_at_rest(set_, arrived, scratch_, state.contact_stiffness);
+void Contact::accept_at_rest(State& state, bool arrived, double deepest) {
+  ContactStiffness(problem_).accept_at_rest(set_, arrived, deepest, scratch_, state.contact_stiffness);
   leave(state);
 }
 

@@ -134,7 +134,7 @@ class Contact {
   /// Keeps in `state`, still where the step began, what contacts at q1 must remember: see `ContactStiffness::accept`.
   double accept(State& state, double spare);
   /// The same in an equilibrium, or on the way to one.
-  void accept_at_rest(State& state, bool arrived);
+  void accept_at_rest(State& state, bool arrived, double deepest = kDeepest);
   /// The greatest of the stiffnesses that forces want of contacts, over what they have; no less than 1.
   double wanted_ratio() const { return ContactStiffness(problem_).wanted_ratio(set_); }
   /// Whether what was accepted last there presses as it did, but for rounding.

@@ -146,7 +146,7 @@ double anchor_work(const ContactProblem& problem, const Touching& t, bool mean) 
 }
 
 double anchor_energy(const ContactProblem& problem, const Touching& t) {
-  if (!problem.anchored() || !t.pair.rubs() || t.proximity.distance >= t.pair.reach()) return 0.0;
+  if (!problem.anchored() || !t.pair.rubs() || !problem.touch(t.pair, t.proximity.distance, t.yielded)) return 0.0;
   double stored = 0.0;
   each_kind(t, [&](FrictionKind kind) {
     const FrictionForce<double> anchor = friction_now(problem, t, kind);

@@ -18,17 +18,19 @@ ContactParameters::ContactParameters(const Surfaces& surfaces, const Parameters&
       gravity(parameters.gravity.norm()),
       slip_tolerance(parameters.surfaces.slip_tolerance) {
   const Model& model = surfaces.model();
-  const double given = parameters.surfaces.contact_stiffness;
+  const double given = parameters.surfaces.contact_stiffness, light = model.description.contact.least_tolerance();
   least_stiffness.setConstant(static_cast<Eigen::Index>(model.description.rods.size()), given);
+  firm_stiffness.setZero(least_stiffness.size());
   edge_mass = parameters.edge_density.cwiseProduct(model.edge_arc);
   for (int e = 0; e < model.edge_count && !(given > 0.0); ++e) {
     const double r = surfaces.radius(e);
     if (!(r > 0.0)) continue;
     const double weight = parameters.edge_density(e) * model.edge_arc(e) * parameters.gravity.norm();
-    const double force = weight + parameters.edge_bend.row(e).minCoeff() / (kSlender * kSlender * r * r);
-    double& least = least_stiffness(model.edge_rod[at(e)]);
-    least = std::max(least, force / (2.0 * kDepth * r));
+    const double bends = parameters.edge_bend.row(e).minCoeff() / (kSlender * kSlender * r * r);
+    double& firm = firm_stiffness(model.edge_rod[at(e)]);
+    firm = std::max(firm, (weight / (light * light) + bends) / (2.0 * kDepth * r));
   }
+  least_stiffness += light * firm_stiffness;
 }
 
 void ContactProblem::find_offsets() {
@@ -59,6 +61,30 @@ double ContactProblem::offset(const ContactPair& pair) const {
   const auto found = std::lower_bound(offsets.begin(), offsets.end(), bodies, by_bodies);
   if (found == offsets.end() || by_bodies(bodies, *found)) return 0.0;
   return std::min(found->moment / found->force, kMostYield * pair.small_radius());
+}
+
+double ContactProblem::at_own_depth(double firm, double stiffness, double power) const {
+  if (stiffness >= firm) return stiffness;
+  return firm * std::max(std::pow(stiffness / firm, power), description().least_tolerance());
+}
+
+double ContactProblem::stiffness_to_bear(const ContactPair& pair, double force) const {
+  return at_own_depth(firm_stiffness(pair), force / (2.0 * kDepth * pair.small_radius()), 1.0 / 2.0);
+}
+
+double ContactProblem::stiffness_to_store(const ContactPair& pair, double energy) const {
+  const double depth = kDepth * pair.small_radius();
+  return at_own_depth(firm_stiffness(pair), energy / (depth * depth), 1.0 / 3.0);
+}
+
+double ContactProblem::stiffness_to_bear_more(double firm, double stiffness, double times) const {
+  const double whole = stiffness < firm ? stiffness * stiffness / firm : stiffness;
+  return at_own_depth(firm, times * whole, 1.0 / 2.0);
+}
+
+double ContactProblem::tolerance(const ContactPair& pair, double stiffness) const {
+  if (fixed(pair)) return pair.tolerance;
+  return pair.tolerance * std::clamp(stiffness / firm_stiffness(pair), description().least_tolerance(), 1.0);
 }
 
 double ContactProblem::mass_of(const ContactPair& pair) const {

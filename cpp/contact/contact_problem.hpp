@@ -88,6 +88,7 @@ struct ContactParameters {
   double slip_tolerance = 0;  ///< nu [m/s]
   VectorX edge_mass;          ///< [kg]
   VectorX least_stiffness;    ///< per rod, that of no contact of which is less [N/m]
+  VectorX firm_stiffness;     ///< per rod, from which on the distance tolerance is whole [N/m]
 };
 
 struct ContactProblem {
@@ -150,6 +151,19 @@ struct ContactProblem {
   bool fixed(const ContactPair& pair) const {
     return pair.stiffness > 0.0 || surfaces->parameters().contact_stiffness > 0.0;
   }
+  /// From which stiffness on, of a whole node, the distance tolerance of a pair is whole [N/m].
+  double firm_stiffness(const ContactPair& pair) const {
+    const VectorX& of_rod = parameters->firm_stiffness;
+    return pair.rod_b < 0 ? of_rod(pair.rod_a) : std::max(of_rod(pair.rod_a), of_rod(pair.rod_b));
+  }
+  /// Stiffness of a whole node by which surfaces bear a force, or store an energy, in the depth that goes with it
+  /// [N/m].
+  double stiffness_to_bear(const ContactPair& pair, double force) const;
+  double stiffness_to_store(const ContactPair& pair, double energy) const;
+  /// Stiffness that bears so many times the force that another one bears, of a pair or rod with that firm stiffness.
+  double stiffness_to_bear_more(double firm, double stiffness, double times) const;
+  /// The distance tolerance of a contact so stiff, of a whole node [m].
+  double tolerance(const ContactPair& pair, double stiffness) const;
   /// Of the edges, or half of both beside a node, that a contact holds up [kg].
   double mass_of(const ContactPair& pair) const;
   /// Adds `by` times its derivatives by masses of edges.
@@ -169,6 +183,8 @@ struct ContactProblem {
   ClosestPoints closest_at_start(const ContactPair& pair, Vec3d (&x)[4]) const;
 
  private:
+  /// From a stiffness at the whole depth to that at the depth that goes with it; both to `power` are in proportion.
+  double at_own_depth(double firm, double stiffness, double power) const;
   static Vec3d of_obstacle(const ContactPair& pair, const std::vector<Vec3d>& ways) {
     return pair.key.b < 0 && !ways.empty() ? ways[static_cast<std::size_t>(-1 - pair.key.b)] : Vec3d{};
   }

@@ -26,19 +26,15 @@ constexpr double kDrawnForce = 1e-6;
 
 /// A contact that is yet to come starts as stiff as its rods' greatest force has wanted, so that those which take over
 /// from each other while surfaces slide have no need to change; that fades where it is much more than is wanted now.
-void follow_forces(const VectorX& greatest, VectorX& stiffness) {
+void follow_forces(const ContactProblem& problem, const VectorX& greatest, VectorX& stiffness) {
+  const VectorX& firm = problem.parameters->firm_stiffness;
   for (Eigen::Index rod = 0; rod < greatest.size(); ++rod) {
     double& own = stiffness(rod);
     if (greatest(rod) > own)
       own = kAhead * greatest(rod);
-    else if (own > kSlack * greatest(rod))
+    else if (own > problem.stiffness_to_bear_more(firm(rod), greatest(rod), kSlack))
       own *= 0.8;
   }
-}
-
-/// Of a whole node, for a force to press surfaces no deeper than `kDepth` [N/m].
-double wanted_stiffness(const ContactPair& pair, double force) {
-  return force / (2.0 * kDepth * pair.small_radius() * pair.share);
 }
 
 /// What has yielded wears off where surfaces that separate press no more, without work, down to what their bodies'
@@ -88,22 +84,28 @@ class SharedWeight {
   std::ptrdiff_t contacts_ = 0;
 };
 
-/// Distance of centrelines, with what has yielded, at which a contact's force, or energy, is what is `wanted` for unit
-/// stiffness, or less by rounding.
-double distance_at(const Touching& t, bool force, double wanted) {
+/// Energy of a contact that is so many times as stiff, for unit stiffness, at a distance of centrelines with what has
+/// yielded.
+ContactEnergy energy_at(const ContactProblem& problem, const Touching& t, double ratio, double distance) {
+  const double tolerance = problem.tolerance(t.pair, ratio * t.stiffness / t.pair.share);
+  return contact_energy(t.law.law, distance, t.pair.radii(), tolerance);
+}
+
+/// Distance of centrelines, with what has yielded, at which the force, or energy, of a contact that is so many times
+/// as stiff is what is `wanted` for unit stiffness, or less by rounding.
+double distance_at(const ContactProblem& problem, const Touching& t, double ratio, bool force, double wanted) {
   double low = t.proximity.distance + t.yielded, high = t.pair.reach();
   for (int k = 0; k < 60; ++k) {
     const double middle = 0.5 * (low + high);
-    const ContactEnergy e = contact_energy(t.law.law, middle, t.pair.radii(), t.pair.tolerance);
+    const ContactEnergy e = energy_at(problem, t, ratio, middle);
     ((force ? -e.first : e.value) > wanted ? low : high) = middle;
   }
   return high;
 }
 
 /// With which a contact presses where it stands, so many times as stiff, with a depth that presses no more [N].
-double force_at(const Touching& t, double ratio, double yielded) {
-  const double distance = t.proximity.distance + yielded;
-  return -ratio * t.stiffness * contact_energy(t.law.law, distance, t.pair.radii(), t.pair.tolerance).first;
+double force_at(const ContactProblem& problem, const Touching& t, double ratio, double yielded) {
+  return -ratio * t.stiffness * energy_at(problem, t, ratio, t.proximity.distance + yielded).first;
 }
 
 /// What stops an edge's mass at the speed at which the ends meet (along the normal of a plane, which is known before
@@ -132,11 +134,11 @@ double impact_stiffness(const ContactProblem& problem, const ContactPair& pair) 
     for (int l = 0; l < 2; ++l)
       fastest = std::max(fastest, speed_of(v - local_position(model, velocities, end_node(pair.key.b, l))));
   }
-  const double depth = kDepth * pair.small_radius(), half = 0.5 * problem.mass_of(pair) / depth;
-  const double stops = half * fastest * std::min(1.0 / problem.duration, fastest / depth);
+  const double mass = problem.mass_of(pair);
+  const auto stores = [&](double speed) { return problem.stiffness_to_store(pair, 0.5 * mass * speed * speed); };
+  const double stops = std::min(problem.stiffness_to_bear(pair, mass * fastest / problem.duration), stores(fastest));
   if (problem.pressing < Pressing::mean) return stops;
-  const double speed = approach_speed(problem, pair);
-  return std::max(stops, half * speed * speed / depth);
+  return std::max(stops, stores(approach_speed(problem, pair)));
 }
 
 }  // namespace
@@ -159,12 +161,14 @@ double first_stiffness(const ContactProblem& problem, const ContactPair& pair) {
   return std::max(start, impact_stiffness(problem, pair));
 }
 
-/// The depth that must press no more for a contact that becomes stiffer to press as hard as before, which takes energy,
-/// or to store as much as before, in an impact.
+/// The depth that must press no more for a contact that becomes stiffer to store no more than before, and, but for in
+/// an impact, to press no harder.
 double ContactStiffness::yielded_at(const Touching& t, double ratio) const {
-  const bool force = t.approach == 0.0;
-  const double wanted = (force ? -t.energy.first : t.energy.value) / (t.stiffness * ratio);
-  return distance_at(t, force, wanted) - t.proximity.distance;
+  const double stiffness = t.stiffness * ratio;
+  double distance = distance_at(problem_, t, ratio, false, t.energy.value / stiffness);
+  if (t.approach == 0.0)
+    distance = std::max(distance, distance_at(problem_, t, ratio, true, -t.energy.first / stiffness));
+  return distance - t.proximity.distance;
 }
 
 /// Gives a contact another stiffness, and another depth that presses no more. Anchors that become stiffer keep their
@@ -172,8 +176,7 @@ double ContactStiffness::yielded_at(const Touching& t, double ratio) const {
 double ContactStiffness::change_stiffness(const Touching& t, double ratio, double yielded,
                                           ContactRecord& record) const {
   const ContactPair& pair = t.pair;
-  const double energy = ratio * t.stiffness *
-                        contact_energy(t.law.law, t.proximity.distance + yielded, pair.radii(), pair.tolerance).value;
+  const double energy = ratio * t.stiffness * energy_at(problem_, t, ratio, t.proximity.distance + yielded).value;
   const double shorter = ratio > 1.0 ? 1.0 / ratio : 1.0 / std::sqrt(ratio);
   const double rolled = anchor_stiffness(pair, FrictionKind::rolling, t.stiffness) * dot(record.roll, record.roll);
   const double anchored = 0.5 * (rolled - dot(record.friction, record.stick));
@@ -187,12 +190,15 @@ double ContactStiffness::change_stiffness(const Touching& t, double ratio, doubl
 
 double ContactStiffness::wanted_ratio(const Touching& t, const ContactRecord& record) const {
   if (problem_.fixed(t.pair)) return 1.0;
-  const double wanted = wanted_stiffness(t.pair, record.force);
+  const double wanted = problem_.stiffness_to_bear(t.pair, record.force / t.pair.share);
   if (wanted > record.stiffness) return kAhead * wanted / record.stiffness;
   if (record.approach > 0.0) return 1.0;  // as stiff as the impact that has only begun will want it
   // A contact that is about to open wants next to nothing, and more when it presses again.
   const double common = std::max(wanted, start_stiffness(problem_, t.pair, problem_.start->contact_stiffness));
-  return kSlack * common < record.stiffness ? 2.0 * common / record.stiffness : 1.0;
+  const auto bears = [&](double times) {
+    return problem_.stiffness_to_bear_more(problem_.firm_stiffness(t.pair), common, times);
+  };
+  return bears(kSlack) < record.stiffness ? bears(2.0) / record.stiffness : 1.0;
 }
 
 /// The greatest force that contact has to hold at a node, times 1e5 / m [Choi, dissertation, (5.16), (5.17)]: what all
@@ -272,7 +278,9 @@ double ContactStiffness::accept(const ContactSet& set, double spare, StiffnessSc
       fading.push_back({&t, records.size()});
     }
     for (int rod : {pair.rod_a, pair.rod_b})
-      if (rod >= 0) greatest(rod) = std::max(greatest(rod), source ? common : wanted_stiffness(pair, -t.energy.first));
+      if (rod >= 0)
+        greatest(rod) =
+            std::max(greatest(rod), source ? common : problem_.stiffness_to_bear(pair, -t.energy.first / pair.share));
     records.push_back(record);
   }
   // Energy grows with depth the faster the deeper, so that a part of the way takes less than that part of the work.
@@ -283,19 +291,19 @@ double ContactStiffness::accept(const ContactSet& set, double spare, StiffnessSc
     put_in += change_stiffness(*t, 1.0, left, records[number]);
   }
   finish(set, records);
-  if (!given) follow_forces(greatest, stiffness);
+  if (!given) follow_forces(problem_, greatest, stiffness);
   return put_in;
 }
 
-void ContactStiffness::accept_at_rest(const ContactSet& set, bool arrived, StiffnessScratch& scratch,
+void ContactStiffness::accept_at_rest(const ContactSet& set, bool arrived, double deepest, StiffnessScratch& scratch,
                                       VectorX& stiffness) const {
   const double source = source_stiffness(set, scratch.force);
   VectorX& greatest = scratch.greatest;
   greatest = problem_.parameters->least_stiffness;
   for (const Touching& t : set) {
     if (source > 0.0 || !presses(t) || problem_.fixed(t.pair)) continue;
-    const double wanted = wanted_stiffness(t.pair, -t.energy.first);
-    const bool more = arrived ? wanted > t.stiffness / t.pair.share : t.depth() > kDeepest;
+    const double wanted = problem_.stiffness_to_bear(t.pair, -t.energy.first / t.pair.share);
+    const bool more = arrived ? wanted > t.stiffness / t.pair.share : t.depth() > deepest;
     for (int rod : {t.pair.rod_a, t.pair.rod_b}) {
       if (rod < 0) continue;
       greatest(rod) = std::max(greatest(rod), wanted);
@@ -304,7 +312,9 @@ void ContactStiffness::accept_at_rest(const ContactSet& set, bool arrived, Stiff
   }
   // What a rod has met on the way is no reason to be stiff for.
   for (Eigen::Index rod = 0; arrived && source == 0.0 && rod < greatest.size(); ++rod)
-    if (stiffness(rod) > kSlack * greatest(rod)) stiffness(rod) = kAhead * greatest(rod);
+    if (stiffness(rod) >
+        problem_.stiffness_to_bear_more(problem_.parameters->firm_stiffness(rod), greatest(rod), kSlack))
+      stiffness(rod) = kAhead * greatest(rod);
   scratch.records.clear();
   scratch.pressing = scratch.change = 0.0;
   for (const Touching& t : set) {
@@ -317,7 +327,7 @@ void ContactStiffness::accept_at_rest(const ContactSet& set, bool arrived, Stiff
       const double wanted = source > 0.0 ? source : start_stiffness(problem_, t.pair, stiffness);
       change_stiffness(t, wanted / record.stiffness, 0.0, record);
     }
-    const double now = force_at(t, record.stiffness * t.pair.share / t.stiffness, record.yielded);
+    const double now = force_at(problem_, t, record.stiffness * t.pair.share / t.stiffness, record.yielded);
     scratch.pressing = std::max(scratch.pressing, record.force);
     scratch.change = std::max(scratch.change, std::abs(now - record.force));
     scratch.records.push_back(record);
@@ -329,7 +339,8 @@ double ContactStiffness::wanted_ratio(const ContactSet& set) const {
   double ratio = 1.0;
   for (const Touching& t : set)
     if (t.lagged < 0 && !problem_.fixed(t.pair))
-      ratio = std::max(ratio, wanted_stiffness(t.pair, -t.energy.first) * t.pair.share / t.stiffness);
+      ratio = std::max(ratio,
+                       problem_.stiffness_to_bear(t.pair, -t.energy.first / t.pair.share) * t.pair.share / t.stiffness);
   return ratio;
 }
 
@@ -403,7 +414,7 @@ bool ContactStiffness::begins_at_rest(const Touching& t, ContactRecord& record) 
   if (problem_.fixed(t.pair)) return false;
   const double most = record.force + kDrawnForce * 2.0 * kDepth * t.pair.small_radius() * t.stiffness;
   if (!(-t.energy.first > most)) return false;
-  record.yielded = distance_at(t, true, most / t.stiffness) - t.proximity.distance;
+  record.yielded = distance_at(problem_, t, 1.0, true, most / t.stiffness) - t.proximity.distance;
   return true;
 }
 

@@ -40,9 +40,10 @@ class ContactStiffness {
   /// zero where it took some [J].
   double accept(const ContactSet& set, double spare, StiffnessScratch& scratch, VectorX& stiffness) const;
   /// The same in an equilibrium, or on the way to one. Where a force wants a greater stiffness, on the way where
-  /// surfaces are too deep in each other, all contacts of their rods become stiffer, and press harder; in an
-  /// equilibrium those of rods that are far too stiff for their forces softer.
-  void accept_at_rest(const ContactSet& set, bool arrived, StiffnessScratch& scratch, VectorX& stiffness) const;
+  /// surfaces are deeper in each other than `deepest`, all contacts of their rods become stiffer, and press harder; in
+  /// an equilibrium those of rods that are far too stiff for their forces softer.
+  void accept_at_rest(const ContactSet& set, bool arrived, double deepest, StiffnessScratch& scratch,
+                      VectorX& stiffness) const;
   /// The greatest of the stiffnesses that forces want of contacts, over what they have; no less than 1.
   double wanted_ratio(const ContactSet& set) const;
   /// The same for a step so short that stiffness stays as it is.

@@ -238,7 +238,8 @@ void add_approach_slopes(const ContactProblem& problem, const Touching& touching
 
 void set_pressing(const ContactProblem& problem, Touching& t) {
   const ContactPair& pair = t.pair;
-  t.law = {problem.description().law, pair.radii(), pair.tolerance, t.stiffness, t.yielded};
+  const double tolerance = problem.tolerance(pair, t.stiffness / pair.share);
+  t.law = {problem.description().law, pair.radii(), tolerance, t.stiffness, t.yielded};
   t.energy = t.law.energy(t.proximity.distance);
   t.energy.value *= t.stiffness;
   t.energy.first *= t.stiffness;

@@ -58,6 +58,7 @@ void Homotopy::start_out_of_balance() {
   go_to(0.0);
   equations_.evaluate(state_.q, false, nullptr, work_.data);
   imbalance_ = work_.data.residual;
+  if (const Contact* contact = equations_.contact()) deepest_ = std::max(kDeepest, contact->contacts().depth());
   go_to(0.0);
 }
 
@@ -84,8 +85,8 @@ bool Homotopy::stiffen_deep(const VectorX& q) {
   Contact* contact = equations_.contact();
   if (contact == nullptr) return false;
   contact->update(q);
-  if (!(contact->contacts().depth() > kDeepest)) return false;
-  contact->accept_at_rest(state_, false);
+  if (!(contact->contacts().depth() > deepest_)) return false;
+  contact->accept_at_rest(state_, false, deepest_);
   if (contact->presses_alike()) return false;
   go_to(factor_);
   return true;
@@ -96,7 +97,7 @@ void Homotopy::accept(const VectorX& q) {
   present_ = factor_;
   if (Contact* contact = equations_.contact()) {
     contact->update(q);
-    contact->accept_at_rest(state_, false);
+    contact->accept_at_rest(state_, false, deepest_);
   }
   compute_configuration(model, state_, q, scratch_);
   accept_configuration(model, q, scratch_, state_);

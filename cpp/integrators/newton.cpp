@@ -25,7 +25,8 @@ constexpr double kCut = 0.5;
 constexpr double kMostContraction = 0.5, kNear = 0.05, kUnsettled = 1e4;
 
 /// Whether corrections of a prediction are too long, or do not shrink, for what they lead to to lie on the same path.
-bool loses_path(const Prediction& predicted, const MatrixReuse& reuse, bool first) {
+bool loses_path(const Prediction& predicted, const MatrixReuse& reuse, bool first, double length) {
+  if (!predicted.strict) return length > std::max(predicted.length, kUnsettled * reuse.tolerance());
   if (reuse.step() <= std::max(kNear * predicted.length, kUnsettled * reuse.tolerance())) return false;
   return first ? !(reuse.step() <= predicted.length) : !(reuse.step() <= kMostContraction * reuse.last_step());
 }
@@ -105,7 +106,7 @@ class Newton::Solve {
         reuse_(work.matrix, equations, how.interval, how.interval != 0.0 && !line_search_,
                std::min(newton.options_.step_tolerance * newton.model_.length_scale, work.finest),
                newton.options_.heuristics),
-        axial_known_(mixed_ && (how.interval != 0.0 || how.predicted)) {
+        axial_known_(mixed_ && (how.interval != 0.0 || (how.predicted && how.predicted->forces))) {
     work.contact.regularisation = how.regularisation;
     work.contact.geometric = true;
     work.contact.forget_friction();
@@ -207,8 +208,9 @@ class Newton::Solve {
     // A step that is cut says nothing of where the solution is, unless all of it is within the tolerance.
     const bool near = shorten > 0.0 && length <= shorten * reuse_.tolerance();
     reuse_.note_step(shorten == 1.0 || near ? length : INFINITY);
-    if (!how_.predicted || !how_.predicted->strict) return true;
-    return !loses_path(*how_.predicted, reuse_, result_.iterations == 0) || ++kinks_met_ <= how_.predicted->kinks;
+    if (!how_.predicted || how_.predicted->length == 0.0) return true;
+    return !loses_path(*how_.predicted, reuse_, result_.iterations == 0, length) ||
+           ++kinks_met_ <= how_.predicted->kinks;
   }
 
   /// Whether nothing touches where the step begins and ends: then it is one as in a scene without surfaces.

@@ -202,7 +202,8 @@ class Statics {
   /// The point of the path at the factor `next`, predicted along the tangent.
   bool reach(double next, double increment, NewtonResult& last) {
     path_.go_to(next);
-    // Where surfaces meet, corrections shrink less than on smooth paths; rings have kinks.
+    // Where surfaces meet, corrections shrink less than on smooth paths, but lead no farther than the prediction does:
+    // what slides without friction would go off. Rings have kinks.
     const bool touching = equations_.contact() && equations_.contact()->count() > 0;
     const int rings = equations_.hands() ? equations_.hands()->rings().count() : 0;
     Prediction prediction{.length = 0.0, .strict = !touching, .kinks = kKinks * rings};
@@ -221,13 +222,15 @@ class Statics {
     if (!predicted) {
       z_ = state_.q;
       if (!path_.hold(next, z_) || !clear_way(z_)) return false;
+      prediction.length = newton_.norms().displacement(z_ - state_.q);
+      prediction.strict = prediction.forces = false;
     }
     const NewtonResult r = newton_.solve(equations_, z_,
                                          {.target = &path_.target(),
                                           .max_iterations = most_iterations(),
                                           .free_steps = border_iterations(),
                                           .hold_neutral = neutral_,
-                                          .predicted = predicted ? &prediction : nullptr},
+                                          .predicted = predicted || touching ? &prediction : nullptr},
                                          work_);
     note(r, last);
     last.step = r.step;

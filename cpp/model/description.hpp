@@ -219,7 +219,7 @@ struct ContactDescription {
   VectorX obstacle_restitution;  ///< per obstacle [-]; empty: 1
   ContactLaw law = ContactLaw::imcv2;
   FrictionLaw friction_law = FrictionLaw::implicit;
-  double distance_tolerance = 0;  ///< delta [m]; 0: a tenth of the smaller radius of a pair
+  double distance_tolerance = 0;  ///< delta [m]; 0: a tenth of the smaller radius of a pair at most, see `light`
   double slip_tolerance = 1e-3;   ///< nu [m/s]
   double stiffness = 0;           ///< [N/m]; 0: found by the rule
   StiffnessRule stiffness_rule = StiffnessRule::forces;
@@ -227,7 +227,15 @@ struct ContactDescription {
   Overlap overlap = Overlap::error;
   std::vector<ObstacleDescription> obstacles;
   std::vector<ContactPairDescription> pairs;
+  /// Where loads are light, contact is narrower: the least share of the distance tolerance, where it is found, and of
+  /// the depth of contact.
+  double light = 0.05;
 
+  double least_tolerance() const {
+    const bool follows =
+        distance_tolerance == 0.0 && law == ContactLaw::imcv2 && stiffness_rule == StiffnessRule::forces;
+    return follows ? light : 1.0;
+  }
   bool any() const { return rods || !obstacles.empty(); }
 };
 

@@ -165,7 +165,7 @@ def test_a_push_holds_on_floors_on_which_a_bend_slips_without():
     for controller in ("exact", "least_friction"):
         motion = plan(Cable.dlo(2), pattern, controller)
         assert (motion.feasibility(0.25).lift_off[3:-3].max() < 0.25) == (controller == "least_friction")
-        slips[controller] = deploy(motion, floor=0.25, nodes=100, quasi_static=True, progress=False).slipped.max()
+        slips[controller] = deploy(motion, floor=0.25, nodes=200, quasi_static=True, progress=False).slipped.max()
     assert slips["exact"] > 1e-3
     assert slips["least_friction"] < 4e-4
 

@@ -87,7 +87,7 @@ def test_a_rod_that_lies_on_a_floor_is_drawn_from_above_and_one_that_is_lifted_i
     simulation = scene.build()
     simulation.move(hand, position=(0, 0.05, 5e-3 + lift), over=0.1)
     record = simulation.run(0.1, progress=False)
-    assert np.ptp(record.positions()[..., 2]) > 1e-5
+    assert np.ptp(record.positions()[..., 2]) > 1e-6
     axes = record.plot().axes[0]
     labels = [getattr(axes, f"get_{axis}label")() for axis in "xyz" if hasattr(axes, f"get_{axis}label")]
     assert labels == [f"{name} [mm]" for name in names]

@@ -232,13 +232,15 @@ class Contacts:
             keeps the equations symmetric; or, archival, with the forces and the direction of slip of its start (4.5
             of Choi's dissertation), which holds nothing that is at rest.
         distance_tolerance : float [m]
-            Surfaces nearer than this press on each other; by default a tenth of the smaller radius.
+            Surfaces nearer than this press on each other. By default it follows the load: 0.005 of the smaller radius
+            where that is light, and up to a tenth for forces that bend rods, 1e-4 EI / radius^2 and more. With integrator "verlet"
+            it is a tenth always.
         slip_tolerance : float [m/s]
             Slip slower than this counts as sticking, with less friction than the coefficient allows.
         stiffness : float [N/m] or "source"
-            Of contact; by default it follows the forces, so that surfaces are about a hundredth of the
-            smaller radius deep in each other; a tenth where a load grows a thousandfold, for what becomes stiffer under
-            it goes on pressing as hard as before. Between bodies that hardly yield, where that depth decides how hard
+            Of contact; by default it follows the forces, so that surfaces are about a tenth of the distance tolerance
+            deep in each other; ten times that where a load grows a thousandfold, for what becomes stiffer under it goes
+            on pressing as hard as before. Between bodies that hardly yield, where that depth decides how hard
             they press, give it. "source" is the rule (5.17) of Choi's dissertation: 1e5 / m times the
             greatest force on a node in contact, for all contacts; it has a scale, that of its flagella.
         centreline_friction : bool
