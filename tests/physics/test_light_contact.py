@@ -1,5 +1,6 @@
-"""Where what is drawn touching rocks, stands, falls and leaves, by rigid-body theory: light loads must not move surfaces
-apart by more than a thousandth or so of their radius."""
+"""Where what is drawn touching rocks, stands, falls and leaves, by rigid-body theory.
+
+Light loads must not move surfaces apart by more than a thousandth or so of their radius."""
 
 from typing import Any
 
@@ -15,8 +16,7 @@ GRAVITY = 9.81
 @pytest.mark.parametrize("radius", [4e-3, 8e-3])
 @pytest.mark.parametrize("tilt", [0.03, 0.05])
 def test_a_plank_on_a_cylinder_rocks_about_its_middle(integrator: Any, radius: float, tilt: float) -> None:
-    """Energy m g (R - r) a^2 / 2 against m L^2 w^2 / 24 [Routh]: contact that rests on what it has moved apart by stands
-    tilted."""
+    """Energy m g (R - r) a^2 / 2 against m L^2 w^2 / 24 [Routh]. On wide contact it came to rest tilted."""
     length, drum = 0.3, 0.1
     along = np.array([np.cos(tilt), 0.0, -np.sin(tilt)])
     normal = np.array([np.sin(tilt), 0.0, np.cos(tilt)])

@@ -233,8 +233,8 @@ class Contacts:
             of Choi's dissertation), which holds nothing that is at rest.
         distance_tolerance : float [m]
             Surfaces nearer than this press on each other. By default it follows the load: 0.005 of the smaller radius
-            where that is light, and up to a tenth for forces that bend rods, 1e-4 EI / radius^2 and more. With integrator "verlet"
-            it is a tenth always.
+            where that is light, and up to a tenth for forces that bend rods, 1e-4 EI / radius^2 and more. With
+            integrator "verlet" it is a tenth always.
         slip_tolerance : float [m/s]
             Slip slower than this counts as sticking, with less friction than the coefficient allows.
         stiffness : float [N/m] or "source"
