@@ -532,7 +532,6 @@ class Options:
     )
     adaptive: bool
     integrator: str
-    line_search: str
     mixed: bool
     planar: bool | None
     solver: str
