@@ -407,4 +407,10 @@ void Assembler::add_held_change(const VectorX& from, const VectorX& to, double f
   }
 }
 
+double Assembler::greatest_held_change(const VectorX& from, const VectorX& to) const {
+  double greatest = 0.0;
+  for (const Block& block : blocks_) greatest = std::max(greatest, block.constraint.held_change(from, to).norm());
+  return greatest;
+}
+
 }  // namespace withe

@@ -136,6 +136,8 @@ class Assembler {
   void add_held_part(const VectorX& from, double factor, VectorX& to) const;
   /// out += factor x the part of `to` - `from` along held directions.
   void add_held_change(const VectorX& from, const VectorX& to, double factor, VectorX& out) const;
+  /// Length of the longest of those parts, each that of one constraint.
+  double greatest_held_change(const VectorX& from, const VectorX& to) const;
 
   ElementTable stretch, bend, half, contact;
   RegularStencils regular;

@@ -1,6 +1,7 @@
 #include "integrators/inner_solve.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "elasticity/stretch.hpp"
@@ -8,8 +9,18 @@
 namespace withe {
 namespace {
 
-// Iterations from a guess that may be wrong.
+/// Initial guesses: the extrapolated motion; a steady one; rest; a steady one with the other of the mixed and the plain
+/// method; rest, and continuation in friction's regularisation.
+enum class Guess : std::size_t { accelerated, steady, rest, other_method, continuation };
+using Guesses = std::array<Guess, 5>;
+
+// Iterations of guesses that may be wrong.
 constexpr int kFew = 12;
+// Steps without the mixed method after it has gone round in circles.
+constexpr int kPlainSolves = 16;
+// The slip over which friction grows, over that of the scene, and iterations at each.
+constexpr std::array<double, 7> kRegularisation{8192.0, 4096.0, 512.0, 64.0, 16.0, 4.0, 1.0};
+constexpr int kMostOfEach = 20;
 
 /// Axial forces at the start of a step [N]: where the mixed method sets out from, for those of an extrapolated motion,
 /// whose edges turn along straight lines and so stretch, mean nothing.
@@ -25,43 +36,198 @@ void start_axial_force(const Equations& equations, const VectorX& q, VectorX& ou
   }
 }
 
-/// Puts into `work.z` the state after the motion `work.move`, as far as supports and surfaces let it go.
-void guess(Equations& equations, const Newton& newton, const Options& options, double part, const State& state,
-           StepWorkspace& work) {
+/// Adds to `work.move` what supports do within a part of the step. Where that is more than the edges next to them bear,
+/// the others follow as they would by the linear step.
+void follow_supports(Equations& equations, const Newton& newton, const Options& options, double part,
+                     const State& state, StepWorkspace& work) {
   const Assembler& assembler = equations.assembler();
-  assembler.project(work.move);
-  work.move *= newton.norms().cap(work.move);
-  if (equations.contact() && options.heuristics.uses(Heuristic::hold_sticking))
-    equations.contact()->hold_sticking(state, work.move);
-  assembler.add_held_change(state.q, work.held.q, part, work.move);
-  work.z = state.q + work.move * equations.allowed(state.q, work.move);
-  start_axial_force(equations, state.q, work.newton.axial_force);
+  if (!options.heuristics.uses(Heuristic::supports_linear) ||
+      newton.norms().leaves_alone(part * assembler.greatest_held_change(state.q, work.held.q))) {
+    assembler.add_held_change(state.q, work.held.q, part, work.move);
+    return;
+  }
+  VectorX& held = work.difference;
+  held.setZero(state.q.size());
+  assembler.add_held_change(state.q, work.held.q, part, held);
+  const double bearable = newton.norms().cap(held);
+  if (bearable < 1.0) {
+    StepData& e = work.newton.data;
+    work.newton.matrix.owner = nullptr;
+    work.z = state.q + work.move;
+    equations.evaluate(work.z, true, nullptr, e);
+    VectorX& force = work.change;
+    force = -e.residual;
+    if (equations.assembler().solver().factorize().status == FactorStatus::ok) {
+      const double little = 1e-6 * bearable;
+      work.z += little * held;
+      equations.evaluate(work.z, false, nullptr, e);
+      force = force - (e.residual + force) / little;
+      equations.assembler().solver().solve({force.data(), static_cast<std::size_t>(force.size())});
+      if (force.allFinite()) work.move += force;
+    }
+  }
+  work.move += held;
 }
+
+class InnerSolve {
+ public:
+  InnerSolve(Equations& equations, const Newton& newton, const Options& options, const StepPlan& plan, double h,
+             const State& state, const Predictor& predictor, StepWorkspace& work)
+      : equations_(equations),
+        newton_(newton),
+        options_(options),
+        plan_(plan),
+        h_(h),
+        state_(state),
+        predictor_(predictor),
+        work_(work),
+        history_(work.newton.guesses),
+        frictional_(equations.contact() && equations.contact()->frictional()),
+        regularised_(frictional_ && equations.contact()->regularises()),
+        energy_momentum_(plan.rule == StepRule::energy_momentum),
+        mixed_(!energy_momentum_ || history_.plain_solves == 0),
+        steady_(predictor.steady(plan.slot)) {
+    if (energy_momentum_ && !mixed_) --history_.plain_solves;
+  }
+
+  NewtonResult run() {
+    NewtonResult found;
+    int spent = 0;
+    for (Guess guess : order()) {
+      if (!applies(guess)) continue;
+      GuessRecord& record = history_.records[static_cast<std::size_t>(guess)];
+      const bool sure = certain(guess);
+      if (!sure && uses(Heuristic::start_record) && record.skipped()) continue;
+      found = solve_from(guess);
+      spent += found.iterations;
+      if (!sure) record.note(found.converged);
+      if (!found.converged) continue;
+      if (energy_momentum_ && mixed_ && guess == Guess::other_method && uses(Heuristic::remember_plain))
+        history_.plain_solves = kPlainSolves;
+      break;
+    }
+    found.iterations = spent;
+    return found;
+  }
+
+ private:
+  /// Where surfaces stick, a motion that lets them slip leads far off, and from rest Newton's method finds its way
+  /// soon, or else mostly within a shorter step.
+  Guesses order() const {
+    if (!uses(Heuristic::friction_order))
+      return {Guess::accelerated, Guess::steady, Guess::rest, Guess::other_method, Guess::continuation};
+    if (regularised_) return {Guess::accelerated, Guess::rest, Guess::continuation, Guess::steady, Guess::other_method};
+    if (frictional_) return {Guess::accelerated, Guess::rest, Guess::steady, Guess::other_method, Guess::continuation};
+    return {Guess::accelerated, Guess::steady, Guess::rest, Guess::other_method, Guess::continuation};
+  }
+
+  bool applies(Guess guess) const {
+    if (guess == Guess::accelerated && !uses(Heuristic::start_accelerated)) return false;
+    if (guess == Guess::steady && !uses(Heuristic::start_steady)) return false;
+    if (guess == Guess::other_method && !uses(Heuristic::start_other_method)) return false;
+    if (guess == Guess::continuation && !uses(Heuristic::start_continuation)) return false;
+    if (guess == Guess::continuation) return regularised_;
+    return guess != Guess::accelerated || !steady_;
+  }
+
+  /// What is always tried: rest, and where friction does not let surfaces jump all but the extrapolated motion. Others
+  /// only while they help.
+  bool certain(Guess guess) const {
+    if (guess == Guess::rest) return true;
+    return guess != Guess::accelerated && !(frictional_ && options_.adaptive);
+  }
+
+  /// Initial guesses that need not lead to the solution are rejected early. Where edges turn by a radian in an
+  /// energy-momentum step, the mixed method may circle for ever: then the plain one comes first for a while.
+  bool on_trial(Guess guess) const {
+    const bool moving = guess == Guess::steady || guess == Guess::other_method;
+    return guess == Guess::accelerated || (energy_momentum_ && moving && mixed(guess));
+  }
+
+  bool mixed(Guess guess) const { return (guess == Guess::other_method) != mixed_; }
+
+  bool uses(Heuristic h) const { return options_.heuristics.uses(h); }
+
+  /// Puts the guess into `work.z`.
+  void guess_at(Guess guess) {
+    if (guess == Guess::accelerated) {
+      predictor_.predict({state_.time + 0.5 * plan_.dt, h_, plan_.dt, plan_.slot}, state_.v, work_.mean);
+      work_.move = h_ * work_.mean;
+    } else {
+      work_.move = (guess == Guess::rest || guess == Guess::continuation ? 0.0 : h_) * state_.v;
+    }
+    equations_.assembler().project(work_.move);
+    work_.move *= newton_.norms().cap(work_.move);
+    if (equations_.contact() && uses(Heuristic::hold_sticking)) equations_.contact()->hold_sticking(state_, work_.move);
+    follow_supports(equations_, newton_, options_, h_ / plan_.dt, state_, work_);
+    work_.z = state_.q + work_.move * equations_.allowed(state_.q, work_.move);
+    start_axial_force(equations_, state_.q, work_.newton.axial_force);
+  }
+
+  NewtonResult solve_from(Guess guess) {
+    guess_at(guess);
+    if (guess == Guess::continuation) return solve_by_continuation();
+    // Guesses that surfaces cut short soon converge in one scene, and lead nowhere in another.
+    const bool trial = on_trial(guess) && uses(Heuristic::few_iterations);
+    const NewtonResult found =
+        newton_.solve(equations_, work_.z,
+                      {.max_iterations = trial ? std::min(kFew, options_.max_iterations) : options_.max_iterations,
+                       .mixed = mixed(guess),
+                       .interval = h_,
+                       .give_up_if_cut = trial && history_.cut.waits > 0},
+                      work_.newton);
+    if (trial && found.cut && !history_.cut.skipped()) history_.cut.note(found.converged);
+    return found;
+  }
+
+  /// Where surfaces stop or turn round, friction jumps within a slip far smaller than an iteration, and Newton's method
+  /// goes to and fro across it. So the slip over which it grows is made great first, and small little by little: what
+  /// sticks slips in proportion to it, which leads from one solution to the next.
+  NewtonResult solve_by_continuation() {
+    NewtonResult found;
+    VectorX& last = work_.velocity;
+    int spent = 0;
+    for (std::size_t k = 0; k < kRegularisation.size(); ++k) {
+      if (k > 1 && uses(Heuristic::continuation_secant)) {
+        const double share =
+            (kRegularisation[k] - kRegularisation[k - 1]) / (kRegularisation[k - 1] - kRegularisation[k - 2]);
+        work_.move = share * (work_.z - last);
+        last = work_.z;
+        work_.z += equations_.allowed(work_.z, work_.move) * work_.move;
+      } else {
+        last = work_.z;
+      }
+      found = newton_.solve(
+          equations_, work_.z,
+          {.max_iterations = kMostOfEach, .mixed = mixed_, .interval = h_, .regularisation = kRegularisation[k]},
+          work_.newton);
+      spent += found.iterations;
+      if (!found.converged) break;
+    }
+    found.iterations = spent;
+    return found;
+  }
+
+  Equations& equations_;
+  const Newton& newton_;
+  const Options& options_;
+  const StepPlan& plan_;
+  double h_;
+  const State& state_;
+  const Predictor& predictor_;
+  StepWorkspace& work_;
+  GuessHistory& history_;
+  bool frictional_;
+  bool regularised_;  ///< whether friction's regularisation is what Newton's method may fail on
+  bool energy_momentum_, mixed_;
+  bool steady_;  ///< whether nothing predicts better than a steady motion
+};
 
 }  // namespace
 
 NewtonResult solve_inner(Equations& equations, const Newton& newton, const Options& options, const StepPlan& plan,
                          double h, const State& state, const Predictor& predictor, StepWorkspace& work) {
-  const auto uses = [&options](Heuristic heuristic) { return options.heuristics.uses(heuristic); };
-  const double part = h / plan.dt;
-  const auto solve = [&](int most_iterations) {
-    guess(equations, newton, options, part, state, work);
-    return newton.solve(equations, work.z, {.max_iterations = most_iterations, .interval = h}, work.newton);
-  };
-  NewtonResult found;
-  GuessRecord& record = work.newton.guess_record;
-  if (uses(Heuristic::start_extrapolated) && !(uses(Heuristic::start_record) && record.skipped())) {
-    predictor.predict({state.time + 0.5 * plan.dt, h, plan.dt, plan.slot}, state.v, work.mean);
-    work.move = h * work.mean;
-    found = solve(uses(Heuristic::few_iterations) ? std::min(kFew, options.max_iterations) : options.max_iterations);
-    record.note(found.converged);
-    if (found.converged) return found;
-  }
-  const int spent = found.iterations;
-  work.move.setZero(state.q.size());
-  found = solve(options.max_iterations);
-  found.iterations += spent;
-  return found;
+  return InnerSolve(equations, newton, options, plan, h, state, predictor, work).run();
 }
 
 }  // namespace withe

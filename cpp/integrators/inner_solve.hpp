@@ -1,12 +1,12 @@
 #pragma once
-/// The inner configuration of an implicit step, from one initial guess or the other.
+/// The inner configuration of an implicit step, from one initial guess after the other.
 
 #include "integrators/dynamics.hpp"
 
 namespace withe {
 
-/// Finds it, `work.z`, over an interval h: from the extrapolated motion, in few iterations and only while that helps;
-/// else from rest, whose first iteration is the linear step.
+/// Finds it, `work.z`, over an interval h: from the extrapolated motion first; where that is too far off, from a steady
+/// one, or from rest, whose first iteration is the linear step.
 NewtonResult solve_inner(Equations& equations, const Newton& newton, const Options& options, const StepPlan& plan,
                          double h, const State& state, const Predictor& predictor, StepWorkspace& work);
 

@@ -10,9 +10,15 @@
 namespace withe {
 namespace {
 
+// After so many iterations, steps that are still too long to be taken whole and a residual that has grown by so much
+// lead nowhere in time.
+constexpr int kFirstIterations = 4;
+constexpr double kMostGrowth = 1e3;
 // Steps that are within the tolerance, while so many in a row have not halved the residual, end at a jump of forces. In
 // time a shorter interval leads past it; a solve at rest has nothing better than to go on.
 constexpr int kMostStalls = 4;
+// A first step of which less is kept counts as cut.
+constexpr double kCut = 0.5;
 
 // Corrections of a prediction must shrink by this factor, while they are longer than this share of the prediction, and
 // than this, over the tolerance.
@@ -27,6 +33,29 @@ bool loses_path(const Prediction& predicted, const MatrixReuse& reuse, bool firs
 
 /// In packs: what is not finite is none times zero either.
 bool is_finite(const VectorX& x) { return (0.0 * x).sum() == 0.0; }
+
+/// [Choi, dissertation, Algorithm 4], with the sign of q + alpha dq and the bounds it leaves unset: Goldstein-Price on
+/// |F|^2 / 2.
+double line_search(const NewtonSystem& system, const VectorX& z, const VectorX& step) {
+  NewtonWorkspace& work = system.work;
+  const double before = 0.5 * work.data.residual.squaredNorm();
+  const double slope = -2.0 * before;  // F^T (dF/dq) dq, with dq = -J^-1 F
+  double low = 0.0, high = 2.0, alpha = 1.0;
+  for (int n = 0; n < 20; ++n) {
+    work.trial = z + alpha * step;
+    system.evaluate(work.trial, false);
+    const double change = 0.5 * work.data.residual.squaredNorm() - before;
+    if (!(change <= 0.1 * alpha * slope))
+      high = alpha;
+    else if (alpha < 1.0 && change < 0.9 * alpha * slope)
+      low = alpha;
+    else
+      break;
+    if (high - low < 1e-3) break;
+    alpha = 0.5 * (low + high);
+  }
+  return alpha;
+}
 
 /// A user's force tolerance is that of a whole step.
 Options options_of_parts(Options options) {
@@ -72,11 +101,13 @@ class Newton::Solve {
         contact_(equations.contact()),
         system_{equations, how.target, work, how.hold_neutral},
         search_(newton.norms_, system_, newton.options_.heuristics),
-        mixed_(newton.options_.mixed),
-        reuse_(work.matrix, equations, how.interval,
+        line_search_(newton.options_.line_search == LineSearch::goldstein_price),
+        mixed_(how.mixed && newton.options_.mixed),
+        reuse_(work.matrix, equations, how.interval, how.interval != 0.0 && !line_search_,
                std::min(newton.options_.step_tolerance * newton.model_.length_scale, work.finest),
                newton.options_.heuristics),
         axial_known_(mixed_ && (how.interval != 0.0 || (how.predicted && how.predicted->forces))) {
+    work.contact.regularisation = how.regularisation;
     work.contact.geometric = true;
     work.contact.forget_friction();
   }
@@ -122,6 +153,10 @@ class Newton::Solve {
     if (uses(Heuristic::reject_stagnation) && how_.interval != 0.0 && stagnation_.stalls() >= kMostStalls &&
         reuse_.at_end())
       return Verdict::failed;
+    if (result_.iterations == 0) first_residual_ = result_.residual;
+    if (uses(Heuristic::reject_growing) && how_.interval != 0.0 && result_.iterations >= kFirstIterations &&
+        std::isinf(reuse_.step()) && std::isinf(reuse_.last_step()) && result_.residual > kMostGrowth * first_residual_)
+      return Verdict::failed;
     if (reuse_.fresh() && near_end) evaluate(true);
     return Verdict::go_on;
   }
@@ -155,6 +190,15 @@ class Newton::Solve {
     axial_known_ = mixed_;
     if (contact_ && uses(Heuristic::surface_search) && !leaves_surfaces_alone() && !step_between_surfaces(shorten))
       return false;
+    if (result_.iterations == 0) result_.cut = contact_ && shorten < kCut;
+    if (how_.give_up_if_cut && result_.cut && uses(Heuristic::reject_cut)) return false;
+    if (line_search_) {
+      const double alpha = line_search(system_, z_, work_.step);
+      work_.step *= alpha;
+      shorten *= alpha;
+      axial_known_ = axial_known_ && alpha == 1.0;
+      search_.forget();
+    }
     if (search_.evaluated())
       z_.swap(work_.trial);
     else
@@ -190,7 +234,7 @@ class Newton::Solve {
   Contact* contact_;
   NewtonSystem system_;
   SurfaceSearch search_;
-  bool mixed_;
+  bool line_search_, mixed_;
   MatrixReuse reuse_;
   bool axial_known_;
   bool spare_matrix_ = false;  ///< made since the last factorisation
@@ -198,6 +242,7 @@ class Newton::Solve {
   NewtonResult result_;
   Balance balance_;
   Stagnation stagnation_;
+  double first_residual_ = 0.0;
 };
 
 NewtonResult Newton::solve(Equations& equations, VectorX& z, const SolveOptions& how, NewtonWorkspace& work) const {

@@ -70,6 +70,10 @@ double StepNorms::displacement(const VectorX& step) const {
   return std::max(farthest_node(step), shortest_edge_ * greatest_angle(step));
 }
 
+bool StepNorms::leaves_alone(double most) const {
+  return leaves_edges_alone(most) && most <= std::min(kFarthest * model_.length_scale, kGreatestAngle);
+}
+
 /// Both ends of an edge may move by it, in opposite directions.
 bool StepNorms::leaves_edges_alone(double most) const { return most <= 0.5 * kGreatestEdgeTurn * shortest_edge_; }
 

@@ -17,6 +17,8 @@ class StepNorms {
   double turn(const VectorX& step) const;
   /// Factor by which a step is shortened, so that nothing moves or turns too far at once.
   double cap(const VectorX& step) const;
+  /// Whether `cap` surely leaves a step alone in which no node moves, and nothing turns, by more than `most`.
+  bool leaves_alone(double most) const;
 
   /// Per unknown: 1 where it is a coordinate of a node, 1 where it is an angle, else 0; and what makes a force of a
   /// force or moment: 1, or the inverse of the shortest edge [1/m].

@@ -216,9 +216,10 @@ void exchange(Archive& io, MatrixHistory& history) {
 }
 
 template <class Archive>
-void exchange(Archive& io, GuessRecord& history) {
-  auto& [misses, waits] = history;
-  io(misses), io(waits);
+void exchange(Archive& io, GuessHistory& history) {
+  auto& [records, cut, plain_solves] = history;
+  for (auto& [misses, waits] : records) io(misses), io(waits);
+  io(cut.misses), io(cut.waits), io(plain_solves);
 }
 
 }  // namespace
@@ -233,9 +234,9 @@ void exchange(Archive& io, const Model& model, Running& running) {
 
 template <class Archive>
 void exchange(Archive& io, Lagged& lagged) {
-  auto& [matrix, guess_record, owner, systems] = lagged;
+  auto& [matrix, guesses, owner, systems] = lagged;
   exchange(io, matrix);
-  exchange(io, guess_record);
+  exchange(io, guesses);
   int number = owner ? static_cast<int>(*owner) : -1;
   io(number);
   require(number >= -1 && number < static_cast<int>(kSystems.size()), "snapshot is damaged: unknown equations");

@@ -67,7 +67,7 @@ struct World::Implementation : Running {
   EnergyCoefficients before_settings;
   bool newly_set = false;
   MatrixRecord marked_matrix;
-  GuessRecord marked_guess_record;
+  GuessHistory marked_guesses;
   StepControl marked_control;
   Moving kept;                         ///< at the start of a step that may be taken back
   double turned = 0, held_turned = 0;  ///< of an edge, of a held frame in the last step at most [rad]

@@ -1,4 +1,4 @@
-/// What solves leave for those to come: factorisations that may serve again, orders of elimination, how guesses fared.
+/// What solves leave for those to come: factorisations that may serve again, orders of elimination, guesses.
 
 #include "common/check.hpp"
 #include "world/implementation.hpp"
@@ -25,7 +25,7 @@ Lagged World::Implementation::lagged() {
   Lagged out;
   const MatrixRecord& matrix = work.newton.matrix;
   out.matrix = matrix;
-  out.guess_record = work.newton.guess_record;
+  out.guesses = work.newton.guesses;
   for (const System which : kSystems) {
     const Equations* known = system(which);
     if (!known) continue;
@@ -50,7 +50,7 @@ void World::Implementation::recall(const Lagged& past) {
   MatrixRecord& matrix = work.newton.matrix;
   static_cast<MatrixHistory&>(matrix) = past.matrix;
   matrix.owner = nullptr;
-  work.newton.guess_record = past.guess_record;
+  work.newton.guesses = past.guesses;
   if (past.owner && fits) factorize_again(*past.owner);
 }
 
@@ -68,7 +68,7 @@ void World::Implementation::factorize_again(System which) {
 void World::Implementation::mark() {
   marked_control = *this;
   marked_matrix = work.newton.matrix;
-  marked_guess_record = work.newton.guess_record;
+  marked_guesses = work.newton.guesses;
   for (const System which : kSystems)
     if (Equations* known = system(which)) known->mark();
 }
@@ -81,7 +81,7 @@ void World::Implementation::return_to_mark() {
   }
   if (static_equations && !static_equations->marked()) static_equations.reset();
   work.newton.matrix = marked_matrix;
-  work.newton.guess_record = marked_guess_record;
+  work.newton.guesses = marked_guesses;
   for (const System which : kSystems) {
     Equations* known = system(which);
     const EquationsMemory* before = known ? known->since_mark() : nullptr;
@@ -103,7 +103,7 @@ void World::Implementation::forget_contacts() {
 
 void World::Implementation::forget_matrix() {
   work.newton.matrix = MatrixRecord{};
-  work.newton.guess_record = GuessRecord{};
+  work.newton.guesses = GuessHistory{};
   for (const System which : kSystems)
     if (Equations* known = system(which)) known->forget_flow();
 }

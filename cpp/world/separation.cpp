@@ -43,7 +43,7 @@ class Separation {
       predictor_.clear();
       work_.held = {state_.q, true};
       work_.newton.matrix = MatrixRecord{};
-      work_.newton.guess_record = GuessRecord{};
+      work_.newton.guesses = GuessHistory{};
       const bool done = implicit_step(equations_, newton_, options_, parameters_, {StepRule::backward_euler, dt, 0},
                                       state_, predictor_, work_)
                             .accepted;

@@ -12,22 +12,33 @@ constexpr Words<Integrator, 6> kIntegrators{{{"static", Integrator::statics},
                                              {"energy_momentum", Integrator::energy_momentum},
                                              {"fourth_order", Integrator::fourth_order},
                                              {"verlet", Integrator::verlet}}};
-constexpr Words<Heuristic, 16> kHeuristics{{{"reuse_across_steps", Heuristic::reuse_across_steps},
+constexpr Words<LineSearch, 2> kLineSearches{
+    {{"automatic", LineSearch::automatic}, {"goldstein_price", LineSearch::goldstein_price}}};
+constexpr Words<Heuristic, 25> kHeuristics{{{"reuse_across_steps", Heuristic::reuse_across_steps},
                                             {"reuse_within_step", Heuristic::reuse_within_step},
                                             {"rest_from_reuse", Heuristic::rest_from_reuse},
                                             {"refresh_after_slow", Heuristic::refresh_after_slow},
                                             {"forget_contraction", Heuristic::forget_contraction},
                                             {"late_matrix", Heuristic::late_matrix},
                                             {"matrix_worth", Heuristic::matrix_worth},
+                                            {"reject_growing", Heuristic::reject_growing},
+                                            {"reject_cut", Heuristic::reject_cut},
                                             {"reject_stagnation", Heuristic::reject_stagnation},
                                             {"surface_search", Heuristic::surface_search},
                                             {"search_descent", Heuristic::search_descent},
                                             {"drop_geometric", Heuristic::drop_geometric},
-                                            {"start_extrapolated", Heuristic::start_extrapolated},
+                                            {"start_accelerated", Heuristic::start_accelerated},
+                                            {"start_steady", Heuristic::start_steady},
+                                            {"start_other_method", Heuristic::start_other_method},
+                                            {"start_continuation", Heuristic::start_continuation},
                                             {"start_record", Heuristic::start_record},
+                                            {"remember_plain", Heuristic::remember_plain},
+                                            {"friction_order", Heuristic::friction_order},
                                             {"few_iterations", Heuristic::few_iterations},
                                             {"hold_sticking", Heuristic::hold_sticking},
-                                            {"predict_friction", Heuristic::predict_friction}}};
+                                            {"predict_friction", Heuristic::predict_friction},
+                                            {"supports_linear", Heuristic::supports_linear},
+                                            {"continuation_secant", Heuristic::continuation_secant}}};
 constexpr Words<SolverKind, 3> kSolvers{
     {{"automatic", SolverKind::automatic}, {"band", SolverKind::band}, {"sparse", SolverKind::sparse}}};
 
@@ -49,6 +60,7 @@ void register_integrators(py::module_& module) {
       .def_readwrite("max_steps", &Options::max_steps);
   def_word(options, "integrator", &Options::integrator, kIntegrators);
   def_word(options, "solver", &Options::solver, kSolvers);
+  def_word(options, "line_search", &Options::line_search, kLineSearches);
   options.def("switch_off",
               [](Options& self, const std::string& word) { self.heuristics.switch_off(from_word(kHeuristics, word)); });
   std::vector<std::string> heuristics;

@@ -511,18 +511,28 @@ class Options:
         "forget_contraction",
         "late_matrix",
         "matrix_worth",
+        "reject_growing",
+        "reject_cut",
         "reject_stagnation",
         "surface_search",
         "search_descent",
         "drop_geometric",
-        "start_extrapolated",
+        "start_accelerated",
+        "start_steady",
+        "start_other_method",
+        "start_continuation",
         "start_record",
+        "remember_plain",
+        "friction_order",
         "few_iterations",
         "hold_sticking",
         "predict_friction",
+        "supports_linear",
+        "continuation_secant",
     )
     adaptive: bool
     integrator: str
+    line_search: str
     mixed: bool
     planar: bool | None
     solver: str

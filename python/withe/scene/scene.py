@@ -17,7 +17,7 @@ from withe.parts.directory import Directory
 from withe.parts.handles import Joint, Load, NodeHandle, Rod, RodPlace, parse_place
 from withe.parts.kinds import JoinKind, JointForm, LoadPart, RodPart
 from withe.parts.materials import Material, Section, Stiffness
-from withe.parts.options import Bending, BuildOptions, Integrator, Solver
+from withe.parts.options import Bending, BuildOptions, Integrator, LineSearch, Solver
 from withe.parts.rods import Natural, make_rod
 from withe.scene.contacts import Contacts
 from withe.scene.joints import JoinedNodes
@@ -321,6 +321,7 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         duration: float | None = None,
         bending: Bending = "angle",
         solver: Solver = "automatic",
+        line_search: LineSearch = "automatic",
         mixed: bool = True,
         step_tolerance: float = 1e-9,
         force_tolerance: float = 1e-8,
@@ -366,6 +367,7 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
             [Bergou et al. 2008], which bends too stiffly on coarse meshes, and with which edges are always the
             rod and never chords of its arcs.
         solver : {"automatic", "band", "sparse"}
+        line_search : {"automatic", "goldstein_price"}
         mixed : bool
             Newton's method with the axial forces as unknowns of their own.
         step_tolerance : float
@@ -400,6 +402,7 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
             duration=duration,
             bending=bending,
             solver=solver,
+            line_search=line_search,
             mixed=mixed,
             step_tolerance=step_tolerance,
             force_tolerance=force_tolerance,

@@ -1,0 +1,29 @@
+#pragma once
+/// What is remembered of initial guesses from one time step to the next.
+
+#include <algorithm>
+#include <array>
+
+namespace withe {
+
+/// How often a guess that need not lead to the solution has done so: what misses time and again is tried ever more
+/// rarely.
+struct GuessRecord {
+  int misses = 0;  ///< in a row
+  int waits = 0;   ///< solves to come without it
+
+  bool skipped() { return waits > 0 && waits-- > 0; }
+  void note(bool converged) {
+    constexpr int kMostMisses = 6;
+    misses = converged ? 0 : std::min(misses + 1, kMostMisses);
+    waits = (1 << misses) - 1;
+  }
+};
+
+struct GuessHistory {
+  std::array<GuessRecord, 5> records{};  ///< per `Guess`
+  GuessRecord cut;                       ///< of those whose first step surfaces cut short
+  int plain_solves = 0;                  ///< still to come before the mixed method is tried again
+};
+
+}  // namespace withe
