@@ -83,8 +83,9 @@ double ContactProblem::stiffness_to_bear_more(double firm, double stiffness, dou
 }
 
 double ContactProblem::tolerance(const ContactPair& pair, double stiffness) const {
-  if (fixed(pair)) return pair.tolerance;
-  return pair.tolerance * std::clamp(stiffness / firm_stiffness(pair), description().least_tolerance(), 1.0);
+  const double firm = firm_stiffness(pair);
+  if (fixed(pair) || stiffness >= firm) return pair.tolerance;
+  return pair.tolerance * std::max(stiffness / firm, description().least_tolerance());
 }
 
 double ContactProblem::mass_of(const ContactPair& pair) const {

@@ -84,20 +84,25 @@ class SharedWeight {
   std::ptrdiff_t contacts_ = 0;
 };
 
-/// Energy of a contact that is so many times as stiff, for unit stiffness, at a distance of centrelines with what has
-/// yielded.
-ContactEnergy energy_at(const ContactProblem& problem, const Touching& t, double ratio, double distance) {
-  const double tolerance = problem.tolerance(t.pair, ratio * t.stiffness / t.pair.share);
-  return contact_energy(t.law.law, distance, t.pair.radii(), tolerance);
+/// Stiffness of a whole node that a contact's force asks for [N/m].
+double wanted_stiffness(const ContactProblem& problem, const Touching& t) {
+  return problem.stiffness_to_bear(t.pair, -t.energy.first / t.pair.share);
+}
+
+/// Law of a contact that is so many times as stiff, and has yielded by so much.
+PressingLaw law_at(const ContactProblem& problem, const Touching& t, double ratio, double yielded) {
+  const double stiffness = ratio * t.stiffness;
+  return {t.law.law, t.pair.radii(), problem.tolerance(t.pair, stiffness / t.pair.share), stiffness, yielded};
 }
 
 /// Distance of centrelines, with what has yielded, at which the force, or energy, of a contact that is so many times
 /// as stiff is what is `wanted` for unit stiffness, or less by rounding.
 double distance_at(const ContactProblem& problem, const Touching& t, double ratio, bool force, double wanted) {
+  const PressingLaw law = law_at(problem, t, ratio, 0.0);
   double low = t.proximity.distance + t.yielded, high = t.pair.reach();
   for (int k = 0; k < 60; ++k) {
     const double middle = 0.5 * (low + high);
-    const ContactEnergy e = energy_at(problem, t, ratio, middle);
+    const ContactEnergy e = law.energy(middle);
     ((force ? -e.first : e.value) > wanted ? low : high) = middle;
   }
   return high;
@@ -105,7 +110,7 @@ double distance_at(const ContactProblem& problem, const Touching& t, double rati
 
 /// With which a contact presses where it stands, so many times as stiff, with a depth that presses no more [N].
 double force_at(const ContactProblem& problem, const Touching& t, double ratio, double yielded) {
-  return -ratio * t.stiffness * energy_at(problem, t, ratio, t.proximity.distance + yielded).first;
+  return -ratio * t.stiffness * law_at(problem, t, ratio, yielded).energy(t.proximity.distance).first;
 }
 
 /// What stops an edge's mass at the speed at which the ends meet (along the normal of a plane, which is known before
@@ -176,7 +181,7 @@ double ContactStiffness::yielded_at(const Touching& t, double ratio) const {
 double ContactStiffness::change_stiffness(const Touching& t, double ratio, double yielded,
                                           ContactRecord& record) const {
   const ContactPair& pair = t.pair;
-  const double energy = ratio * t.stiffness * energy_at(problem_, t, ratio, t.proximity.distance + yielded).value;
+  const double energy = ratio * t.stiffness * law_at(problem_, t, ratio, yielded).energy(t.proximity.distance).value;
   const double shorter = ratio > 1.0 ? 1.0 / ratio : 1.0 / std::sqrt(ratio);
   const double rolled = anchor_stiffness(pair, FrictionKind::rolling, t.stiffness) * dot(record.roll, record.roll);
   const double anchored = 0.5 * (rolled - dot(record.friction, record.stick));
@@ -190,7 +195,7 @@ double ContactStiffness::change_stiffness(const Touching& t, double ratio, doubl
 
 double ContactStiffness::wanted_ratio(const Touching& t, const ContactRecord& record) const {
   if (problem_.fixed(t.pair)) return 1.0;
-  const double wanted = problem_.stiffness_to_bear(t.pair, record.force / t.pair.share);
+  const double wanted = wanted_stiffness(problem_, t);
   if (wanted > record.stiffness) return kAhead * wanted / record.stiffness;
   if (record.approach > 0.0) return 1.0;  // as stiff as the impact that has only begun will want it
   // A contact that is about to open wants next to nothing, and more when it presses again.
@@ -278,9 +283,7 @@ double ContactStiffness::accept(const ContactSet& set, double spare, StiffnessSc
       fading.push_back({&t, records.size()});
     }
     for (int rod : {pair.rod_a, pair.rod_b})
-      if (rod >= 0)
-        greatest(rod) =
-            std::max(greatest(rod), source ? common : problem_.stiffness_to_bear(pair, -t.energy.first / pair.share));
+      if (rod >= 0) greatest(rod) = std::max(greatest(rod), source ? common : wanted_stiffness(problem_, t));
     records.push_back(record);
   }
   // Energy grows with depth the faster the deeper, so that a part of the way takes less than that part of the work.
@@ -302,7 +305,7 @@ void ContactStiffness::accept_at_rest(const ContactSet& set, bool arrived, doubl
   greatest = problem_.parameters->least_stiffness;
   for (const Touching& t : set) {
     if (source > 0.0 || !presses(t) || problem_.fixed(t.pair)) continue;
-    const double wanted = problem_.stiffness_to_bear(t.pair, -t.energy.first / t.pair.share);
+    const double wanted = wanted_stiffness(problem_, t);
     const bool more = arrived ? wanted > t.stiffness / t.pair.share : t.depth() > deepest;
     for (int rod : {t.pair.rod_a, t.pair.rod_b}) {
       if (rod < 0) continue;
@@ -339,8 +342,7 @@ double ContactStiffness::wanted_ratio(const ContactSet& set) const {
   double ratio = 1.0;
   for (const Touching& t : set)
     if (t.lagged < 0 && !problem_.fixed(t.pair))
-      ratio = std::max(ratio,
-                       problem_.stiffness_to_bear(t.pair, -t.energy.first / t.pair.share) * t.pair.share / t.stiffness);
+      ratio = std::max(ratio, wanted_stiffness(problem_, t) * t.pair.share / t.stiffness);
   return ratio;
 }
 

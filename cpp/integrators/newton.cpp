@@ -26,8 +26,9 @@ constexpr double kMostContraction = 0.5, kNear = 0.05, kUnsettled = 1e4;
 
 /// Whether corrections of a prediction are too long, or do not shrink, for what they lead to to lie on the same path.
 bool loses_path(const Prediction& predicted, const MatrixReuse& reuse, bool first, double length) {
-  if (!predicted.strict) return length > std::max(predicted.length, kUnsettled * reuse.tolerance());
-  if (reuse.step() <= std::max(kNear * predicted.length, kUnsettled * reuse.tolerance())) return false;
+  const double unsettled = kUnsettled * reuse.tolerance();
+  if (!predicted.strict) return predicted.length > 0.0 && length > std::max(predicted.length, unsettled);
+  if (reuse.step() <= std::max(kNear * predicted.length, unsettled)) return false;
   return first ? !(reuse.step() <= predicted.length) : !(reuse.step() <= kMostContraction * reuse.last_step());
 }
 
@@ -208,7 +209,7 @@ class Newton::Solve {
     // A step that is cut says nothing of where the solution is, unless all of it is within the tolerance.
     const bool near = shorten > 0.0 && length <= shorten * reuse_.tolerance();
     reuse_.note_step(shorten == 1.0 || near ? length : INFINITY);
-    if (!how_.predicted || how_.predicted->length == 0.0) return true;
+    if (!how_.predicted) return true;
     return !loses_path(*how_.predicted, reuse_, result_.iterations == 0, length) ||
            ++kinks_met_ <= how_.predicted->kinks;
   }

@@ -52,8 +52,8 @@ class Stagnation {
 /// guess that is near enough is drawn in fast: where the first correction is longer than the prediction, or the
 /// corrections do not halve, the path is lost, or another one not far [Deuflhard 2011, section 5.1].
 struct Prediction {
-  double length = 0;   ///< greatest displacement from the known solution [m]; 0: corrections are not judged
-  bool strict = true;  ///< whether corrections have to shrink, too
+  double length = 0;   ///< greatest displacement from the known solution [m]; 0 and not strict: no bound
+  bool strict = true;  ///< whether corrections have to shrink too; else none may be longer than `length`
   int kinks = 0;       ///< corrections that may fail so because forces have kinks
   bool forces = true;  ///< whether work.axial_force goes with it
   double enough = 0;   ///< a correction after which no other is needed, for a point on the way [m]

@@ -15,7 +15,7 @@ enum class LineSearch {
   goldstein_price,  ///< [Choi, dissertation, Algorithm 4] on |F|^2 / 2
 };
 
-/// What the static solver does at an equilibrium that is not stable: leave it for a stable one, or return it.
+/// Choice of the static solver at an equilibrium that is not stable: leave it for a stable one, or return it.
 enum class Saddles { leave, keep };
 
 struct Options {

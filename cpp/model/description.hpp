@@ -227,10 +227,11 @@ struct ContactDescription {
   Overlap overlap = Overlap::error;
   std::vector<ObstacleDescription> obstacles;
   std::vector<ContactPairDescription> pairs;
-  /// Where loads are light, contact is narrower: the least share of the distance tolerance, where it is found, and of
-  /// the depth of contact.
+  /// Share of the distance tolerance, and of the depth of contact, that is left where loads are light: contact is
+  /// narrower there, unless the tolerance is given.
   double light = 0.05;
 
+  /// That share, or 1 where the tolerance does not follow the load [-].
   double least_tolerance() const {
     const bool follows =
         distance_tolerance == 0.0 && law == ContactLaw::imcv2 && stiffness_rule == StiffnessRule::forces;

@@ -51,7 +51,7 @@ def test_a_column_that_grows_between_walls_buckles_by_its_strain() -> None:
 
 
 def tensioned(w: float, tension: float) -> float:
-    """What vanishes at the frequencies of a clamped beam under tension, B = m = L = 1, over its growth."""
+    """Characteristic function of a clamped beam under tension, B = m = L = 1, over its growth; 0 at its frequencies."""
     root = np.hypot(0.5 * tension, w)
     a, b = np.sqrt(root - 0.5 * tension), np.sqrt(root + 0.5 * tension)
     return 2.0 * a * b * (1.0 / np.cosh(b) - np.cos(a)) + (b * b - a * a) * np.sin(a) * np.tanh(b)

@@ -1,4 +1,4 @@
-"""Where what is drawn touching rocks, stands, falls and leaves, by rigid-body theory.
+"""A plank on a cylinder, a pile of logs and a cylinder that slides off another, by rigid-body theory.
 
 Light loads must not move surfaces apart by more than a thousandth or so of their radius."""
 

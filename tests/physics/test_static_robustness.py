@@ -133,7 +133,7 @@ def test_drawn_cables_that_are_pulled_over_a_rough_floor_find_equilibria_all_the
     cable = scene.add_rod(points=points, radius=radius, material=rubber)
     scene.enable_contact(rods=False)
     scene.pin(cable.end, free=(0.0, 0.0, 1.0), name="hand")
-    # What Newton's method leaves at each of 400 nodes adds up.
+    # The residuals that Newton's method leaves at 400 nodes add up.
     simulation = scene.build(integrator="static", time_step=0.1, planar=False, step_tolerance=1e-11)
     simulation.set_natural_curvature(cable, (0.0, 0.0), over=1.0)
     way = random.normal(size=2)
