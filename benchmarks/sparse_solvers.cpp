@@ -179,10 +179,12 @@ struct Settled : BenchmarkProblem {
     predictor.resize(state.q.size());
     equations.contact()->initialise(state, parameters);
     for (int k = 0; k < 8; ++k) {
-      work.held.q = state.q;
+      Prescribed prescribed;
+      prescribed.held.q = state.q;
       const StepPlan plan{StepRule::backward_euler, kStep, 0};
       for (int tries = 0; tries < 9; ++tries) {
-        const StepResult r = implicit_step(equations, newton, options, parameters, plan, state, predictor, work);
+        const StepResult r =
+            implicit_step(equations, newton, options, parameters, prescribed, plan, state, predictor, work);
         if (r.accepted) break;
         require(r.too_deep && tries < 8, "the pile did not settle");
         equations.contact()->stiffen(state, false);

@@ -11,7 +11,7 @@ constexpr double kFar = 0.6;
 
 }  // namespace
 
-double Bodies::place(const std::vector<ObstaclePlace>& places) {
+double Bodies::place(std::span<const ObstaclePlace> places) {
   double square = 0.0;
   for (std::size_t o = 0; o < places.size(); ++o) {
     const Vec3d shift = places[o].point - obstacles[o].point;

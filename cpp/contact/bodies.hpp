@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <vector>
 
 #include "contact/surfaces.hpp"
@@ -28,7 +29,7 @@ struct Bodies {
   /// Whether a pair is one with a plane, which has no other side.
   bool flat(const ContactPair& pair) const { return pair.key.b < 0 && obstacle(pair).kind == ObstacleKind::plane; }
   /// Puts obstacles where they are now; how far the farthest of them came [m].
-  double place(const std::vector<ObstaclePlace>& places);
+  double place(std::span<const ObstaclePlace> places);
   /// Ends of edges, or of an obstacle; of a piece of a curve its nodes, and nothing.
   void end_points(const ContactPair& pair, const VectorX& q, Vec3d (&x)[4]) const;
   /// Unknowns of a pair at q (obstacles' points where there are none).

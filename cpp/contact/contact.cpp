@@ -121,12 +121,14 @@ void Contact::take_given_stiffness(State& state, const Parameters& parameters) c
   }
 }
 
-void Contact::begin(const State& state, const Parameters& parameters, double duration, Pressing pressing) {
+void Contact::begin(const State& state, const Parameters& parameters, double duration, Pressing pressing,
+                    std::span<const ObstaclePlace> target) {
   if (parameters_.version != parameters.version) {
     set_parameters(parameters);
     parameters_ = ContactParameters(surfaces_, parameters);
   }
   problem_.pressing = pressing;
+  target_ = target;
   restart(state, duration);
 }
 
@@ -258,7 +260,7 @@ Contact::TouchingComponents Contact::touching_components() const {
 }
 
 void Contact::leave_obstacles(State& state) const {
-  if (!target_.empty()) state.obstacles = target_;
+  if (!target_.empty()) state.obstacles.assign(target_.begin(), target_.end());
   const bool moves = !problem_.velocity.empty() && problem_.pressing != Pressing::still;
   for (std::size_t o = 0; o < state.obstacles.size(); ++o)
     state.obstacles[o].velocity = moves ? problem_.velocity[o] : Vec3d{};

@@ -9,6 +9,7 @@
 /// functions of its entries and of the `ContactProblem`, which is const while a step is solved; and `ContactStiffness`
 /// makes the records that a step leaves of those that it began with.
 
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -64,8 +65,6 @@ class Contact {
   /// Whether friction grows with slip, so that a continuation in the slip tolerance leads to it.
   bool regularises() const;
 
-  /// Where obstacles shall be at the end of the steps to come; nothing: where they are.
-  void aim(std::vector<ObstaclePlace> places) { target_ = std::move(places); }
   /// Whether an obstacle would pass through a rod on its way through this step.
   bool blocked() const { return blocked_; }
 
@@ -74,8 +73,10 @@ class Contact {
   /// Gives contacts of a state, and those that begin, the stiffness that is given, where one is; and where none is any
   /// more, those that begin the least one.
   void take_given_stiffness(State& state, const Parameters& parameters) const;
-  /// A step begins at `state`, which must outlive it. `duration`: the time in which slip happens [s].
-  void begin(const State& state, const Parameters& parameters, double duration, Pressing pressing);
+  /// A step begins at `state`, which must outlive it. `duration`: the time in which slip happens [s]. `target`:
+  /// obstacles at the end of the step, which must outlive it; empty: they rest.
+  void begin(const State& state, const Parameters& parameters, double duration, Pressing pressing,
+             std::span<const ObstaclePlace> target = {});
   /// Finds what touches at q1.
   void update(const VectorX& q1);
   const ContactProblem& problem() const { return problem_; }
@@ -169,7 +170,7 @@ class Contact {
   ContactSet set_, deep_;  ///< what touches; what did when it was found to be too deep
   StiffnessScratch scratch_;
   bool current_ = false;  ///< set_ is what touches in this step
-  std::vector<ObstaclePlace> target_;
+  std::span<const ObstaclePlace> target_;
   bool blocked_ = false;
   double deepest_ = kDeepest;
 };

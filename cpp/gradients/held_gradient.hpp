@@ -24,7 +24,7 @@ DrawnAdjoint by_drawing(const Model& model, const VectorX& q, const VectorX& by)
 
 /// Hands, per support: where they are, and what they have grasped.
 struct HandsHeld {
-  const std::vector<HandPose>& poses;
+  const std::vector<SupportPose>& poses;
   const std::vector<HandState>& grasped;
 };
 

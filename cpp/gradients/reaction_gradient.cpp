@@ -83,7 +83,8 @@ void StepGradient::add_hand_reaction(int support, const Vector3& by_force, const
   const Support& hand = model.supports[at(support)];
   if (hand.yields()) {
     if (by_force.isZero() && by_moment.isZero()) return;
-    const Vector3 end = step_->hands ? (*step_->hands)[at(support)].position : step_->start.hands[at(support)].position;
+    const std::vector<SupportPose>& poses = step_->prescribed.supports;
+    const Vector3 end = poses.empty() ? step_->start.hands[at(support)].position : poses[at(support)].position;
     equations_.hands()->add_wrench_adjoint(equations_.problem(), data_, support,
                                            by_force + by_moment.cross(end - about), by_moment, adjoint, by_z_);
     return;

@@ -49,11 +49,8 @@ void StepGradient::begin(const StepTaken& step) {
     held_acceleration_ = (*step.held_velocity - step.start.v) / step.duration;
   else if (holds)
     held_acceleration_.setZero(model.dof_count);
-  if (HandForces* hands = equations_.hands()) hands->aim(step.hands ? *step.hands : std::vector<HandPose>{});
-  if (Contact* contact = equations_.contact())
-    contact->aim(step.obstacles ? *step.obstacles : std::vector<ObstaclePlace>{});
   equations_.begin(step.start, step.parameters, step.rule, middle ? 0.5 * step.duration : step.duration,
-                   holds ? &held_acceleration_ : nullptr);
+                   step.prescribed, holds ? &held_acceleration_ : nullptr);
   if (step.rule == StepRule::energy_momentum) {
     z_ = step.end - step.start.q;
     set_velocity_rates(model, z_, step.duration, rates_);

@@ -38,10 +38,8 @@ struct StepTaken {
   const VectorX* held_velocity = nullptr;  ///< of supports at the end, meaningful where held; nothing: they rest
   /// Per constraint, how much of the gain on the mean velocity before goes into that at the end; nothing: none.
   const VectorX* held_gain = nullptr;
-  /// Of hands at the end, per support; nothing: they are where they were.
-  const std::vector<HandPose>* hands = nullptr;
-  /// Of obstacles at the end; nothing: they are where they were.
-  const std::vector<ObstaclePlace>* obstacles = nullptr;
+  /// Poses of hands and places of obstacles at the end; must outlive the step.
+  const Prescribed& prescribed = Prescribed::nothing();
 };
 
 /// Derivatives of a scalar by the reactions of supports in a step, as `World::reaction` has them; or empty.
@@ -53,8 +51,8 @@ struct SupportAdjoint {
 /// their moments are.
 struct ReactionAdjoint {
   const SupportAdjoint& by;
-  std::vector<HandPose> about;  ///< per support; none: there is no hand
-  double share = 1;             ///< of the time step, over whose parts reactions are means
+  std::vector<SupportPose> about;  ///< per support; none: there is no hand
+  double share = 1;                ///< of the time step, over whose parts reactions are means
 };
 
 /// Derivatives of a scalar by what supports prescribe, meaningful where held.

@@ -25,21 +25,21 @@ MatrixX3 at_nodes(const Model& model, const VectorX& by) {
 }
 
 /// Takes hands of a state to where they are.
-void place_hands(const std::vector<HandPose>& poses, State& state) {
+void place_hands(const std::vector<SupportPose>& poses, State& state) {
   for (std::size_t s = 0; s < poses.size(); ++s) {
     state.hands[s].position = poses[s].position;
     state.hands[s].rotation = poses[s].rotation;
   }
 }
 
-std::vector<HandPose> poses_of(const State& state) {
-  std::vector<HandPose> poses;
+std::vector<SupportPose> poses_of(const State& state) {
+  std::vector<SupportPose> poses;
   for (const HandState& hand : state.hands) poses.push_back({hand.position, hand.rotation});
   return poses;
 }
 
-bool same_poses(const std::vector<HandPose>& a, const std::vector<HandPose>& b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const HandPose& one, const HandPose& other) {
+bool same_poses(const std::vector<SupportPose>& a, const std::vector<SupportPose>& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const SupportPose& one, const SupportPose& other) {
     return one.position == other.position && one.rotation == other.rotation;
   });
 }
@@ -73,10 +73,7 @@ class Tape::Player {
     if (const VectorX* held = held_velocity(step)) assembler.add_held_part(*held, 1.0, v);
     if (!model_.planar()) compute_configuration(model_, state, step.end, configuration_);
     accept_configuration(model_, step.end, configuration_, state);
-    if (HandForces* hands = equations.hands()) {
-      hands->aim(hands_after(step, state));
-      hands->accept(configuration_, state);
-    }
+    if (const HandForces* hands = equations.hands()) hands->accept(hands_after(step, state), configuration_, state);
     place_hands(step.hands, state);
     if (!step.obstacles.empty()) state.obstacles = step.obstacles;
     state.v = v;
@@ -84,7 +81,7 @@ class Tape::Player {
   }
 
   /// Where hands are at the end of a step from a state.
-  static std::vector<HandPose> hands_after(const Step& step, const State& start) {
+  static std::vector<SupportPose> hands_after(const Step& step, const State& start) {
     return step.hands.empty() ? poses_of(start) : step.hands;
   }
 
@@ -109,7 +106,7 @@ class Tape::Player {
 };
 
 Tape::Tape(const Model& model, EquationOptions options, State first, const Parameters& parameters, bool frictional,
-           std::vector<HandPose> hands)
+           std::vector<SupportPose> hands)
     : model_(model),
       options_(options),
       acting_(parameters),
@@ -147,13 +144,13 @@ void Tape::note_moment(const Parameters& now) {
   natural_[count()] = {now.natural_curvature, now.natural_twist, now.edge_natural_stretch};
 }
 
-std::vector<HandPose> Tape::hands_after(long steps) const {
+std::vector<SupportPose> Tape::hands_after(long steps) const {
   for (long k = steps; k-- > 0;)
     if (const Step& step = steps_[static_cast<std::size_t>(k)]; !step.hands.empty()) return step.hands;
   return poses_of(starts_.front());
 }
 
-std::vector<HandPose> Tape::moved_hands(const std::vector<HandPose>& hands) {
+std::vector<SupportPose> Tape::moved_hands(const std::vector<SupportPose>& hands) {
   if (same_poses(hands, last_hands_)) return {};
   last_hands_ = hands;
   return hands;
@@ -195,7 +192,7 @@ VectorX Tape::held_velocities(const VectorX& v) const {
   return out;
 }
 
-void Tape::cut(long count, const State& after, std::vector<HandPose> hands) {
+void Tape::cut(long count, const State& after, std::vector<SupportPose> hands) {
   if (count >= this->count()) return;
   steps_.resize(static_cast<std::size_t>(count));
   starts_.resize(steps_.size() / kStretch + 1);
@@ -240,16 +237,15 @@ void Tape::walk_back(Player& player, const std::function<void(const Passage&)>& 
     while (acting_.first(stretch) > k) --stretch;
     const Parameters& parameters = acting_.play(model_, stretch, acting);
     StepGradient& gradient = player.gradient(step.rule);
-    const std::vector<HandPose> hands = Player::hands_after(step, states[k - first]);
+    const Prescribed prescribed{.supports = Player::hands_after(step, states[k - first]), .obstacles = step.obstacles};
     gradient.begin({states[k - first], parameters, step.rule, step.duration, step.end, player.held_velocity(step),
-                    step.gain.size() != 0 ? &step.gain : nullptr, &hands,
-                    step.obstacles.empty() ? nullptr : &step.obstacles});
+                    step.gain.size() != 0 ? &step.gain : nullptr, prescribed});
     const std::function<State()> end = [&] {
       State after = states[k - first];
       player.advance(step, after);
       return after;
     };
-    visit({k, stretch, gradient, parameters, hands, end});
+    visit({k, stretch, gradient, parameters, prescribed.supports, end});
   }
 }
 
@@ -332,7 +328,7 @@ class Tape::Moments {
     while (first > 0 && !tape_.steps_[first].begins) --first;
     double duration = 0.0;
     for (std::size_t k = first; k < end; ++k) duration += tape_.steps_[k].duration;
-    const std::vector<HandPose> hands = tape_.hands_after(moment.steps);
+    const std::vector<SupportPose> hands = tape_.hands_after(moment.steps);
     for (std::size_t k = first; k < end; ++k) {
       if (by_poses) check_rests(moment.by.reactions, hands, tape_.hands_after(static_cast<long>(k) + 1));
       reactions_.push_back({k, {moment.by.reactions, hands, tape_.steps_[k].duration / duration}});
@@ -340,8 +336,8 @@ class Tape::Moments {
   }
 
   /// The way of a hand between the parts of a time step moves the point that its moment is about.
-  void check_rests(const SupportAdjoint& by, const std::vector<HandPose>& hands,
-                   const std::vector<HandPose>& then) const {
+  void check_rests(const SupportAdjoint& by, const std::vector<SupportPose>& hands,
+                   const std::vector<SupportPose>& then) const {
     for (Eigen::Index s = 0; s < by.moments.rows(); ++s)
       if (tape_.model_.supports[static_cast<std::size_t>(s)].is_hand() && !by.moments.row(s).isZero(0.0) &&
           hands[static_cast<std::size_t>(s)].position != then[static_cast<std::size_t>(s)].position)
@@ -409,7 +405,7 @@ InitialGradient Tape::gradient(const std::vector<MomentAdjoint>& given, const Pa
   moments.add(0, assembler, acting_.start(), [&] { return starts_.front(); }, adjoint);
   assembler.project(adjoint.v);  // what is held goes as it is told
   const State& first = starts_.front();
-  const std::vector<HandPose> hands = poses_of(first);
+  const std::vector<SupportPose> hands = poses_of(first);
   PoseAdjoint poses = by_poses(model_, first.q, adjoint.q, adjoint.hands, {hands, first.hands});
   poses.obstacles = by_places(model_, adjoint.obstacles);
   drawn += adjoint.q;

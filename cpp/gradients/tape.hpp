@@ -58,7 +58,7 @@ struct AcceptedStep {
   const State& after;            ///< at its end
   const Parameters& parameters;  ///< as they acted
   Reached reached;
-  std::vector<HandPose> hands;      ///< where hands are at its end, per support; empty: there is none
+  std::vector<SupportPose> hands;   ///< where hands are at its end, per support; empty: there is none
   bool begins = true;               ///< whether it is the first part of a time step
   const char* unknown = nullptr;    ///< why no gradient goes through it, unless it is cut off again
   bool tensions_in_middle = false;  ///< whether axial forces after it are read out in its middle
@@ -68,7 +68,7 @@ class Tape {
  public:
   /// Of a run that begins so, with friction or not; these are kept. `hands`: see `AcceptedStep`.
   Tape(const Model& model, EquationOptions options, State first, const Parameters& parameters, bool frictional,
-       std::vector<HandPose> hands);
+       std::vector<SupportPose> hands);
 
   long count() const { return static_cast<long>(steps_.size()); }
   void record(const AcceptedStep& step);
@@ -77,7 +77,7 @@ class Tape {
   /// What acts from here on is to be told apart from what acted before.
   void divide() { acting_.divide(); }
   /// Forgets all but so many.
-  void cut(long count, const State& after, std::vector<HandPose> hands);
+  void cut(long count, const State& after, std::vector<SupportPose> hands);
   /// Says why no gradient goes through this run; the first reason stays.
   void refuse(const std::string& why);
   /// Whether that is what the last step led to.
@@ -105,7 +105,7 @@ class Tape {
     VectorX held;  ///< velocities at its end of what supports hold, one after the other; none: they rest, as before it
     VectorX gain;  ///< see `StepTaken::held_gain`; none: nothing
     Reached reached;
-    std::vector<HandPose> hands;           ///< at its end; none: where they were before it
+    std::vector<SupportPose> hands;        ///< at its end; none: where they were before it
     std::vector<ObstaclePlace> obstacles;  ///< likewise
     std::vector<ContactRecord> contacts;   ///< at its end
     bool begins;
@@ -121,8 +121,8 @@ class Tape {
   class Player;
   class Moments;
   /// Where hands are after so many steps.
-  std::vector<HandPose> hands_after(long steps) const;
-  std::vector<HandPose> moved_hands(const std::vector<HandPose>& hands);
+  std::vector<SupportPose> hands_after(long steps) const;
+  std::vector<SupportPose> moved_hands(const std::vector<SupportPose>& hands);
   std::vector<ObstaclePlace> moved_obstacles(const std::vector<ObstaclePlace>& obstacles);
   VectorX held_velocities(const VectorX& v) const;
   VectorX held_gains(const AcceptedStep& step) const;
@@ -137,7 +137,7 @@ class Tape {
     std::size_t step, stretch;
     StepGradient& gradient;
     const Parameters& parameters;
-    const std::vector<HandPose>& hands;
+    const std::vector<SupportPose>& hands;
     const std::function<State()>& end;
   };
   void walk_back(Player& player, const std::function<void(const Passage&)>& visit) const;
@@ -149,7 +149,7 @@ class Tape {
   std::map<long, NaturalShape> natural_;  ///< by the number of steps
   std::vector<State> starts_;             ///< of every stretch of steps that are played again together
   VectorX last_, last_velocity_;          ///< what the last step led to
-  std::vector<HandPose> last_hands_;      ///< likewise
+  std::vector<SupportPose> last_hands_;   ///< likewise
   std::vector<ObstaclePlace> last_obstacles_;
   std::string refused_;
   bool frictional_;

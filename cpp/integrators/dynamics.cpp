@@ -77,9 +77,10 @@ double estimated_error(Equations& equations, const Newton& newton, const Options
 /// Velocity at the end of a step of what supports hold. They have no dynamics of their own, and midpoint's 2 v - v0
 /// would ring for ever: their mean velocities of this step and the last are carried on, to second order, but where they
 /// jump.
-void find_held_velocity(const Model& model, const StepPlan& plan, const State& state, StepWorkspace& work) {
+void find_held_velocity(const Model& model, const HeldTarget& held, const StepPlan& plan, const State& state,
+                        StepWorkspace& work) {
   VectorX& v = work.held_velocity;
-  v = (1.0 / plan.dt) * (work.held.q - state.q);
+  v = (1.0 / plan.dt) * (held.q - state.q);
   if (plan.rule == StepRule::backward_euler || state.motion.known == 0) return;
   const double share = 0.5 * plan.dt / (state.time + 0.5 * plan.dt - state.motion.time[0]);
   for (const Constraint& c : model.constraints) {
@@ -109,7 +110,7 @@ bool begin_flow(Equations& equations, double dt, bool euler, const State& state,
   else
     extrapolate_velocity(state, state.time + 0.5 * dt, v);
   equations.assembler().project(v);
-  equations.assembler().add_held_change(state.q, work.held.q, 1.0 / dt, v);
+  equations.assembler().add_held_change(state.q, equations.problem().prescribed->held.q, 1.0 / dt, v);
   q = state.q;
   if (!euler) q += 0.5 * dt * v;
   return solve_flow(equations, q, v, work.newton.counters);
@@ -247,19 +248,19 @@ void advance(const Equations& equations, const StepPlan& plan, const VectorX& q1
 }  // namespace
 
 StepResult implicit_step(Equations& equations, const Newton& newton, const Options& options,
-                         const Parameters& parameters, const StepPlan& plan, State& state, Predictor& predictor,
-                         StepWorkspace& work) {
+                         const Parameters& parameters, const Prescribed& prescribed, const StepPlan& plan, State& state,
+                         Predictor& predictor, StepWorkspace& work) {
   StepResult result;
   const Model& model = equations.model();
   const bool euler = plan.rule == StepRule::backward_euler;
   const double dt = plan.dt, h = euler ? dt : 0.5 * dt;
-  if (!work.held.reachable) return result;
+  if (!prescribed.held.reachable) return result;
   const bool holds = !model.constraints.empty();
   if (holds) {
-    find_held_velocity(model, plan, state, work);
+    find_held_velocity(model, prescribed.held, plan, state, work);
     work.held_acceleration = (1.0 / held_time(plan, state)) * (work.held_velocity - state.v);
   }
-  equations.begin(state, parameters, plan.rule, h, holds ? &work.held_acceleration : nullptr);
+  equations.begin(state, parameters, plan.rule, h, prescribed, holds ? &work.held_acceleration : nullptr);
   if (equations.contact() && equations.contact()->blocked()) return result;
   if (!begin_flow(equations, dt, euler, state, work)) return result;
   result.newton = solve_inner(equations, newton, options, plan, h, state, predictor, work);
@@ -289,7 +290,8 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
                    equations.mass().rows);
   if (Contact* contact = equations.contact()) result.dissipated -= contact->accept(state, std::max(contact_loss, 0.0));
   advance(equations, plan, q1, work, state);
-  if (const HandForces* hands = equations.hands()) result.support_work -= hands->accept(work.after, state);
+  if (const HandForces* hands = equations.hands())
+    result.support_work -= hands->accept(prescribed.supports, work.after, state);
   result.accepted = true;
   return result;
 }

@@ -9,13 +9,6 @@
 
 namespace withe {
 
-/// Where supports put the held unknowns at the end of a step.
-struct HeldTarget {
-  VectorX q;                  ///< end of step; meaningful where held
-  double turn = 0, spin = 0;  ///< of a frame in space, of an edge about itself, against where they are; the greatest
-  bool reachable = true;      ///< false: a frame would have to turn by half a turn at once
-};
-
 /// One implicit step: its rule and its length; `slot` tells the parts of a composition apart.
 struct StepPlan {
   StepRule rule = StepRule::midpoint;
@@ -39,7 +32,6 @@ struct StepResult {
 /// Scratch of a step; owned by the world, so that a step does not allocate.
 struct StepWorkspace {
   NewtonWorkspace newton;
-  HeldTarget held;
   VectorX z, move, change, working, mean, velocity, held_velocity, held_acceleration, assumed, difference,
       whole_acceleration;
   PressureGains pressure;  ///< of a backward Euler step under `adaptive`
@@ -47,32 +39,34 @@ struct StepWorkspace {
   State from, next;  ///< explicit steps
 };
 
-/// Advances `state` to where `work.held` says, or leaves it as it was when the step is not accepted.
+/// Advances `state`, or leaves it as it was when the step is not accepted.
 StepResult implicit_step(Equations& equations, const Newton& newton, const Options& options,
-                         const Parameters& parameters, const StepPlan& plan, State& state, Predictor& predictor,
-                         StepWorkspace& work);
+                         const Parameters& parameters, const Prescribed& prescribed, const StepPlan& plan, State& state,
+                         Predictor& predictor, StepWorkspace& work);
 
 /// Velocities in the middle of a step, to second order: those over the last two steps are carried on to `time` [s], for
 /// velocities at their ends ring on modes that are stiff to the midpoint rule. `state.v` where they are not known.
 void extrapolate_velocity(const State& state, double time, VectorX& v);
 
 /// Finds the acceleration at the state, with loads and custom forces as they are now, where it is not known.
-void find_acceleration(Equations& equations, const Parameters& parameters, double dt, State& state,
-                       StepWorkspace& work);
+void find_acceleration(Equations& equations, const Parameters& parameters, const Prescribed& prescribed, double dt,
+                       State& state, StepWorkspace& work);
 
 /// Finds the acceleration at the state where it is not known, and where an explicit step leads: positions in `work.z`,
 /// velocities (predicted ones, to second order) in `work.velocity`.
-void begin_verlet(Equations& equations, const Parameters& parameters, double dt, State& state, StepWorkspace& work);
+void begin_verlet(Equations& equations, const Parameters& parameters, const Prescribed& prescribed, double dt,
+                  State& state, StepWorkspace& work);
 
 /// Velocity Verlet; velocity-dependent forces are taken at the half step.
-StepResult verlet_step(Equations& equations, const Parameters& parameters, double dt, State& state,
-                       StepWorkspace& work);
+StepResult verlet_step(Equations& equations, const Parameters& parameters, const Prescribed& prescribed, double dt,
+                       State& state, StepWorkspace& work);
 
 /// Largest stable step of the explicit scheme at a state: a mode of frequency omega that resistance damps at the rate
 /// gamma, and which Verlet's predicted velocity feels, is stable while (omega dt)^2 / 4 + gamma dt <= 1. Found as the
 /// dt for which the greatest eigenvalue of M^-1 (K + 4 C / dt) is 4 / dt^2, resistance C that of friction, drag and
 /// viscosity.
-double stable_step(Equations& equations, const Parameters& parameters, const State& state, StepWorkspace& work);
+double stable_step(Equations& equations, const Parameters& parameters, const Prescribed& prescribed, const State& state,
+                   StepWorkspace& work);
 
 /// Whether a mean velocity of what a support holds, which gained so much on that of the step before, goes on like that;
 /// else it jumps. From rest at an even acceleration, the second step is 2/3 faster.

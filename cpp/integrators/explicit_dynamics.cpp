@@ -16,14 +16,15 @@ void set_acceleration(const Equations& equations, const StepWorkspace& work, Vec
 
 /// Forces over mass at q, with velocity v in drag, viscosity, friction and the spin couple. Anchors have followed the
 /// way from `before`.
-void explicit_acceleration(Equations& equations, const Parameters& parameters, double dt, const State& before,
-                           const State& state, const VectorX& v, StepWorkspace& work, VectorX& acceleration) {
+void explicit_acceleration(Equations& equations, const Parameters& parameters, const Prescribed& prescribed, double dt,
+                           const State& before, const State& state, const VectorX& v, StepWorkspace& work,
+                           VectorX& acceleration) {
   work.from = state;  // one that reaches q over dt with velocity v
   work.from.q -= dt * v;
   work.from.v = v;
-  equations.begin(work.from, parameters, StepRule::verlet, dt);
+  equations.begin(work.from, parameters, StepRule::verlet, dt, prescribed);
   if (Contact* contact = equations.contact(); contact && contact->anchored())
-    contact->begin(before, parameters, dt, Pressing::still);
+    contact->begin(before, parameters, dt, Pressing::still, prescribed.obstacles);
   if (equations.flows() && !solve_flow(equations, state.q, v, work.newton.counters)) {
     acceleration.setConstant(state.q.size(), std::nan(""));
     return;
@@ -34,19 +35,20 @@ void explicit_acceleration(Equations& equations, const Parameters& parameters, d
 
 /// Where nothing resists motion but inertia: `work.next` at q = work.z, with accelerations there, velocities being
 /// work.velocity. Returns by how much edges turn at most [rad].
-double free_acceleration(Equations& equations, const Parameters& parameters, const State& state, StepWorkspace& work) {
+double free_acceleration(Equations& equations, const Parameters& parameters, const Prescribed& prescribed,
+                         const State& state, StepWorkspace& work) {
   State& next = work.next;
   if (next.q.size() != state.q.size()) next = state;  // once: what an explicit step leaves as it is, and room
   const double turn = advance(equations.model(), state, work.z, work.newton.data.configuration, next);
-  equations.begin(next, parameters, StepRule::verlet, 0.0);
+  equations.begin(next, parameters, StepRule::verlet, 0.0, prescribed);
   equations.evaluate_forces(work.velocity, work.newton.data);
   set_acceleration(equations, work, next.acceleration);
   return turn;
 }
 
 /// The same under contact, or where anything takes energy from the motion.
-double resisted_acceleration(Equations& equations, const Parameters& parameters, double dt, const State& state,
-                             StepWorkspace& work) {
+double resisted_acceleration(Equations& equations, const Parameters& parameters, const Prescribed& prescribed,
+                             double dt, const State& state, StepWorkspace& work) {
   const Model& model = equations.model();
   const double turn = largest_turn(model, state.q, work.z);
   if (!(turn <= 1.5)) return turn;
@@ -54,7 +56,7 @@ double resisted_acceleration(Equations& equations, const Parameters& parameters,
   next = state;
   if (!model.planar()) compute_configuration(model, state, work.z, work.after);
   accept_configuration(model, work.z, work.after, next);
-  explicit_acceleration(equations, parameters, dt, state, next, work.velocity, work, next.acceleration);
+  explicit_acceleration(equations, parameters, prescribed, dt, state, next, work.velocity, work, next.acceleration);
   return turn;
 }
 
@@ -94,37 +96,38 @@ double advance(const Model& model, const State& state, const VectorX& q, Configu
   return largest_turn(model, state.q, q);
 }
 
-void find_acceleration(Equations& equations, const Parameters& parameters, double dt, State& state,
-                       StepWorkspace& work) {
+void find_acceleration(Equations& equations, const Parameters& parameters, const Prescribed& prescribed, double dt,
+                       State& state, StepWorkspace& work) {
   if (state.acceleration_current) return;
-  explicit_acceleration(equations, parameters, dt, state, state, state.v, work, state.acceleration);
+  explicit_acceleration(equations, parameters, prescribed, dt, state, state, state.v, work, state.acceleration);
   if (equations.loaded()) equations.load_force(work.newton.data, state.load_force);
   if (const Contact* contact = equations.contact()) contact->friction_force(state.friction_force);
   state.acceleration_current = true;
 }
 
-void begin_verlet(Equations& equations, const Parameters& parameters, double dt, State& state, StepWorkspace& work) {
-  find_acceleration(equations, parameters, dt, state, work);
+void begin_verlet(Equations& equations, const Parameters& parameters, const Prescribed& prescribed, double dt,
+                  State& state, StepWorkspace& work) {
+  find_acceleration(equations, parameters, prescribed, dt, state, work);
   VectorX &half = work.mean, &q1 = work.z, &v1 = work.velocity;
   half = state.v + 0.5 * dt * state.acceleration;
   equations.assembler().project(half);
-  equations.assembler().add_held_change(state.q, work.held.q, 1.0 / dt, half);
+  equations.assembler().add_held_change(state.q, prescribed.held.q, 1.0 / dt, half);
   q1 = state.q + dt * half;
   // Drag, viscosity and the spin couple want the velocity at the end; a predicted one is second order.
   v1 = half + 0.5 * dt * state.acceleration;
 }
 
-StepResult verlet_step(Equations& equations, const Parameters& parameters, double dt, State& state,
-                       StepWorkspace& work) {
+StepResult verlet_step(Equations& equations, const Parameters& parameters, const Prescribed& prescribed, double dt,
+                       State& state, StepWorkspace& work) {
   StepResult result;
   const Model& model = equations.model();
-  if (!work.held.reachable) return result;
-  begin_verlet(equations, parameters, dt, state, work);
+  if (!prescribed.held.reachable) return result;
+  begin_verlet(equations, parameters, prescribed, dt, state, work);
   const VectorX &half = work.mean, &q1 = work.z;
   State& next = work.next;
   const bool resisted = equations.contact() || equations.dissipates(parameters);
-  result.largest_turn = resisted ? resisted_acceleration(equations, parameters, dt, state, work)
-                                 : free_acceleration(equations, parameters, state, work);
+  result.largest_turn = resisted ? resisted_acceleration(equations, parameters, prescribed, dt, state, work)
+                                 : free_acceleration(equations, parameters, prescribed, state, work);
   if (!(result.largest_turn <= 1.5)) return result;
   next.v = half + 0.5 * dt * next.acceleration;
   if (!std::isfinite(next.v.squaredNorm())) return result;
@@ -154,8 +157,9 @@ StepResult verlet_step(Equations& equations, const Parameters& parameters, doubl
   return result;
 }
 
-double stable_step(Equations& equations, const Parameters& parameters, const State& state, StepWorkspace& work) {
-  equations.begin(state, parameters, StepRule::statics, 0.0);
+double stable_step(Equations& equations, const Parameters& parameters, const Prescribed& prescribed, const State& state,
+                   StepWorkspace& work) {
+  equations.begin(state, parameters, StepRule::statics, 0.0, prescribed);
   equations.evaluate(state.q, true, nullptr, work.newton.data);
   double dt = undamped_step(equations, 0.0);
   // The eigenvalue falls while a step grows, at most as one over it: each round halves the logarithm of the error.
@@ -163,7 +167,7 @@ double stable_step(Equations& equations, const Parameters& parameters, const Sta
     const double h = 0.25 * dt;
     work.from = state;  // as it moves: friction resists less, the faster it slips
     work.from.q -= h * state.v;
-    equations.begin(work.from, parameters, StepRule::verlet, h);
+    equations.begin(work.from, parameters, StepRule::verlet, h, prescribed);
     if (Contact* contact = equations.contact()) contact->begin(work.from, parameters, dt, Pressing::still);
     equations.evaluate(state.q, true, nullptr, work.newton.data, {.regularisation = 0.25});
     const double before = std::exchange(dt, undamped_step(equations, 1.0 / (h * h)));

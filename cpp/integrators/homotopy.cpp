@@ -19,7 +19,8 @@ constexpr double kRounding = 64.0 * std::numeric_limits<double>::epsilon();
 bool turns(const LoadPiece& piece) { return piece.shape != LoadShape::dead_node && piece.load >= 0; }
 
 /// Loads that turn with the rod grow from the share of them that the state carries already.
-ActingPath growing_loads(Equations& equations, Parameters& parameters, const State& state, NewtonWorkspace& work) {
+ActingPath growing_loads(Equations& equations, Parameters& parameters, const Prescribed& prescribed, const State& state,
+                         NewtonWorkspace& work) {
   const std::vector<LoadPiece>& pieces = equations.loads().pieces;
   if (std::none_of(pieces.begin(), pieces.end(), turns)) return nullptr;
   const auto scale = [&pieces, full = parameters.loads](double share, MatrixX3& loads) {
@@ -29,7 +30,7 @@ ActingPath growing_loads(Equations& equations, Parameters& parameters, const Sta
   // The residual is linear in them: the share by which the state is least out of balance.
   const auto out_of_balance = [&](double share) {
     scale(share, parameters.loads);
-    equations.begin(state, parameters, StepRule::statics, 0.0);
+    equations.begin(state, parameters, StepRule::statics, 0.0, prescribed);
     equations.evaluate(state.q, false, nullptr, work.data);
     return work.data.residual;
   };
@@ -41,16 +42,17 @@ ActingPath growing_loads(Equations& equations, Parameters& parameters, const Sta
 
 }  // namespace
 
-ActingPath growing(Equations& equations, Parameters& parameters, const State& state, NewtonWorkspace& work,
-                   const Actuation* before) {
-  if (!before) return growing_loads(equations, parameters, state, work);
+ActingPath growing(Equations& equations, Parameters& parameters, const Prescribed& prescribed, const State& state,
+                   NewtonWorkspace& work, const Actuation* before) {
+  if (!before) return growing_loads(equations, parameters, prescribed, state, work);
   const ActingPath actuation = [&model = equations.model(), from = *before, to = actuation_of(parameters)](
                                    double factor, Parameters& p) { set_actuation_between(model, from, to, factor, p); };
   actuation(0.0, parameters);
-  return [actuation, loads = growing_loads(equations, parameters, state, work)](double factor, Parameters& p) {
-    actuation(factor, p);
-    if (loads) loads(factor, p);
-  };
+  return
+      [actuation, loads = growing_loads(equations, parameters, prescribed, state, work)](double factor, Parameters& p) {
+        actuation(factor, p);
+        if (loads) loads(factor, p);
+      };
 }
 
 void Homotopy::start_out_of_balance() {
@@ -64,8 +66,8 @@ void Homotopy::start_out_of_balance() {
 
 void Homotopy::apply(double factor) {
   if (acting_) acting_(factor, parameters_);
-  if (boundary_.aim) boundary_.aim(factor);
-  equations_.begin(state_, parameters_, StepRule::statics, 0.0);
+  if (boundary_.move) boundary_.move(factor);
+  equations_.begin(state_, parameters_, StepRule::statics, 0.0, boundary_.prescribed);
 }
 
 void Homotopy::go_to(double factor) {
@@ -101,11 +103,11 @@ void Homotopy::accept(const VectorX& q) {
   }
   compute_configuration(model, state_, q, scratch_);
   accept_configuration(model, q, scratch_, state_);
-  if (HandForces* hands = equations_.hands()) hands->accept(scratch_, state_);
+  if (HandForces* hands = equations_.hands()) hands->accept(boundary_.prescribed.supports, scratch_, state_);
 }
 
 void Homotopy::find_pull(const VectorX& z, VectorX& pull, VectorX& held) {
-  double little = boundary_.aim ? kLittleFactor : 1.0;
+  double little = boundary_.move ? kLittleFactor : 1.0;
   for (int tries = 0; tries < 20; ++tries) {
     moved_ = z;
     const bool reached = boundary_.hold(present_, factor_ + little, moved_);
@@ -118,7 +120,7 @@ void Homotopy::find_pull(const VectorX& z, VectorX& pull, VectorX& held) {
   const bool any_moves = newton_.norms().displacement(held) > kRounding * farthest;
   if (!any_moves) moved_ = z;
   held = any_moves ? (held / little).eval() : VectorX::Zero(z.size());
-  moves_ = boundary_.aim || any_moves;
+  moves_ = boundary_.move || any_moves;
   equations_.evaluate(z, false, nullptr, work_.data);
   pull = work_.data.residual;
   apply(factor_ + little);

@@ -10,13 +10,15 @@
 
 namespace withe {
 
-/// Where supports are at a factor.
+/// Supports at a factor.
 struct Boundary {
+  /// Supports, obstacles and custom forces at the factor last gone to; must outlive the path.
+  const Prescribed& prescribed = Prescribed::nothing();
   /// Sets the held unknowns of q to those at `factor`. False where the present state, which is that at `present`, is
   /// too many turns of a frame away.
-  std::function<bool(double present, double factor, VectorX& q)> hold;
-  /// Tells hands that yield; nothing where none moves.
-  std::function<void(double factor)> aim;
+  std::function<bool(double present, double factor, VectorX& q)> hold = nullptr;
+  /// Sets the poses of supports in `prescribed` to those at a factor; nothing where no hand that yields moves.
+  std::function<void(double factor)> move = nullptr;
 };
 /// Sets what acts at a factor; nothing where it all stays.
 using ActingPath = std::function<void(double factor, Parameters& parameters)>;
@@ -25,8 +27,8 @@ using ActingPath = std::function<void(double factor, Parameters& parameters)>;
 /// their muscles and tendons and are not bent to there; and loads that turn with the rod (moments, followers) from the
 /// share of them that the state carries already to all of them: a dead imbalance would pull where they do not. Other
 /// loads stay, as they are part of what is out of balance.
-ActingPath growing(Equations& equations, Parameters& parameters, const State& state, NewtonWorkspace& work,
-                   const Actuation* before);
+ActingPath growing(Equations& equations, Parameters& parameters, const Prescribed& prescribed, const State& state,
+                   NewtonWorkspace& work, const Actuation* before);
 
 class Homotopy {
  public:
@@ -46,6 +48,7 @@ class Homotopy {
   /// Loads and what is left out of balance at a factor; the frames count from the present state.
   void go_to(double factor);
   bool hold(double factor, VectorX& q) const { return boundary_.hold(present_, factor, q); }
+  const Prescribed& prescribed() const { return boundary_.prescribed; }
   /// From here on tangents leave alone what is neutral.
   void hold_neutral() { hold_neutral_ = true; }
   /// Whether supports did so where a tangent was last found.

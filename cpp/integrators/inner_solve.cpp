@@ -41,14 +41,15 @@ void start_axial_force(const Equations& equations, const VectorX& q, VectorX& ou
 void follow_supports(Equations& equations, const Newton& newton, const Options& options, double part,
                      const State& state, StepWorkspace& work) {
   const Assembler& assembler = equations.assembler();
+  const VectorX& target = equations.problem().prescribed->held.q;
   if (!options.heuristics.uses(Heuristic::supports_linear) ||
-      newton.norms().leaves_alone(part * assembler.greatest_held_change(state.q, work.held.q))) {
-    assembler.add_held_change(state.q, work.held.q, part, work.move);
+      newton.norms().leaves_alone(part * assembler.greatest_held_change(state.q, target))) {
+    assembler.add_held_change(state.q, target, part, work.move);
     return;
   }
   VectorX& held = work.difference;
   held.setZero(state.q.size());
-  assembler.add_held_change(state.q, work.held.q, part, held);
+  assembler.add_held_change(state.q, target, part, held);
   const double bearable = newton.norms().cap(held);
   if (bearable < 1.0) {
     StepData& e = work.newton.data;

@@ -65,8 +65,8 @@ class Statics {
         leaves_saddles_(saddles == Saddles::leave),
         state_(state),
         work_(work),
-        path_(equations, newton, parameters, boundary, growing(equations, parameters, state, work, before), state,
-              work),
+        path_(equations, newton, parameters, boundary,
+              growing(equations, parameters, boundary.prescribed, state, work, before), state, work),
         signs_(equations, newton.norms(), work.counters) {}
 
   StaticResult run() {
@@ -321,7 +321,7 @@ class Statics {
 
   /// An interval of backward Euler from rest, which ends in z; of no length: equilibrium.
   NewtonResult solve_interval(double h, int border, NewtonResult& last) {
-    equations_.begin(state_, parameters_, h > 0.0 ? StepRule::settling : StepRule::statics, h);
+    equations_.begin(state_, parameters_, h > 0.0 ? StepRule::settling : StepRule::statics, h, path_.prescribed());
     z_ = state_.q;
     NewtonResult r = newton_.solve(
         equations_, z_,

@@ -50,7 +50,7 @@ void ContactForces::begin(StepProblem& problem) {
                             : problem.rule == StepRule::midpoint      ? Pressing::mean
                             : at_end                                  ? Pressing::end
                                                                       : Pressing::still;
-  contact_.begin(*problem.start, *problem.parameters, problem.slip_time, pressing);
+  contact_.begin(*problem.start, *problem.parameters, problem.slip_time, pressing, problem.prescribed->obstacles);
 }
 
 void ContactForces::find(const StepProblem& problem, StepData& data, Assembler& assembler, bool with_matrix) {

@@ -18,9 +18,17 @@ AppliedForces applied_forces(const Model& model, const MatrixX3& forces, const M
   return out;
 }
 
+AppliedForces given_forces(const StepProblem& problem) {
+  const AppliedForces& given = problem.prescribed->custom;
+  if (given.force.size() != 0) return given;
+  return {VectorX::Zero(problem.model.dof_count),
+          std::vector<Vector3>(at(problem.loads.node_moments), Vector3::Zero())};
+}
+
 void CustomTerm::find(const StepProblem& problem, StepData& data, Assembler& assembler, bool with_matrix) {
+  const CustomResponse& respond = problem.prescribed->respond;
   if (!respond) {
-    data.custom = problem.custom;
+    data.custom = given_forces(problem);
     return;
   }
   data.velocity = data.z - problem.start->q;
@@ -37,7 +45,7 @@ void CustomTerm::add(const StepProblem& problem, StepData& data, const Assembler
   const int n = problem.model.dof_count;
   data.gradient.head(n) -= data.custom.force;
   data.row_magnitude.head(n) += data.custom.force.cwiseAbs();
-  if (respond && !values.empty()) add_matrix(problem, data, assembler, values);
+  if (problem.prescribed->respond && !values.empty()) add_matrix(problem, data, assembler, values);
 }
 
 void CustomTerm::add_applied(const StepProblem&, const StepData& data, const Assembler&, VectorX& force) const {

@@ -1,21 +1,14 @@
 #pragma once
 /// Custom forces among the equations: see forces/custom_forces.hpp.
 
-#include <functional>
-
 #include "steps/load_forces.hpp"
 
 namespace withe {
-
-/// Custom forces at configuration q and velocities v.
-using CustomResponse = std::function<CustomForces(const VectorX& q, const VectorX& v, bool derivatives)>;
 
 class CustomTerm final : public Term {
  public:
   /// `loads` has the pieces of moments, where there are any, and must outlive it.
   explicit CustomTerm(const LoadForces* loads) : loads_(loads) {}
-  /// What is solved for in the steps to come. Empty: forces stay as they were set.
-  CustomResponse respond;
 
   bool has_potential() const override { return false; }
   void find(const StepProblem& problem, StepData& data, Assembler& assembler, bool with_matrix) override;
@@ -40,5 +33,7 @@ class CustomTerm final : public Term {
 
 /// Forces and moments (where there are any), per node in world axes, as the equations take them.
 AppliedForces applied_forces(const Model& model, const MatrixX3& forces, const MatrixX3& moments);
+/// Custom forces of a problem that does not solve for them.
+AppliedForces given_forces(const StepProblem& problem);
 
 }  // namespace withe

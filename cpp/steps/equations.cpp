@@ -19,8 +19,6 @@ long next_number() {
 StepProblem problem_of(const Model& model) {
   StepProblem problem(model);
   problem.loads = resolve_loads(model);
-  problem.custom.force = VectorX::Zero(model.dof_count);
-  problem.custom.moments.assign(at(problem.loads.node_moments), Vector3::Zero());
   return problem;
 }
 
@@ -73,10 +71,16 @@ void Equations::set_parameters(const Parameters& parameters) {
   set_drag(model(), parameters, problem_.drag);
 }
 
+const Prescribed& Prescribed::nothing() {
+  static const Prescribed none;
+  return none;
+}
+
 void Equations::begin(const State& state, const Parameters& parameters, StepRule rule, double h,
-                      const VectorX* held_acceleration) {
+                      const Prescribed& prescribed, const VectorX* held_acceleration) {
   set_parameters(parameters);
   problem_.start = &state;
+  problem_.prescribed = &prescribed;
   problem_.rule = rule;
   problem_.interval = h;
   if (held_acceleration)
@@ -86,14 +90,6 @@ void Equations::begin(const State& state, const Parameters& parameters, StepRule
   problem_.number = next_number();
   problem_.slip_time = problem_.moves() ? problem_.duration() : static_duration_;
   for (const std::unique_ptr<Term>& term : terms_.all) term->begin(problem_);
-}
-
-void Equations::set_custom(const MatrixX3& forces, const MatrixX3& moments) {
-  problem_.custom = applied_forces(model(), forces, moments);
-}
-
-void Equations::respond(CustomResponse response) {
-  if (terms_.custom) terms_.custom->respond = std::move(response);
 }
 
 bool Equations::begin_flow(const VectorX& q, const VectorX& v) {
@@ -155,7 +151,7 @@ void Equations::finish(StepData& data) const {
 
 void Equations::evaluate_forces(const VectorX& v, StepData& data) const {
   clear(problem_.start->q, data);
-  if (terms_.custom) data.custom = problem_.custom;
+  if (terms_.custom) data.custom = given_forces(problem_);
   data.axial_force = nullptr;
   for (const std::unique_ptr<Term>& term : terms_.all) term->add_explicit(problem_, data, assembler_, v);
   data.full_residual = data.gradient.head(model().dof_count);

@@ -71,13 +71,10 @@ class Equations {
   void predict_friction(const VectorX& step, double kept, ContactLinearisation& linearisation);
   double contact_loss(const StepData& data, const VectorX& change, double obstacle_work) const;
 
-  /// Prepares a step from `state`, which must outlive it, over h (0: statics). `held_acceleration`: of what supports
-  /// hold, see StepProblem.
+  /// Prepares a step from `state` over h (0: statics). The state, the parameters and what is prescribed must outlive
+  /// it. `held_acceleration`: of what supports hold, see StepProblem.
   void begin(const State& state, const Parameters& parameters, StepRule rule, double h,
-             const VectorX* held_acceleration = nullptr);
-  /// Custom forces that act in the steps to come, and what is solved for (empty: nothing), where the scene has any.
-  void set_custom(const MatrixX3& forces, const MatrixX3& moments);
-  void respond(CustomResponse response);
+             const Prescribed& prescribed = Prescribed::nothing(), const VectorX* held_acceleration = nullptr);
   /// Whether Stokeslets act: then `begin_flow` follows `begin`, with velocities `v` at positions `q`. False where no
   /// solution was found.
   bool flows() const { return terms_.stokeslets != nullptr; }

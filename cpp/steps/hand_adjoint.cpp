@@ -66,8 +66,8 @@ void HandForces::add_shift_adjoint(const StepProblem& problem, const StepData& d
     return;
   }
   const HandState& hand = problem.start->hands[at(held.support)];
-  const HandPose from{hand.position, hand.rotation}, to = end_pose(problem, held.support);
-  const auto shift_at = [&](const VectorX& q, const HandPose& pose) {
+  const SupportPose from{hand.position, hand.rotation}, to = end_pose(problem, held.support);
+  const auto shift_at = [&](const VectorX& q, const SupportPose& pose) {
     return shift_of(model_, q, hand, pose, p.touched, at(held.touched));
   };
   const ByEnd start = by_end(shift_at(problem.start->q, from), from.position, 0.5),
@@ -187,7 +187,7 @@ void HandForces::add_slip_adjoint(const StepProblem& problem, const VectorX& q1,
     const Held& held = held_[at(k)];
     const TouchedEdge& touched = model_.supports[at(held.support)].touched[at(held.touched)];
     const HandDescription& own = model_.supports[at(held.support)].description.hand;
-    const HandPose pose = end_pose(problem, held.support);
+    const SupportPose pose = end_pose(problem, held.support);
     const Shift shift = shift_of(model_, q1, problem.start->hands[at(held.support)], pose, touched, at(held.touched));
     const Vector3 K = shift_stiffness(own, touched.share), after = adjoint.hands_after.slips.row(k).transpose();
     const CappedForce force = capped(K.cwiseProduct(shift.by), touched.share * own.force_limit);

@@ -56,9 +56,9 @@ std::string HandForces::note() const {
   return out;
 }
 
-HandPose HandForces::pose_of(const StepProblem& problem, int support) const {
+SupportPose HandForces::pose_of(const StepProblem& problem, int support) const {
   const HandState& start = problem.start->hands[at(support)];
-  HandPose end = end_pose(problem, support);
+  SupportPose end = end_pose(problem, support);
   if (!problem.in_middle()) return end;
   const Vector3 turn = rotation_log(end.rotation * start.rotation.transpose());
   return {0.5 * (start.position + end.position), rotation_exp(0.5 * turn) * start.rotation};
@@ -70,9 +70,10 @@ void HandForces::begin(StepProblem& problem) {
     if (model_.supports[s].active && model_.supports[s].yields()) now_[s] = pose_of(problem, static_cast<int>(s));
 }
 
-HandPose HandForces::end_pose(const StepProblem& problem, int support) const {
+SupportPose HandForces::end_pose(const StepProblem& problem, int support) const {
   const HandState& start = problem.start->hands[at(support)];
-  return end_.empty() ? HandPose{start.position, start.rotation} : end_[at(support)];
+  const std::vector<SupportPose>& end = problem.prescribed->supports;
+  return end.empty() ? SupportPose{start.position, start.rotation} : end[at(support)];
 }
 
 /// In an energy-momentum step u and G are the means of both ends: with w the Cayley vector of the hand's turn, u1 - u0
@@ -83,7 +84,7 @@ HandForces::Piece HandForces::piece(const StepProblem& problem, const StepData& 
   const TouchedEdge& touched = support.touched[at(held.touched)];
   const HandDescription& hand = support.description.hand;
   const HandState& start = problem.start->hands[at(held.support)];
-  const auto at_pose = [&](const VectorX& q, const HandPose& pose) {
+  const auto at_pose = [&](const VectorX& q, const SupportPose& pose) {
     return shift_of(model_, q, start, pose, touched, at(held.touched));
   };
   Shift shift;
@@ -214,7 +215,7 @@ void HandForces::add(const StepProblem& problem, StepData& data, const Assembler
     wrench.force -= pull;
     wrench.moment += turn.moment - p.shift.point.cross(pull);
   }
-  if (rings_.count() > 0) rings_.add(problem, data, end_, values);
+  if (rings_.count() > 0) rings_.add(problem, data, values);
 }
 
 /// Positions round by eps |x|, and with them what is between an edge and where it was grasped.
@@ -236,13 +237,13 @@ void HandForces::add_rounding(const StepProblem& problem, StepData& data) const 
 double HandForces::dissipated(const StepProblem& problem, const StepData& data, const Assembler&,
                               const VectorX& /*change*/) const {
   if (!problem.moves()) return 0.0;
-  double lost = rings_.dissipated(problem, end_, data.z);
+  double lost = rings_.dissipated(problem, data.z);
   for (int k = 0; k < table_.count(); ++k) {
     const Piece p = piece(problem, data, k);
     const Held& held = held_[at(k)];
     const HandState& hand = problem.start->hands[at(held.support)];
-    const HandPose from{hand.position, hand.rotation}, to = end_pose(problem, held.support);
-    const auto shift = [&](const VectorX& q, const HandPose& pose) {
+    const SupportPose from{hand.position, hand.rotation}, to = end_pose(problem, held.support);
+    const auto shift = [&](const VectorX& q, const SupportPose& pose) {
       return shift_of(model_, q, hand, pose, p.touched, at(held.touched)).by;
     };
     const Vector3 u0 = shift(problem.start->q, from), there = shift(data.z, to);
@@ -260,25 +261,26 @@ double HandForces::dissipated(const StepProblem& problem, const StepData& data, 
 }
 
 double HandForces::work(const StepProblem& problem, const StepData& data, const VectorX& q1) const {
-  double done = rings_.work(problem, end_, q1);
-  for (std::size_t s = 0; s < end_.size(); ++s) {
+  const std::vector<SupportPose>& end = problem.prescribed->supports;
+  double done = rings_.work(problem, q1);
+  for (std::size_t s = 0; s < end.size(); ++s) {
     const Support& support = model_.supports[s];
     if (!support.active || !support.yields() || support.slides()) continue;
     const HandState& start = problem.start->hands[s];
     const Wrench& wrench = data.hands[s];
     const Vector3 moment = wrench.moment - now_[s].position.cross(wrench.force);
-    const Matrix3 turned = end_[s].rotation * start.rotation.transpose();
-    done += wrench.force.dot(end_[s].position - start.position) +
+    const Matrix3 turned = end[s].rotation * start.rotation.transpose();
+    done += wrench.force.dot(end[s].position - start.position) +
             moment.dot(problem.conserves_energy() ? cayley_inverse(turned) : rotation_log(turned));
   }
   return done;
 }
 
-double HandForces::accept(const Configuration& c, State& state) const {
-  for (std::size_t s = 0; s < end_.size(); ++s) {
-    state.hands[s].position = end_[s].position;
-    state.hands[s].rotation = end_[s].rotation;
-    state.hands[s].ring.fed = end_[s].fed;
+double HandForces::accept(const std::vector<SupportPose>& end, const Configuration& c, State& state) const {
+  for (std::size_t s = 0; s < end.size(); ++s) {
+    state.hands[s].position = end[s].position;
+    state.hands[s].rotation = end[s].rotation;
+    state.hands[s].ring.fed = end[s].fed;
   }
   for (const Held& held : held_) {
     const Support& support = model_.supports[at(held.support)];

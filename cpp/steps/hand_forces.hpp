@@ -30,8 +30,6 @@ class HandForces final : public Term {
   double dissipated(const StepProblem& problem, const StepData& data, const Assembler& assembler,
                     const VectorX& change) const override;
 
-  /// Where hands are at the end of the steps to come, per support; empty: where they are at the start.
-  void aim(const std::vector<HandPose>& end) { end_ = end; }
   /// Adds to derivatives by what a step is given those by what it leaves of slips, `adjoint.hands_after`: to `by_end`,
   /// that by q1, and to the adjoint. To come before `add_adjoint`.
   void add_slip_adjoint(const StepProblem& problem, const VectorX& q1, StepAdjoint& adjoint, VectorX& by_end) const;
@@ -45,9 +43,9 @@ class HandForces final : public Term {
   bool at_limit(const State& state) const;
   /// What hands have done in a step that has just been evaluated [J].
   double work(const StepProblem& problem, const StepData& data, const VectorX& q1) const;
-  /// Takes a state whose q is that of the end of a step there: hands are where they were aimed at, and slip where the
-  /// force is too great. `c`: of that q; not used in a plane. Returns what stays with rings that rods have left [J].
-  double accept(const Configuration& c, State& state) const;
+  /// Takes a state whose q is that of the end of a step there: supports are at `end`, and hands slip where the force is
+  /// too great. `c`: of that q; not used in a plane. Returns what stays with rings that rods have left [J].
+  double accept(const std::vector<SupportPose>& end, const Configuration& c, State& state) const;
 
  private:
   struct Held {
@@ -57,8 +55,8 @@ class HandForces final : public Term {
   struct Grip;
   struct Turn;
   /// Where forces act, and where it is at the end of the step.
-  HandPose pose_of(const StepProblem& problem, int support) const;
-  HandPose end_pose(const StepProblem& problem, int support) const;
+  SupportPose pose_of(const StepProblem& problem, int support) const;
+  SupportPose end_pose(const StepProblem& problem, int support) const;
   Piece piece(const StepProblem& problem, const StepData& data, int element) const;
   Turn put_planar_turn(const StepProblem& problem, const StepData& data, const Piece& p, bool with_matrix,
                        Local& local) const;
@@ -88,8 +86,8 @@ class HandForces final : public Term {
   RingForces rings_;
   std::vector<Held> held_;  ///< of each element
   ElementTable table_;
-  bool slips_ = false;               ///< whether any may
-  std::vector<HandPose> end_, now_;  ///< at the end of the step; where forces act
+  bool slips_ = false;            ///< whether any may
+  std::vector<SupportPose> now_;  ///< where forces act
 };
 
 /// What hands that yield have stored, or only one support of them [J].

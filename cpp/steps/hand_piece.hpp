@@ -26,7 +26,7 @@ struct Shift {
   Vector3 point, by;  ///< x [m]; u, in the axes of G [m]
 };
 
-inline Shift shift_of(const Model& model, const VectorX& q, const HandState& hand, const HandPose& pose,
+inline Shift shift_of(const Model& model, const VectorX& q, const HandState& hand, const SupportPose& pose,
                       const TouchedEdge& touched, std::size_t i) {
   Shift out;
   out.grip = pose.rotation * hand.edges[i];

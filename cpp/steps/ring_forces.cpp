@@ -19,13 +19,14 @@ Ring ring_of(const Support& support, double reach) {
 
 Vector3 centre_of(const HandState& hand) { return hand.position + hand.rotation * hand.points.front(); }
 
-RingStep step_of(const Model& model, const StepProblem& problem, const std::vector<HandPose>& end, int support) {
+RingStep step_of(const Model& model, const StepProblem& problem, int support) {
   const Support& s = model.supports[at(support)];
   const HandState& start = problem.start->hands[at(support)];
   const Vector3 from = centre_of(start);
   const double fed = start.ring.fed;
+  const std::vector<SupportPose>& end = problem.prescribed->supports;
   if (end.empty()) return {ring_of(s, from.norm()), s.curve, start.ring, from, from, fed, fed};
-  const HandPose& to = end[at(support)];
+  const SupportPose& to = end[at(support)];
   const Vector3 centre = to.position + to.rotation * start.points.front();
   return {ring_of(s, centre.norm()), s.curve, start.ring, from, centre, fed, to.fed};
 }
@@ -102,11 +103,10 @@ RingForces::RingForces(const Model& model) : model_(model) {
   table_ = ElementTable(3 * n, std::move(dofs));
 }
 
-void RingForces::add(const StepProblem& problem, StepData& data, const std::vector<HandPose>& end,
-                     std::span<double> values) const {
+void RingForces::add(const StepProblem& problem, StepData& data, std::span<double> values) const {
   for (const Held& held : rings_) {
     if (problem.start->hands[at(held.support)].ring.left) continue;
-    const RingStep step = step_of(model_, problem, end, held.support);
+    const RingStep step = step_of(model_, problem, held.support);
     with_found(problem, step, {model_, data.z}, [&](const auto& found, const auto& axes) {
       add_element(table_, held.first_element + own_piece(step.curve, found.place.piece), local_of(found, axes), data,
                   values);
@@ -134,12 +134,12 @@ void RingForces::add_rounding(const StepProblem& problem, StepData& data) const 
   }
 }
 
-double RingForces::dissipated(const StepProblem& problem, const std::vector<HandPose>& end, const VectorX& z) const {
+double RingForces::dissipated(const StepProblem& problem, const VectorX& z) const {
   const NodePlaces acting{model_, z};
   const NodePlaces last = problem.in_middle() ? NodePlaces{model_, z, 2.0, &problem.start->q} : acting;
   double lost = 0.0;
   for (const Held& held : rings_) {
-    const RingStep step = step_of(model_, problem, end, held.support);
+    const RingStep step = step_of(model_, problem, held.support);
     if (step.start.left || !step.ring.holds) continue;
     const SplinePlace place = nearest_place(step.curve, step.start.place, last, step.to);
     const double k = step.ring.stiffness, u0 = step.origin(step.fed_from) - step.curve.arc_at(step.start.place),
@@ -155,10 +155,10 @@ double RingForces::dissipated(const StepProblem& problem, const std::vector<Hand
   return lost;
 }
 
-double RingForces::work(const StepProblem& problem, const std::vector<HandPose>& end, const VectorX& q1) const {
+double RingForces::work(const StepProblem& problem, const VectorX& q1) const {
   double done = 0.0;
   for (const Held& held : rings_) {
-    const RingStep step = step_of(model_, problem, end, held.support);
+    const RingStep step = step_of(model_, problem, held.support);
     if (step.start.left) continue;
     done -= with_found(problem, step, middle_of(problem, q1), [&](const auto& found, const auto& /*axes*/) {
       return found.force().dot(step.to - step.from) + found.tension * (step.fed_to - step.fed_from);

@@ -9,13 +9,6 @@
 
 namespace withe {
 
-/// Where a hand is.
-struct HandPose {
-  Vector3 position = Vector3::Zero();      ///< [m]
-  Matrix3 rotation = Matrix3::Identity();  ///< columns: its axes
-  double fed = 0.0;                        ///< by the drive of a ring [m]
-};
-
 class RingForces {
  public:
   explicit RingForces(const Model& model);
@@ -25,14 +18,12 @@ class RingForces {
   /// Whether friction or a limit lets any slip along.
   bool slips() const { return slips_; }
 
-  /// `end`: where hands are at the end of the step, per support; empty: where they are at the start.
-  void add(const StepProblem& problem, StepData& data, const std::vector<HandPose>& end,
-           std::span<double> values) const;
+  void add(const StepProblem& problem, StepData& data, std::span<double> values) const;
   void add_rounding(const StepProblem& problem, StepData& data) const;
   /// What slip takes in a step whose forces act at `z` [J].
-  double dissipated(const StepProblem& problem, const std::vector<HandPose>& end, const VectorX& z) const;
+  double dissipated(const StepProblem& problem, const VectorX& z) const;
   /// What rings and their drives do in a step that ends at `q1` [J].
-  double work(const StepProblem& problem, const std::vector<HandPose>& end, const VectorX& q1) const;
+  double work(const StepProblem& problem, const VectorX& q1) const;
   /// Takes a state there whose hands are where they go to. Returns what stays with rings that rods have left [J].
   double accept(State& state) const;
 

@@ -13,10 +13,9 @@
 #include "contact/contact_linearisation.hpp"
 #include "elasticity/discrete_elements.hpp"
 #include "elasticity/elements.hpp"
-#include "forces/custom_forces.hpp"
 #include "forces/loads.hpp"
 #include "model/mass_matrix.hpp"
-#include "model/state.hpp"
+#include "steps/prescribed.hpp"
 
 namespace withe {
 
@@ -24,18 +23,13 @@ namespace withe {
 /// Euler on the way to an equilibrium: its intervals are not physical time, and inertia alone resists.
 enum class StepRule { statics, settling, backward_euler, midpoint, energy_momentum, verlet };
 
-/// Custom forces as the equations take them.
-struct AppliedForces {
-  VectorX force;                 ///< per unknown [N]
-  std::vector<Vector3> moments;  ///< per node, in world axes [N m]; empty: none
-};
-
 struct StepProblem {
   explicit StepProblem(const Model& of) : model(of) {}
 
   const Model& model;
   const State* start = nullptr;            ///< must outlive the step
-  const Parameters* parameters = nullptr;  ///< likewise
+  const Parameters* parameters = nullptr;  ///< must outlive the step
+  const Prescribed* prescribed = nullptr;  ///< must outlive the step
   StepRule rule = StepRule::statics;
   double interval = 0;   ///< h, from q0 to z [s]; 0: statics
   double slip_time = 0;  ///< in which slip happens [s]
@@ -53,8 +47,7 @@ struct StepProblem {
   ElasticCoefficients viscous;  ///< viscosity alone, over h, from the start's strains
   ElasticCoefficients damped;   ///< elasticity and viscosity as one
 
-  Loads loads;           ///< whose values are among the parameters
-  AppliedForces custom;  ///< unless they are solved for
+  Loads loads;  ///< whose values are among the parameters
   /// Of what supports hold, which acts on the edges next to it; meaningful where held. Empty: as the rest accelerates.
   VectorX held_acceleration;
 

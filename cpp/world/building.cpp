@@ -88,7 +88,7 @@ World::Implementation::Implementation(SceneDescription scene, Options choice)
   if (description.contact.overlap == Overlap::separate) separate();
   check_overlap();
   if (options.integrator == Integrator::verlet) {
-    plan.stable_step = stable_step(*equations, parameters, state, work);
+    plan.stable_step = stable_step(*equations, parameters, at_rest(), state, work);
     require(options.time_step <= plan.stable_step,
             "time_step must not exceed the stable step of the explicit scheme, " + text(plan.stable_step) + " s, got " +
                 text(options.time_step) + " s");

@@ -333,7 +333,7 @@ void World::Implementation::check_energy() {
 
 /// What to say where the time step is above the stable one at the present state; else nothing.
 std::string World::Implementation::longest_explicit_step() {
-  const double stable = stable_step(*equations, parameters, state, work);
+  const double stable = stable_step(*equations, parameters, at_rest(), state, work);
   if (!(options.time_step > stable)) return "";
   const bool slips = equations->contact() && equations->contact()->regularises();
   return ": take a time_step below " + text(stable) + " s" +

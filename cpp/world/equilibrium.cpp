@@ -53,41 +53,40 @@ Vector3 swing_between(const SupportMotion& from, const SupportMotion& to) {
   return rotation_log(to.rotation * rotation_exp(-to.roll) * from.rotation.transpose());
 }
 
-/// A place between two of a support, or beyond. Its rotation is exp(s swing) R exp(s roll).
-void put_between(const SupportMotion& from, const SupportMotion& to, double fraction, SupportMotion& out) {
-  out.position = from.position + fraction * (to.position - from.position);
-  out.fed = from.fed + fraction * (to.fed - from.fed);
-  out.rotation = rotation_exp(fraction * swing_between(from, to)) * from.rotation * rotation_exp(fraction * to.roll);
+/// Places between two of each support, or beyond. A rotation is exp(s swing) R exp(s roll).
+void find_poses_between(const std::vector<SupportMotion>& from, const std::vector<SupportMotion>& to, double fraction,
+                        std::vector<SupportPose>& out) {
+  out.resize(to.size());
+  for (std::size_t s = 0; s < to.size(); ++s) {
+    out[s].position = from[s].position + fraction * (to[s].position - from[s].position);
+    out[s].fed = from[s].fed + fraction * (to[s].fed - from[s].fed);
+    out[s].rotation =
+        rotation_exp(fraction * swing_between(from[s], to[s])) * from[s].rotation * rotation_exp(fraction * to[s].roll);
+  }
+}
+
+void put(const std::vector<SupportPose>& poses, std::vector<SupportMotion>& motions) {
+  for (std::size_t s = 0; s < motions.size(); ++s) motions[s].put(poses[s]);
 }
 
 }  // namespace
 
-void World::Implementation::move_between(const std::vector<SupportMotion>& from, const std::vector<SupportMotion>& to,
-                                         double factor) {
-  for (std::size_t s = 0; s < motions.size(); ++s) put_between(from[s], to[s], factor, motions[s]);
-}
-
-/// `from` and `to` must outlive it; it leaves `motions` where they were last asked for.
 Boundary World::Implementation::boundary_between(Equations& system, const std::vector<SupportMotion>& from,
-                                                 const std::vector<SupportMotion>& to) {
-  Boundary boundary{.hold =
-                        [this, &system, &from, &to](double present, double factor, VectorX& q) {
-                          move_between(from, to, factor);
-                          hold_now(work.held);
-                          for (std::size_t s = 0; s < to.size(); ++s) {
-                            const double turn = to[s].roll.norm() + swing_between(from[s], to[s]).norm();
-                            if (to[s].roll != Vector3::Zero() && std::abs(factor - present) * turn > kMostTurn)
-                              work.held.reachable = false;
-                          }
-                          system.assembler().add_held_change(q, work.held.q, 1.0, q);
-                          return work.held.reachable;
-                        },
-                    .aim = nullptr};
+                                                 const std::vector<SupportMotion>& to, Prescribed& out) const {
+  Boundary boundary{.prescribed = out};
+  boundary.hold = [this, &system, &from, &to, poses = std::vector<SupportPose>{}, there = HeldTarget{}](
+                      double present, double factor, VectorX& q) mutable {
+    find_poses_between(from, to, factor, poses);
+    hold(poses, there);
+    for (std::size_t s = 0; s < to.size(); ++s) {
+      const double turn = to[s].roll.norm() + swing_between(from[s], to[s]).norm();
+      if (to[s].roll != Vector3::Zero() && std::abs(factor - present) * turn > kMostTurn) there.reachable = false;
+    }
+    system.assembler().add_held_change(q, there.q, 1.0, q);
+    return there.reachable;
+  };
   if (hands_move(from, to))
-    boundary.aim = [this, &system, &from, &to](double factor) {
-      move_between(from, to, factor);
-      aim_hands(system);
-    };
+    boundary.move = [&from, &to, &out](double factor) { find_poses_between(from, to, factor, out.supports); };
   return boundary;
 }
 
@@ -104,11 +103,11 @@ void World::Implementation::rest() {
 
 /// True if nothing resists a translation along which forces do not sum to zero: no way off leads to equilibrium then.
 /// Surfaces, and custom forces with a Jacobian, may resist elsewhere.
-bool World::Implementation::drifts(Equations& system) {
+bool World::Implementation::drifts(Equations& system, const Prescribed& given) {
   if (system.contact() || description.custom_implicit) return false;
   for (const Support& s : model.supports)
     if (s.active) return false;
-  system.begin(state, parameters, StepRule::statics, 0.0);
+  system.begin(state, parameters, StepRule::statics, 0.0, given);
   StepData& e = work.newton.data;
   system.evaluate(state.q, true, nullptr, e);
   if (!e.residual.allFinite()) return false;
@@ -128,9 +127,9 @@ bool World::Implementation::drifts(Equations& system) {
 
 /// Has what touches press as what is yet to touch will, and, once arrived at an equilibrium, as hard as it has to
 /// without being deep; see `ContactStiffness`. Whether that is as it did.
-bool World::Implementation::even_contact(Equations& system, bool arrived) {
+bool World::Implementation::even_contact(Equations& system, const Prescribed& given, bool arrived) {
   if (!system.contact()) return true;
-  system.begin(state, parameters, StepRule::statics, 0.0);
+  system.begin(state, parameters, StepRule::statics, 0.0, given);
   system.contact()->update(state.q);
   system.contact()->accept_at_rest(state, arrived);
   return system.contact()->presses_alike();
@@ -160,7 +159,7 @@ void World::Implementation::settle_contact(Equations& system, const Boundary& bo
     const State reached = state;
     const StaticResult found = r;
     const double wanted = contact.wanted_ratio();
-    if (even_contact(system, true)) return;
+    if (even_contact(system, boundary.prescribed, true)) return;
     again();
     if (r.converged && (wanted == 1.0 || contact.wanted_ratio() < kRelieved * wanted)) continue;
     state = reached;
@@ -182,14 +181,12 @@ EquilibriumResult World::Implementation::equilibrium(double dt, Saddles saddles)
     apply_ramps(time, configuration(), actuation_work);
   }
   const Actuation wanted = actuation_changed ? actuation_of(parameters) : Actuation{};
-  aim_supports(time);
+  prescribe(time, prescribed);
   Equations& system = statics();
-  update_custom_force(system);
   const MatrixX3 forces_before = custom_force, moments_before = custom_moments;
   const auto undo = [&] {
-    forget_custom(system, forces_before, moments_before);
-    release_obstacles(system);
-    release_hands(system);
+    custom_force = forces_before;
+    custom_moments = moments_before;
     static_cast<Moving&>(*this) = before;
     if (actuation_changed) set_actuation_between(model, wanted, wanted, 1.0, parameters);
     apply_ramps(state.time);
@@ -197,19 +194,18 @@ EquilibriumResult World::Implementation::equilibrium(double dt, Saddles saddles)
     parameters.loads = loads;
     recall(lagged_before);  // and no more of `system`, which this may drop
   };
-  std::vector<SupportMotion> from = before.motions;
+  std::vector<SupportMotion> from = motions;
   std::vector<SupportMotion> target = motions;
-  const Boundary boundary = boundary_between(system, from, target);
+  put(prescribed.supports, target);
+  const Boundary boundary = boundary_between(system, from, target, prescribed);
   rest();
   StaticResult r;
   try {
-    solve_for_custom_at_rest(system, time);
-    even_contact(system, false);
-    aim_obstacles(system, time);
-    aim_hands(system);
+    even_contact(system, Prescribed::nothing(), false);
+    prescribe_custom_at_rest(time, prescribed);
     VectorX reached = state.q;
-    if (boundary.hold(0.0, 1.0, reached)) check_squeezed(system, reached, dt);
-    if (drifts(system)) {
+    if (boundary.hold(0.0, 1.0, reached)) check_squeezed(system, prescribed, reached, dt);
+    if (drifts(system, prescribed)) {
       newton->balance(work.newton.data, r.newton);
       r.newton.worst_row = newton->worst_row(work.newton.data.residual);
     } else {
@@ -224,10 +220,8 @@ EquilibriumResult World::Implementation::equilibrium(double dt, Saddles saddles)
     throw;
   }
   motions = target;
-  system.respond({});
-  if (r.converged) settle_hands(system);
-  release_obstacles(system);
-  release_hands(system);
+  if (const HandForces* hands = system.hands(); hands && r.converged)
+    hands->accept(prescribed.supports, configuration(), state);
   if (!r.converged) {
     undo();
     fail_equilibrium(r, dt);
@@ -308,8 +302,8 @@ EquilibriumResult World::Implementation::settle(Equations& system, StaticResult&
   retire_ramps();
   statistics.steps += 1;
   steps_taken += 1;
-  update_custom_force(system);
-  system.begin(state, parameters, StepRule::statics, 0.0);
+  const Prescribed still = at_rest();
+  system.begin(state, parameters, StepRule::statics, 0.0, still);
   system.evaluate(state.q, false, nullptr, work.newton.data);
   note_reactions();
   newton->balance(work.newton.data, r.newton);
@@ -385,31 +379,35 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
       out.iterations += equilibrium().iterations;
     }
     const std::vector<SupportMotion> from = self.motions;
-    self.aim_supports(self.state.time);
-    const std::vector<SupportMotion> target = self.motions;
+    std::vector<SupportMotion> target = from;
+    for (SupportMotion& motion : target) motion.put(motion.pose_at(self.state.time));
     Equations& system = self.statics();
-    self.solve_for_custom_at_rest(system, self.state.time);
-    self.even_contact(system, false);
-    const Boundary boundary = self.boundary_between(system, from, target);
+    Prescribed& prescribed = self.prescribed;
+    prescribed = {};
+    self.prescribe_custom_at_rest(self.state.time, prescribed);
+    self.even_contact(system, Prescribed::nothing(), false);
+    const Boundary boundary = self.boundary_between(system, from, target, prescribed);
     self.rest();
     const ActingPath acting =
-        by_loads ? scaled : growing(system, self.parameters, self.state, self.work.newton, nullptr);
+        by_loads ? scaled : growing(system, self.parameters, prescribed, self.state, self.work.newton, nullptr);
     Homotopy path(system, *self.newton, self.parameters, boundary, acting, self.state, self.work.newton);
     if (!by_loads) path.start_out_of_balance();
+    std::vector<SupportPose> poses;
     const ArcVisitor visit = [&](const ArcPoint& point) {
+      find_poses_between(from, target, point.factor, poses);
+      put(poses, self.motions);
       self.note_reactions();
       out.points.push_back(path_point(*this, self.model, point));
       if (point.stable && self.buckles_out_of_plane()) out.points.back().stable = false;
     };
     r = follow_arc(system, *self.newton, self.options, path,
                    {wanted.start, wanted.end, wanted.most_points, wanted.turn}, self.state, self.work.newton, visit);
-    system.respond({});
-    self.release_hands(system);
-    self.move_between(from, target, r.factor);
+    find_poses_between(from, target, r.factor, poses);
+    put(poses, self.motions);
     for (SupportMotion& m : self.motions) stop(m, self.state.time);
   } catch (...) {
-    self.release_hands(self.statics());
-    self.forget_custom(self.statics(), forces_before, moments_before);
+    self.custom_force = forces_before;
+    self.custom_moments = moments_before;
     static_cast<Moving&>(self) = before;
     self.parameters.loads = full;
     self.reaction_current = false;
@@ -429,8 +427,8 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
 void World::Implementation::refresh_reactions() {
   if (reaction_current) return;
   Equations& system = statics();
-  update_custom_force(system);
-  system.begin(state, parameters, StepRule::statics, 0.0);
+  const Prescribed still = at_rest();
+  system.begin(state, parameters, StepRule::statics, 0.0, still);
   system.evaluate(state.q, false, nullptr, work.newton.data);
   note_reactions();
 }

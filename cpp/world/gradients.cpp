@@ -60,7 +60,8 @@ StepGradient& World::Implementation::begin_gradient(AtEquilibrium& at) const {
   }
   require(!has_rings(), std::string("no gradient is known of this equilibrium: ") + kRing);
   StepGradient& gradient = *static_gradient;
-  at = {state, hand_poses()};
+  at.frames = state;
+  at.prescribed.supports = support_poses();
   State& frames = at.frames;
   if (!model.planar()) {
     // Directors are measured from where they are, and so turn with their edges without a change of their angles.
@@ -68,7 +69,7 @@ StepGradient& World::Implementation::begin_gradient(AtEquilibrium& at) const {
     compute_configuration(model, state, state.q, configuration);
     accept_configuration(model, state.q, configuration, frames);
   }
-  gradient.begin({frames, parameters, StepRule::statics, 0.0, frames.q, nullptr, nullptr, &at.hands});
+  gradient.begin({frames, parameters, StepRule::statics, 0.0, frames.q, nullptr, nullptr, at.prescribed});
   if (const HandForces* yielding = gradient.equations().hands()) require(!yielding->at_limit(state), kAtLimit);
   const Contact* contact = gradient.equations().contact();
   if (contact && contact->count() > 0) {
@@ -108,7 +109,7 @@ EquilibriumGradients World::equilibrium_gradients(const std::vector<ReadoutAdjoi
     add_unknowns(model, scalar, adjoint);
     if (scalar.needs_state())
       add_readouts(model, gradient.equations().assembler(), self.parameters, at.frames, scalar, adjoint, coefficients);
-    const ReactionAdjoint reactions{scalar.reactions, at.hands};
+    const ReactionAdjoint reactions{scalar.reactions, at.prescribed.supports};
     gradient.pull_back(adjoint, coefficients, held, scalar.has_reactions() ? &reactions : nullptr);
     out.scalars.push_back(self.equilibrium_gradient(coefficients, held));
   }
@@ -138,7 +139,7 @@ MatrixX World::support_directions(int support) const {
   const Model& model = self.model;
   require(support >= 0 && at(support) < model.supports.size() && !model.supports[at(support)].yields(),
           "forward derivatives are not known by the place of a hand that yields");
-  const std::vector<HandPose> hands = self.hand_poses();
+  const std::vector<SupportPose> hands = self.support_poses();
   MatrixX out = MatrixX::Zero(model.dof_count, 6);
   VectorX held = VectorX::Zero(model.dof_count);
   for (const Constraint& c : model.constraints)
@@ -190,7 +191,7 @@ VectorX World::Implementation::neutral_motion() const {
 
 EquilibriumGradient World::Implementation::equilibrium_gradient(const CoefficientAdjoint& coefficients,
                                                                 const HeldAdjoint& held) const {
-  const std::vector<HandPose> hands = hand_poses();
+  const std::vector<SupportPose> hands = support_poses();
   PoseAdjoint poses = by_poses(model, state.q, held.pose, held.hands, {hands, state.hands});
   poses.obstacles = by_places(model, held.obstacles);
   return {parameter_gradient(model, parameters, coefficients), std::move(poses), by_drawing(model, state.q, held.pose)};
@@ -200,7 +201,7 @@ std::shared_ptr<Tape> World::start_tape() {
   Implementation& self = *implementation_;
   const Contact* contact = self.equations->contact();
   self.tape = std::make_shared<Tape>(self.model, equation_options(self.options), self.state, self.parameters,
-                                     contact && contact->frictional(), self.hand_poses());
+                                     contact && contact->frictional(), self.support_poses());
   if (self.options.integrator == Integrator::verlet || self.options.integrator == Integrator::statics)
     self.tape->refuse("integrator '" +
                       std::string(self.options.integrator == Integrator::verlet ? "verlet" : "static") +
@@ -263,7 +264,7 @@ void World::Implementation::record_step(StepRule rule, double dt, bool begins) {
       unknown = kStiffness;
   }
   tape->record(
-      {rule, dt, work.move, state, parameters, reached(), hand_poses(), begins, unknown, tensions_in_middle()});
+      {rule, dt, work.move, state, parameters, reached(), support_poses(), begins, unknown, tensions_in_middle()});
 }
 
 Reached World::Implementation::reached() const {

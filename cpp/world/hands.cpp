@@ -38,22 +38,10 @@ bool World::Implementation::has_rings() const {
                      [](const Support& s) { return s.active && s.slides(); });
 }
 
-void World::Implementation::find_hand_poses(std::vector<HandPose>& poses) const {
-  poses.clear();
-  for (const SupportMotion& m : motions) poses.push_back({m.position, m.rotation, m.fed});
-}
-
-std::vector<HandPose> World::Implementation::hand_poses() const {
-  std::vector<HandPose> poses;
-  find_hand_poses(poses);
+std::vector<SupportPose> World::Implementation::support_poses() const {
+  std::vector<SupportPose> poses;
+  for (const SupportMotion& m : motions) poses.push_back(m.pose());
   return poses;
-}
-
-/// Tells hands that yield where `motions` lead; `release_hands`: that there is no step.
-void World::Implementation::aim_hands(Equations& system) {
-  if (!system.hands()) return;
-  find_hand_poses(aimed_hands);
-  system.hands()->aim(aimed_hands);
 }
 
 /// Whether one that yields does.
@@ -65,15 +53,6 @@ bool World::Implementation::hands_move(const std::vector<SupportMotion>& from,
          from[s].fed != to[s].fed))
       return true;
   return false;
-}
-
-void World::Implementation::release_hands(Equations& system) {
-  if (system.hands()) system.hands()->aim({});
-}
-
-void World::Implementation::settle_hands(Equations& system) {
-  if (!system.hands()) return;
-  system.hands()->accept(configuration(), state);
 }
 
 double World::Implementation::hand_energy_of(int hand) const {
@@ -130,27 +109,27 @@ void World::Implementation::regrip(const std::vector<std::vector<int>>& held_bef
 }
 
 /// Edges after all nodes: one between two hands has a node of either.
-void World::Implementation::hold_hands(HeldTarget& target) const {
+void World::Implementation::hold_hands(const std::vector<SupportPose>& supports, HeldTarget& target) const {
   for (std::size_t h = 0; h < model.supports.size(); ++h) {
     const Support& s = model.supports[h];
     for (std::size_t i = 0; s.active && i < s.span.size(); ++i)
       if (std::find(s.nodes.begin(), s.nodes.end(), s.span[i]) != s.nodes.end())
-        put_node(model, s.span[i], motions[h].position + motions[h].rotation * state.hands[h].points[i], target.q);
+        put_node(model, s.span[i], supports[h].position + supports[h].rotation * state.hands[h].points[i], target.q);
   }
   for (std::size_t h = 0; h < model.supports.size(); ++h) {
     const Support& s = model.supports[h];
-    if (s.active && s.is_hand() && !s.yields() && !hold_edges(static_cast<int>(h), target.q)) target.reachable = false;
+    if (s.active && s.is_hand() && !s.yields() && !hold_edges(static_cast<int>(h), supports[h].rotation, target.q))
+      target.reachable = false;
   }
 }
 
-/// Where a hand puts the edges that it holds, once all nodes have their places in `q`.
-bool World::Implementation::hold_edges(int hand, VectorX& q) const {
+bool World::Implementation::hold_edges(int hand, const Matrix3& rotation, VectorX& q) const {
   if (model.planar()) return true;
   const Support& s = model.supports[at(hand)];
   for (std::size_t i = 0; i < s.touched.size(); ++i) {
     const int edge = s.touched[i].edge;
     const auto e = at(edge);
-    const Matrix3 frame = motions[at(hand)].rotation * state.hands[at(hand)].edges[i];
+    const Matrix3 frame = rotation * state.hands[at(hand)].edges[i];
     Vec3d t = to_vec3(frame.col(2)), d = to_vec3(frame.col(0));
     const auto own = [&](int node) { return std::find(s.nodes.begin(), s.nodes.end(), node) != s.nodes.end(); };
     if (!own(model.edge_tail[e]) || !own(model.edge_head[e])) {

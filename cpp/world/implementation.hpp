@@ -61,7 +61,7 @@ struct World::Implementation : Running {
   std::shared_ptr<Tape> tape;                             ///< of a run that is kept for gradients
   long taped = 0;                                         ///< its length at the start of a step that may be taken back
   StepWorkspace work;
-  std::vector<HandPose> aimed_hands;  ///< scratch
+  Prescribed prescribed;  ///< for the step or the equilibrium that was sought last
   mutable EnergyScratch energy_scratch;
   /// Before what was set since the state last moved; the work of that is found when it is asked for.
   EnergyCoefficients before_settings;
@@ -73,7 +73,7 @@ struct World::Implementation : Running {
   double turned = 0, held_turned = 0;  ///< of an edge, of a held frame in the last step at most [rad]
   /// Of steps that were cut for them, until one is accepted: `held_turned` over its most, way of an obstacle [m].
   double cut_turn = 0, cut_way = 0;
-  std::vector<SupportMotion> motions_before, kept_motions;  ///< at the start of a time step, of a part of it
+  std::vector<SupportMotion> motions_before;  ///< at the start of a time step
   Plan plan;
   bool plan_current = false;  ///< made when it is asked for
   std::string plane_left_by;  ///< what left the plane, where something did
@@ -167,48 +167,49 @@ struct World::Implementation : Running {
   void note_actuation();
   bool actuated() const;
   bool turns_rods() const;
-  void aim_supports(double time);
+  /// Sets the poses of supports, the held unknowns and the places of obstacles at a time. No custom forces.
+  void prescribe(double time, Prescribed& out) const;
+  /// The present custom forces, and nothing else.
+  Prescribed at_rest() const;
   void spread_jumps(double duration);
-  void hold_now(HeldTarget& target) const;
-  void set_motion_at(SupportMotion& motion, double time) const;
+  /// The held unknowns when supports are there.
+  void hold(const std::vector<SupportPose>& supports, HeldTarget& target) const;
   CustomForces custom_forces(double time, const VectorX& q, const VectorX& v, bool derivatives);
-  void solve_for_custom(Equations& target, double dt);
-  void solve_for_custom_at_rest(Equations& target, double time);
-  /// Ends that, with custom forces as they were before.
-  void forget_custom(Equations& target, const MatrixX3& forces, const MatrixX3& moments);
-  /// Asks for custom forces at a time and a state, on each unknown.
-  void ask_custom_force(Equations& target, double time, const VectorX& q, const VectorX& v);
-  /// Those of a step of dt, which leads to where `work.held` says.
-  void find_custom_force(Equations& target, double dt);
-  void update_custom_force(Equations& target) const;
+  /// Prescribes the custom forces of a step of dt, whose held unknowns are prescribed already.
+  void prescribe_custom(double dt, Prescribed& out);
+  /// Prescribes custom forces at rest at a time, which are solved for.
+  void prescribe_custom_at_rest(double time, Prescribed& out);
+  /// Evaluates custom forces at a time and a state.
+  void find_custom_force(double time, const VectorX& q, const VectorX& v);
+  /// Evaluates custom forces where the explicit rules of a step of dt have them act.
+  void find_custom_force_of_step(double dt, Prescribed& out);
+  /// The present custom forces act throughout a step.
+  void put_custom_force(Prescribed& out) const;
 
   // hands.cpp
   bool has_hands() const;
   bool has_rings() const;
   bool release_left_rings();
   bool hands_move(const std::vector<SupportMotion>& from, const std::vector<SupportMotion>& to) const;
-  void aim_hands(Equations& system);
-  /// Where hands are, per support.
-  std::vector<HandPose> hand_poses() const;
+  /// Present poses of supports.
+  std::vector<SupportPose> support_poses() const;
   VectorX neutral_motion() const;
   /// Prepares `static_gradient` for the equilibrium that the scene is in; what it refers to is in `at`. Throws
   /// std::invalid_argument where no derivative is known.
   struct AtEquilibrium {
     State frames;
-    std::vector<HandPose> hands;
+    Prescribed prescribed;
   };
   StepGradient& begin_gradient(AtEquilibrium& at) const;
   EquilibriumGradient equilibrium_gradient(const CoefficientAdjoint& coefficients, const HeldAdjoint& held) const;
-  void find_hand_poses(std::vector<HandPose>& poses) const;
-  static void release_hands(Equations& system);
-  /// In an equilibrium that hands were aimed for.
-  void settle_hands(Equations& system);
   double hand_energy_of(int hand) const;
   void grasp(int hand);
   void regrip(const std::vector<std::vector<int>>& held_before);
-  /// The unknowns that hands hold, where `motions` say.
-  void hold_hands(HeldTarget& target) const;
-  bool hold_edges(int hand, VectorX& q) const;
+  /// The unknowns that hands hold.
+  void hold_hands(const std::vector<SupportPose>& supports, HeldTarget& target) const;
+  /// Sets angles of the edges that a hand holds at a rotation, once all nodes have their places in `q`. False where an
+  /// edge would turn by too much.
+  bool hold_edges(int hand, const Matrix3& rotation, VectorX& q) const;
   Wrench hand_reaction(int hand, const VectorX& held) const;
 
   // stepping.cpp
@@ -268,7 +269,7 @@ struct World::Implementation : Running {
 
   // squeezed.cpp
   void check_squeeze();
-  void check_squeezed(Equations& system, const VectorX& q, double dt);
+  void check_squeezed(Equations& system, const Prescribed& given, const VectorX& q, double dt);
   [[noreturn]] void fail_squeezed(const Equations& system, const Squeezed& squeezed, double dt) const;
 
   // step_length.cpp
@@ -300,16 +301,17 @@ struct World::Implementation : Running {
   EquilibriumResult equilibrium(double dt, Saddles saddles = Saddles::leave);
   /// A step of the static integrator, of dt and to `end`.
   void static_step(double end, double dt);
-  void move_between(const std::vector<SupportMotion>& from, const std::vector<SupportMotion>& to, double factor);
+  /// Supports between two places. `from`, `to` and `out`, whose poses follow where a hand that yields moves, must
+  /// outlive it.
   Boundary boundary_between(Equations& system, const std::vector<SupportMotion>& from,
-                            const std::vector<SupportMotion>& to);
+                            const std::vector<SupportMotion>& to, Prescribed& out) const;
   [[noreturn]] void fail_equilibrium(const StaticResult& result, double dt) const;
   EquilibriumResult settle(Equations& system, StaticResult& result, double time);
   /// Whether a motion out of the plane lowers the potential of an equilibrium in it. Not asked where the scene is to
   /// stay in its plane, nor where what acts has no potential.
   bool buckles_out_of_plane();
-  bool drifts(Equations& system);
-  bool even_contact(Equations& system, bool arrived);
+  bool drifts(Equations& system, const Prescribed& given);
+  bool even_contact(Equations& system, const Prescribed& given, bool arrived);
   void settle_contact(Equations& system, const Boundary& boundary, Saddles saddles, StaticResult& r);
   void rest();
   Equations& statics();
@@ -319,9 +321,6 @@ struct World::Implementation : Running {
   void check_overlap() const;
 
   // obstacles.cpp
-  /// Tells the contact of a step where obstacles are at its end; `release_obstacles`: that there is no step.
-  void aim_obstacles(Equations& system, double time) const;
-  static void release_obstacles(Equations& system);
   ObstacleWay obstacle_way(int obstacle) const;
   double farthest_obstacle(const State& since) const;
   std::vector<ObstaclePlace> obstacle_places(const std::function<ObstacleWay(int)>& way) const;

@@ -53,10 +53,10 @@ Linearisation World::linearise() const {
   Options symmetric = self.options;
   symmetric.integrator = Integrator::statics;
   Equations system(model, equation_options(symmetric));
-  self.update_custom_force(system);
   const MatrixX3 forces = self.custom_force, moments = self.custom_moments;
-  self.solve_for_custom_at_rest(system, self.state.time);
-  system.begin(self.state, self.parameters, StepRule::statics, 0.0);
+  Prescribed prescribed;
+  self.prescribe_custom_at_rest(self.state.time, prescribed);
+  system.begin(self.state, self.parameters, StepRule::statics, 0.0, prescribed);
   StepData evaluation;
   const SparseMatrix basis = free_basis(model), back = basis.transpose();
   std::optional<StrainParts> parts;
@@ -68,10 +68,12 @@ Linearisation World::linearise() const {
     system.elastic() = parts->without();
     system.evaluate(self.state.q, true, nullptr, evaluation);
   } catch (...) {
-    self.forget_custom(system, forces, moments);
+    self.custom_force = forces;
+    self.custom_moments = moments;
     throw;
   }
-  self.forget_custom(system, forces, moments);
+  self.custom_force = forces;
+  self.custom_moments = moments;
 
   Linearisation out;
   out.geometric = back * matrix_of(system.assembler()) * basis;

@@ -9,14 +9,11 @@
 #include "world/implementation.hpp"
 
 namespace withe {
-namespace {
 
-ObstacleWay way_at(const ObstacleMotion& m, double time) {
-  const double share = m.shift.fraction(time), turned = m.turn.fraction(time);
-  return {(1.0 - share) * m.from.shift + share * m.to.shift, (1.0 - turned) * m.from.turn + turned * m.to.turn};
+ObstacleWay ObstacleMotion::at(double time) const {
+  const double share = shift.fraction(time), turned = turn.fraction(time);
+  return {(1.0 - share) * from.shift + share * to.shift, (1.0 - turned) * from.turn + turned * to.turn};
 }
-
-}  // namespace
 
 /// How far an obstacle is from where it is drawn; in a plane, within it.
 ObstacleWay World::Implementation::obstacle_way(int obstacle) const {
@@ -39,15 +36,6 @@ double World::Implementation::farthest_obstacle(const State& since) const {
     square = std::max(square, dot(way, way));
   }
   return std::sqrt(square);
-}
-
-void World::Implementation::aim_obstacles(Equations& system, double time) const {
-  if (obstacle_motions.empty()) return;
-  system.contact()->aim(obstacle_places([&](int o) { return way_at(obstacle_motions[at(o)], time); }));
-}
-
-void World::Implementation::release_obstacles(Equations& system) {
-  if (system.contact()) system.contact()->aim({});
 }
 
 /// Only what leaves the shape where it is can be told by the motion of the surface alone.

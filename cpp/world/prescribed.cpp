@@ -49,12 +49,17 @@ bool World::Implementation::actuated() const {
   return false;
 }
 
-void World::Implementation::set_motion_at(SupportMotion& motion, double time) const {
-  const double s = motion.shift.fraction(time), turned = motion.turn.fraction(time);
-  motion.position = (1.0 - s) * motion.from_position + s * motion.to_position;
-  motion.rotation =
-      rotation_exp(turned * rotation_log(motion.to_rotation * motion.from_rotation.transpose())) * motion.from_rotation;
-  motion.fed = motion.fed_before + motion.feed_rate * (time - motion.feeds_since);
+SupportPose SupportMotion::pose_at(double time) const {
+  const double s = shift.fraction(time), turned = turn.fraction(time);
+  return {(1.0 - s) * from_position + s * to_position,
+          rotation_exp(turned * rotation_log(to_rotation * from_rotation.transpose())) * from_rotation,
+          fed_before + feed_rate * (time - feeds_since)};
+}
+
+void SupportMotion::put(const SupportPose& pose) {
+  position = pose.position;
+  rotation = pose.rotation;
+  fed = pose.fed;
 }
 
 /// A support or an obstacle that is to be elsewhere at once gets there evenly in the course of the time step: shorter
@@ -96,10 +101,21 @@ bool World::Implementation::turns_rods() const {
   return false;
 }
 
-/// Moves supports to where they shall be at a time, and notes what that says of the held unknowns.
-void World::Implementation::aim_supports(double time) {
-  for (SupportMotion& motion : motions) set_motion_at(motion, time);
-  hold_now(work.held);
+void World::Implementation::prescribe(double time, Prescribed& out) const {
+  out.supports.clear();
+  for (const SupportMotion& motion : motions) out.supports.push_back(motion.pose_at(time));
+  hold(out.supports, out.held);
+  out.obstacles.clear();
+  if (!obstacle_motions.empty())
+    out.obstacles = obstacle_places([&](int o) { return obstacle_motions[at(o)].at(time); });
+  out.custom = {};
+  out.respond = nullptr;
+}
+
+Prescribed World::Implementation::at_rest() const {
+  Prescribed out;
+  put_custom_force(out);
+  return out;
 }
 
 void put_node(const Model& model, int node, const Vector3& position, VectorX& q) {
@@ -111,27 +127,26 @@ void put_node(const Model& model, int node, const Vector3& position, VectorX& q)
     q.segment<3>(dof) = position;
 }
 
-/// The held unknowns when supports are where `motions` say.
-void World::Implementation::hold_now(HeldTarget& target) const {
+void World::Implementation::hold(const std::vector<SupportPose>& supports, HeldTarget& target) const {
   target.q = state.q;
   target.turn = target.spin = 0.0;
   target.reachable = true;
   for (std::size_t s = 0; s < model.supports.size(); ++s) {
     const Support& support = model.supports[s];
     if (!support.active) continue;
-    const SupportMotion& motion = motions[s];
+    const SupportPose& pose = supports[s];
     if (support.is_hand()) continue;
     const auto put = [&](int node, const Vector3& position) { put_node(model, node, position, target.q); };
-    put(support.node, motion.position);
+    put(support.node, pose.position);
     const bool spinning = may_spin(support.description.kind);
     if (support.frame >= 0 && !(spinning && !model.planar())) {
       const int dof = model.frame_dof[at(support.frame)];
       if (model.planar()) {
         const double now = state.q(dof);
-        const Matrix3 rest = motion.rotation * rotation_exp(now * model.plane->normal).transpose();
+        const Matrix3 rest = pose.rotation * rotation_exp(now * model.plane->normal).transpose();
         target.q(dof) = now + rotation_log(rest).dot(model.plane->normal);
       } else {
-        const Matrix3 rest = motion.rotation * state.frame[at(support.frame)].transpose();
+        const Matrix3 rest = pose.rotation * state.frame[at(support.frame)].transpose();
         target.turn = std::max(target.turn, rotation_log(rest).norm());
         if (target.turn > 2.5) target.reachable = false;
         target.q.segment<3>(dof) = cayley_inverse(rest);
@@ -140,13 +155,13 @@ void World::Implementation::hold_now(HeldTarget& target) const {
     if (support.other_node >= 0) {
       // The held edge moves rigidly with the node.
       const auto& drawn = description.positions;
-      const Vector3 arm = motion.stretch * (drawn.row(support.other_node) - drawn.row(support.node)).transpose();
-      put(support.other_node, motion.position + motion.rotation * arm);
+      const Vector3 arm = motions[s].stretch * (drawn.row(support.other_node) - drawn.row(support.node)).transpose();
+      put(support.other_node, pose.position + pose.rotation * arm);
       if (!model.planar() && !spinning) {
         // Its angle is what the rotated drawn director measures against direct transport of the reference.
         const auto e = at(support.edge);
-        const Vec3d t = to_vec3(motion.rotation * to_eigen(model.initial_tangent[e]));
-        const Vec3d d = to_vec3(motion.rotation * to_eigen(model.initial_director[e]));
+        const Vec3d t = to_vec3(pose.rotation * to_eigen(model.initial_tangent[e]));
+        const Vec3d d = to_vec3(pose.rotation * to_eigen(model.initial_director[e]));
         const int dof = model.edge_dof[e];
         if (dot(state.tangent[e], t) < -0.5) target.reachable = false;
         const double angle = signed_angle(parallel_transport(state.director[e], state.tangent[e], t), d, t);
@@ -154,7 +169,7 @@ void World::Implementation::hold_now(HeldTarget& target) const {
       }
     }
   }
-  hold_hands(target);
+  hold_hands(supports, target);
   for (const Support& support : model.supports) {
     if (!support.active || support.yields() || model.planar()) continue;
     for (int edge : support.edges) {
@@ -194,31 +209,32 @@ CustomForces World::Implementation::custom_forces(double time, const VectorX& q,
   return now;
 }
 
-void World::Implementation::ask_custom_force(Equations& target, double time, const VectorX& q, const VectorX& v) {
+void World::Implementation::find_custom_force(double time, const VectorX& q, const VectorX& v) {
   custom_forces(time, q, v, false);
-  update_custom_force(target);
 }
 
 /// Custom forces of a step of dt are those where the scheme's own forces act.
-void World::Implementation::solve_for_custom(Equations& target, double dt) {
-  if (!force_function) return;
-  if (!description.custom_implicit || options.integrator == Integrator::verlet) {
-    find_custom_force(target, dt);
+void World::Implementation::prescribe_custom(double dt, Prescribed& out) {
+  if (!description.has_custom_force) return;
+  if (force_function && description.custom_implicit && options.integrator != Integrator::verlet) {
+    out.respond = [this, time = force_time(state.time, dt)](const VectorX& q, const VectorX& v, bool derivatives) {
+      return custom_forces(time, q, v, derivatives);
+    };
     return;
   }
-  target.respond([this, time = force_time(state.time, dt)](const VectorX& q, const VectorX& v, bool derivatives) {
-    return custom_forces(time, q, v, derivatives);
-  });
+  if (force_function) find_custom_force_of_step(dt, out);
+  put_custom_force(out);
 }
 
 /// In balance, whatever moves towards it, velocities are zero.
-void World::Implementation::solve_for_custom_at_rest(Equations& target, double time) {
+void World::Implementation::prescribe_custom_at_rest(double time, Prescribed& out) {
+  put_custom_force(out);
   if (!force_function) return;
-  target.respond([this, time](const VectorX& q, const VectorX& v, bool derivatives) {
+  out.respond = [this, time](const VectorX& q, const VectorX& v, bool derivatives) {
     CustomForces now = custom_forces(time, q, VectorX::Zero(v.size()), derivatives);
     now.by_velocity.resize(0, 0);
     return now;
-  });
+  };
 }
 
 /// Forces at the start of a step would feed a spring's oscillation, by 1 + (w dt)^2 / 2 a step. At q0 + (dt / 2) v0,
@@ -226,20 +242,20 @@ void World::Implementation::solve_for_custom_at_rest(Equations& target, double t
 /// and stable for a spring of frequency w < 2 / dt, however stiff the rod that it pulls at: its matrix has the
 /// determinant 1 and the trace 2 - (w dt)^2. Backward Euler's at the predicted end damp, for w < sqrt(4/3) / dt.
 /// Verlet's end is known.
-void World::Implementation::find_custom_force(Equations& target, double dt) {
+void World::Implementation::find_custom_force_of_step(double dt, Prescribed& out) {
   VectorX &q = work.z, &v = work.velocity;
   if (options.integrator == Integrator::verlet) {
-    if (!state.acceleration_current) ask_custom_force(target, state.time, state.q, state.v);
-    update_custom_force(target);
-    begin_verlet(target, parameters, dt, state, work);
-    ask_custom_force(target, state.time + dt, q, v);
+    if (!state.acceleration_current) find_custom_force(state.time, state.q, state.v);
+    put_custom_force(out);
+    begin_verlet(*equations, parameters, out, dt, state, work);
+    find_custom_force(state.time + dt, q, v);
     return;
   }
-  const Assembler& assembler = target.assembler();
+  const Assembler& assembler = equations->assembler();
   const double time = force_time(state.time, dt);
   const auto hold = [&] {
     assembler.project(v);
-    assembler.add_held_change(state.q, work.held.q, 1.0 / dt, v);
+    assembler.add_held_change(state.q, out.held.q, 1.0 / dt, v);
   };
   v = state.v;
   hold();
@@ -248,18 +264,11 @@ void World::Implementation::find_custom_force(Equations& target, double dt) {
     extrapolate_velocity(state, time, v);
     hold();
   }
-  ask_custom_force(target, time, q, v);
+  find_custom_force(time, q, v);
 }
 
-void World::Implementation::forget_custom(Equations& target, const MatrixX3& forces, const MatrixX3& moments) {
-  target.respond({});
-  custom_force = forces;
-  custom_moments = moments;
-  update_custom_force(target);
-}
-
-void World::Implementation::update_custom_force(Equations& target) const {
-  if (description.has_custom_force) target.set_custom(custom_force, custom_moments);
+void World::Implementation::put_custom_force(Prescribed& out) const {
+  if (description.has_custom_force) out.custom = applied_forces(model, custom_force, custom_moments);
 }
 
 }  // namespace withe

@@ -39,12 +39,17 @@ struct SupportMotion {
 
   /// Whether it is to be elsewhere at once, and no step has led it there yet.
   bool jumps() const { return shift.start == shift.end && position != to_position; }
+  SupportPose pose() const { return {position, rotation, fed}; }
+  SupportPose pose_at(double time) const;
+  void put(const SupportPose& pose);
 };
 
 /// Where an obstacle goes, and how it turns.
 struct ObstacleMotion {
   ObstacleWay from, to;
   Span shift, turn;
+
+  ObstacleWay at(double time) const;
 };
 
 /// What goes evenly from one value to another.

@@ -41,11 +41,11 @@ class Separation {
       state_.contact_stiffness.setConstant(state.contact_stiffness.size(), stiffness);
       state_.v.setZero();
       predictor_.clear();
-      work_.held = {state_.q, true};
+      prescribed_.held.q = state_.q;
       work_.newton.matrix = MatrixRecord{};
       work_.newton.guesses = GuessHistory{};
-      const bool done = implicit_step(equations_, newton_, options_, parameters_, {StepRule::backward_euler, dt, 0},
-                                      state_, predictor_, work_)
+      const bool done = implicit_step(equations_, newton_, options_, parameters_, prescribed_,
+                                      {StepRule::backward_euler, dt, 0}, state_, predictor_, work_)
                             .accepted;
       dt = done ? 1.0 : 0.25 * dt;
       if (done) stiffness = std::min(kStiffer * stiffness, stiff_);
@@ -155,6 +155,7 @@ class Separation {
   bool barred_ = false;
   Predictor predictor_;
   StepWorkspace work_;
+  Prescribed prescribed_;
   double soft_ = 0, stiff_ = 0;  ///< stiffness of contact at first and at most [N/m]
 };
 

@@ -100,7 +100,7 @@ bool World::Implementation::arrives(int support, const std::vector<bool>& told, 
   if (held.yields() || !motion.jumps()) return false;
   const Vector3 before = motion.position;
   motion.position = motion.to_position;
-  hold_now(there);
+  hold(support_poses(), there);
   for (const Constraint& c : model.constraints)
     for (int node : held.nodes)
       if (c.first == model.node_dof[at(node)] &&

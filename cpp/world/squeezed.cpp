@@ -12,9 +12,9 @@ namespace withe {
 
 /// Refuses a place of supports in which what they hold is inside something that does not yield either. `q`: where they
 /// shall be, and all else as it is.
-void World::Implementation::check_squeezed(Equations& system, const VectorX& q, double dt) {
+void World::Implementation::check_squeezed(Equations& system, const Prescribed& given, const VectorX& q, double dt) {
   if (!system.contact()) return;
-  system.begin(state, parameters, StepRule::statics, 0.0);
+  system.begin(state, parameters, StepRule::statics, 0.0, given);
   system.contact()->update(q);
   if (const Squeezed found = squeezed_contact(system, work.change, work.mean)) fail_squeezed(system, found, dt);
 }

@@ -262,7 +262,7 @@ void World::Implementation::take_back() {
 
 void World::Implementation::return_to_start() {
   static_cast<Moving&>(*this) = kept;
-  if (tape) tape->cut(taped, state, hand_poses());
+  if (tape) tape->cut(taped, state, support_poses());
   apply_ramps(state.time);
 }
 
@@ -321,9 +321,8 @@ void World::Implementation::ask_callback(double force_time, double end_time) {
     return;
   }
   if (!state.acceleration_current) {
-    if (force_function) ask_custom_force(*equations, state.time, state.q, state.v);
-    update_custom_force(*equations);
-    find_acceleration(*equations, parameters, end_time - state.time, state, work);
+    if (force_function) find_custom_force(state.time, state.q, state.v);
+    find_acceleration(*equations, parameters, at_rest(), end_time - state.time, state, work);
   }
   const bool planar = model.planar();
   callback(force_time, end_time);
@@ -337,22 +336,15 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
   const bool ramped = actuated();
   double actuation = 0.0;
   if (ramped) apply_ramps(middle, configuration(), actuation);
-  kept_motions = motions;
-  aim_supports(end);
+  prescribe(end, prescribed);
   Equations& system = *equations;
-  aim_obstacles(system, end);
-  aim_hands(system);
   const auto undo = [&] {
-    system.respond({});
-    release_obstacles(system);
-    release_hands(system);
-    motions = kept_motions;
     if (ramped) apply_ramps(start);
   };
   if (tape) check_tape();
   StepResult r;
   try {
-    solve_for_custom(system, dt);
+    prescribe_custom(dt, prescribed);
     r = step_by_rule(dt, slot);
     for (int tries = 0; r.too_deep && tries < kMostStiffenings; ++tries) {
       dissipated -= system.contact()->stiffen(state, false);
@@ -369,15 +361,13 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
     if (r.squeezed) fail_squeezed(system, r.squeezed, dt);
     return false;
   }
-  system.respond({});
-  release_obstacles(system);
-  release_hands(system);
+  for (std::size_t s = 0; s < motions.size(); ++s) motions[s].put(prescribed.supports[s]);
   const bool begins = part.first && slot == 0;
   if (tape) record_step(rule_of_step(), dt, begins);
   error = r.error;
   turned = std::max(turned, r.largest_turn);
-  held_turned = std::max(held_turned, work.held.turn);
-  if (rule_of_step() == StepRule::energy_momentum) held_turned = std::max(held_turned, work.held.spin);
+  held_turned = std::max(held_turned, prescribed.held.turn);
+  if (rule_of_step() == StepRule::energy_momentum) held_turned = std::max(held_turned, prescribed.held.spin);
   load_work += r.load_work;
   dissipated += r.dissipated;
   support_work += r.support_work;
@@ -393,9 +383,9 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
 StepRule World::Implementation::rule_of_step() const { return equation_options(options).rule; }
 
 StepResult World::Implementation::step_by_rule(double dt, int slot) {
-  update_custom_force(*equations);
-  if (options.integrator == Integrator::verlet) return verlet_step(*equations, parameters, dt, state, work);
-  return implicit_step(*equations, *newton, options, parameters, {rule_of_step(), dt, slot}, state, predictor, work);
+  if (options.integrator == Integrator::verlet) return verlet_step(*equations, parameters, prescribed, dt, state, work);
+  return implicit_step(*equations, *newton, options, parameters, prescribed, {rule_of_step(), dt, slot}, state,
+                       predictor, work);
 }
 
 /// The explicit scheme loses nothing in impacts.

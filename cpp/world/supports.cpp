@@ -222,7 +222,7 @@ void World::Implementation::make_frame_moments() {
   for (const Support& support : model.supports) {
     if (!support.active || support.frame < 0) continue;
     const int dof = model.frame_dof[at(support.frame)];
-    const Matrix3 J = cayley_spin((conserving() ? 0.5 : 1.0) * work.held.q.segment<3>(dof));
+    const Matrix3 J = cayley_spin((conserving() ? 0.5 : 1.0) * prescribed.held.q.segment<3>(dof));
     const Vector3 moment = reaction_residual.segment<3>(dof);
     reaction_residual.segment<3>(dof) = J.transpose().inverse() * moment;
   }

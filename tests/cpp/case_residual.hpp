@@ -25,10 +25,10 @@ struct CaseResidual {
         with(of.model, {.rule = under}) {
     begin();
   }
-  void begin() { with.begin(c.state, parameters, rule, interval); }
+  void begin() { with.begin(c.state, parameters, rule, interval, prescribed); }
   /// Hands go there in the step.
-  void aim(const std::vector<HandPose>& poses) {
-    if (with.hands()) with.hands()->aim(poses);
+  void move_hands(std::vector<SupportPose> poses) {
+    prescribed.supports = std::move(poses);
     begin();
   }
   VectorX operator()(const VectorX& q) {
@@ -51,6 +51,7 @@ struct CaseResidual {
   StepRule rule;
   double interval;
   Parameters parameters;
+  Prescribed prescribed;
   Equations with;
   StepData data;
 };

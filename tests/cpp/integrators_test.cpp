@@ -492,7 +492,7 @@ TEST(StableStep, IsTwoOverTheHighestFrequency) {
   parameters.lumped = true;
   const State state = initial_state(model);
   StepWorkspace work;
-  const double step = stable_step(equations, parameters, state, work);
+  const double step = stable_step(equations, parameters, Prescribed::nothing(), state, work);
   equations.begin(state, parameters, StepRule::statics, 0.0);
   equations.evaluate(state.q, true, nullptr, work.newton.data);
   // The same by a dense eigenproblem, by repeated multiplication of the dense matrix.
@@ -531,12 +531,13 @@ double growth(const RodMaterial& material, double of_stable) {
   parameters.lumped = true;
   State state = initial_state(model);
   StepWorkspace work;
-  const double dt = of_stable * stable_step(equations, parameters, state, work);
-  work.held.q = state.q;
+  const double dt = of_stable * stable_step(equations, parameters, Prescribed::nothing(), state, work);
+  Prescribed prescribed;
+  prescribed.held.q = state.q;
   state.v = 1e-10 * testing::RandomNumbers(4).vector(model.dof_count);
   const double before = state.v.norm();
   for (int k = 0; k < 1000; ++k)
-    if (!verlet_step(equations, parameters, dt, state, work).accepted) return INFINITY;
+    if (!verlet_step(equations, parameters, prescribed, dt, state, work).accepted) return INFINITY;
   return state.v.norm() / before;
 }
 

@@ -82,8 +82,8 @@ std::vector<Case> all_cases(double force_limit = INFINITY) {
 }
 
 /// Hands turn by an angle in the step, and move.
-std::vector<HandPose> turned_hands(const Case& c, double angle) {
-  std::vector<HandPose> poses;
+std::vector<SupportPose> turned_hands(const Case& c, double angle) {
+  std::vector<SupportPose> poses;
   const Vector3 axis = c.model.planar() ? c.model.plane->normal : Vector3(0.6, 0.0, 0.8);
   for (const HandState& hand : c.state.hands)
     poses.push_back({hand.position + Vector3(0.02, 0.0, 0.0), rotation_exp(angle * axis) * hand.rotation});
@@ -97,7 +97,7 @@ TEST(HandForces, MatrixIsTheDerivativeOfTheResidualUnderEveryRuleHeldOrSlipping)
         if (rule == StepRule::energy_momentum && c.q == c.state.q)
           c.q += 10.0 * c.increment * RandomNumbers(8).vector(c.q.size());
         CaseResidual residual(c, rule);
-        residual.aim(turned_hands(c, 0.3));
+        residual.move_hands(turned_hands(c, 0.3));
         const MatrixX J = residual.matrix(c.q);
         EXPECT_TRUE(derivative_matches([&](const VectorX& q) { return residual(q); }, c.q, J, 0.3 * c.increment))
             << c.name << ", rule " << static_cast<int>(rule) << ", limit " << limit;
@@ -127,7 +127,7 @@ struct Varied {
       hand.position += vector();
       hand.rotation = rotation_exp(vector()) * hand.rotation;
       const Vector3 shift = vector(), turn = vector();
-      poses.push_back({to + shift, rotation_exp(turn) * turned});
+      prescribed.supports.push_back({to + shift, rotation_exp(turn) * turned});
       HandDescription& own = c.model.supports[s].description.hand;
       for (double& k : own.stiffness) k *= 1.0 + numbers(next++);
       own.force_limit *= 1.0 + numbers(next++);
@@ -144,8 +144,7 @@ struct Varied {
   void evaluate(const VectorX& z, StepData& data) {
     parameters = initial_parameters(c.model);
     equations = std::make_unique<Equations>(c.model, EquationOptions{.rule = rule, .exact = true});
-    equations->hands()->aim(poses);
-    equations->begin(c.state, parameters, rule, rule == StepRule::statics ? 0.0 : 0.3);
+    equations->begin(c.state, parameters, rule, rule == StepRule::statics ? 0.0 : 0.3, prescribed);
     equations->evaluate(z, false, nullptr, data);
   }
   VectorX slips(const VectorX& q1) const {
@@ -153,7 +152,7 @@ struct Varied {
     Configuration configuration;
     compute_configuration(c.model, c.state, q1, configuration);
     after.q = q1;
-    equations->hands()->accept(configuration, after);
+    equations->hands()->accept(prescribed.supports, configuration, after);
     std::vector<double> out;
     for (const HandState& hand : after.hands)
       for (const Vector3& slip : hand.slip) out.insert(out.end(), {slip.x(), slip.y(), slip.z()});
@@ -183,7 +182,7 @@ struct Varied {
 
   Case c;
   StepRule rule;
-  std::vector<HandPose> poses;
+  Prescribed prescribed;
   Parameters parameters;
   std::unique_ptr<Equations> equations;
 };

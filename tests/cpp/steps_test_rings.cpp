@@ -67,8 +67,8 @@ std::vector<Case> cases(bool planar, Along along) {
 }
 
 /// Rings move within the step, and their drives feed.
-std::vector<HandPose> moved_rings(const Case& c) {
-  std::vector<HandPose> poses;
+std::vector<SupportPose> moved_rings(const Case& c) {
+  std::vector<SupportPose> poses;
   for (const HandState& hand : c.state.hands)
     poses.push_back({hand.position + 0.02 * (c.model.planar() ? c.model.plane->first : Vector3(0.6, 0.0, 0.8)),
                      hand.rotation, 0.03});
@@ -130,7 +130,7 @@ TEST(RingForces, MatrixIsTheDerivativeOfTheResidualUnderEveryRule) {
           // Within the pieces that rings are on, where the matrix of an energy-momentum step is exact.
           if (rule == StepRule::energy_momentum) c.q = c.state.q + 3e-3 * RandomNumbers(8).vector(c.q.size());
           CaseResidual residual(c, rule);
-          residual.aim(moved_rings(c));
+          residual.move_hands(moved_rings(c));
           const MatrixX J = residual.matrix(c.q);
           EXPECT_TRUE(derivative_matches([&](const VectorX& q) { return residual(q); }, c.q, J, 0.1 * c.increment))
               << c.name << ", rule " << static_cast<int>(rule) << ", along " << static_cast<int>(along);
@@ -158,8 +158,8 @@ TEST(RingForces, EnergyMomentumStepsBalanceEnergyHoweverFarTheRodSlides) {
           const VectorX change = size * RandomNumbers(9).vector(c.q.size());
           c.q = c.state.q + 0.5 * change;
           CaseResidual with(c, StepRule::energy_momentum);
-          const std::vector<HandPose> poses = moved_rings(c);
-          with.aim(poses);
+          const std::vector<SupportPose> poses = moved_rings(c);
+          with.move_hands(poses);
           const Case without = bare(c);
           CaseResidual rest(without, StepRule::energy_momentum);
           const VectorX forces = with(c.q) - rest(c.q), q1 = c.state.q + change;
@@ -175,11 +175,10 @@ TEST(RingForces, EnergyMomentumStepsBalanceEnergyHoweverFarTheRodSlides) {
           State after = c.state;
           after.q = q1;
           const RingForces& rings = with.with.hands()->rings();
-          const double lost = rings.dissipated(with.with.problem(), poses, c.q),
-                       done = rings.work(with.with.problem(), poses, q1);
+          const double lost = rings.dissipated(with.with.problem(), c.q), done = rings.work(with.with.problem(), q1);
           const double before = energy(c.state);
           compute_configuration(c.model, after, q1, configuration);
-          with.with.hands()->accept(configuration, after);
+          with.with.hands()->accept(poses, configuration, after);
           EXPECT_NEAR(energy(after) - before + lost, done + work, 1e-14 + 1e-12 * std::abs(work))
               << c.name << ", along " << static_cast<int>(along) << ", size " << size;
         }
