@@ -156,9 +156,10 @@ void exchange(Archive& io, Moving& moving) {
 }
 
 template <class Archive>
-void exchange(Archive& io, StepControl& control) {
-  auto& [level, easy_steps, patience, grown, error_rate, mean_step, event_reserve, grid_origin, grid_steps, steps_taken,
-         contact_guard, step_watch, first_energy, greatest_kinetic] = control;
+void exchange(Archive& io, StepHistory& history) {
+  auto& [lengths, grid_origin, grid_steps, steps_taken, contact_guard, step_watch, first_energy, greatest_kinetic] =
+      history;
+  auto& [level, easy_steps, patience, grown, error_rate, mean_step, event_reserve] = lengths;
   io(level), io(easy_steps), io(patience), io(grown), io(error_rate), io(mean_step), io(event_reserve), io(grid_origin),
       io(grid_steps), io(steps_taken);
   auto& [greatest, gained, put_in] = contact_guard;
@@ -228,7 +229,7 @@ template <class Archive>
 void exchange(Archive& io, const Model& model, Running& running) {
   exchange(io, model, static_cast<Settings&>(running));
   exchange(io, static_cast<Moving&>(running));
-  exchange(io, static_cast<StepControl&>(running));
+  exchange(io, static_cast<StepHistory&>(running));
   exchange(io, static_cast<Found&>(running));
 }
 

@@ -68,7 +68,8 @@ struct World::Implementation : Running {
   bool newly_set = false;
   MatrixRecord marked_matrix;
   GuessHistory marked_guesses;
-  StepControl marked_control;
+  StepHistory marked_history;
+  Division division;                   ///< of the present time step
   Moving kept;                         ///< at the start of a step that may be taken back
   double turned = 0, held_turned = 0;  ///< of an edge, of a held frame in the last step at most [rad]
   /// Of steps that were cut for them, until one is accepted: `held_turned` over its most, way of an obstacle [m].
@@ -213,31 +214,12 @@ struct World::Implementation : Running {
   Wrench hand_reaction(int hand, const VectorX& held) const;
 
   // stepping.cpp
-  enum class Attempt { failed, gained_energy, inaccurate, hard, easy };
-  /// Equal parts in which the rest of a time step, from a fraction of it on, is taken.
-  struct Division {
-    double from = 0.0;
-    long parts = 1, done = 0;
-    double reached() const { return from + (1.0 - from) * (static_cast<double>(done) / static_cast<double>(parts)); }
-  };
-  /// Which part of a time step is being taken.
-  struct Part {
-    bool first = true, only = true;
-  } part;
   void advance(double duration);
   void advance_in_parts(double duration);
-  [[noreturn]] void fail_error_control(long tries, double duration, double base) const;
-  bool may_cut() const;
-  int levels_per_halving() const;
-  void divide_rest(Division& division) const;
-  void cut(Attempt why, Division& division, double dt);
-  bool grow(Attempt attempt, double dt);
-  double local_order() const;
-  double allowed_error(double dt) const;
-  bool bears_event(double error, double dt) const;
-  void account_for_error(double error, double dt);
-  bool may_grow(double dt, double times) const;
-  Attempt try_step(double dt);
+  /// Shares of the time step: that of the next part, and that taken in so many tries.
+  [[noreturn]] void fail_error_control(long tries, double duration, double share_of_part, double share_taken) const;
+  [[noreturn]] void fail_step(Verdict why, double dt) const;
+  Verdict try_step(const StepControl& control, double dt);
   void take_back();
   void commit_step();
   void return_to_start();

@@ -66,7 +66,7 @@ void World::Implementation::factorize_again(System which) {
 }
 
 void World::Implementation::mark() {
-  marked_control = *this;
+  marked_history = *this;
   marked_matrix = work.newton.matrix;
   marked_guesses = work.newton.guesses;
   for (const System which : kSystems)
@@ -74,7 +74,7 @@ void World::Implementation::mark() {
 }
 
 void World::Implementation::return_to_mark() {
-  static_cast<StepControl&>(*this) = marked_control;
+  static_cast<StepHistory&>(*this) = marked_history;
   if (!equations->marked()) {  // made anew since, for other supports or outside of a plane
     forget_matrix();
     return;

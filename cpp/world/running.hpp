@@ -9,6 +9,7 @@
 
 #include "integrators/dynamics.hpp"
 #include "model/actuation.hpp"
+#include "run/step_control.hpp"
 #include "world/world.hpp"
 
 namespace withe {
@@ -98,9 +99,6 @@ struct StepWatch {
   VectorX acceleration;  ///< in the step before
 };
 
-/// Easy steps before longer ones are tried, at least.
-inline constexpr int kLeastPatience = 4;
-
 /// What only the user changes, and what is on its way to where the user wants it.
 struct Settings {
   Parameters parameters;
@@ -122,16 +120,10 @@ struct Moving {
   double impulse_time = 0;
 };
 
-/// By what the next step is chosen and judged.
-struct StepControl {
-  int level = 0;                  ///< present halvings of the time step, in `levels_per_halving()` to each
-  int easy_steps = 0;             ///< since it changed
-  int patience = kLeastPatience;  ///< of them before longer steps are tried
-  bool grown = false;             ///< fewer easy steps than the least patience ago
-  double error_rate = 0;  ///< greatest estimated error of the last steps over the power of the step that it goes with
-  double mean_step = 0;   ///< under error control, over some of the last steps, weighed by their lengths [s]
-  double event_reserve = 1;  ///< of the error that events such as impacts may make beyond their time, what is left [-]
-  double grid_origin = 0;    ///< time = grid_origin + grid_steps time_step after whole steps, free of summed rounding
+/// What the next steps are chosen and judged by.
+struct StepHistory {
+  StepLengths lengths;
+  double grid_origin = 0;  ///< time = grid_origin + grid_steps time_step after whole steps, free of summed rounding
   std::int64_t grid_steps = 0;
   std::int64_t steps_taken = 0;  ///< inner steps accepted since the scene was built
   ContactGuard contact_guard;
@@ -152,7 +144,7 @@ struct Found {
   bool reaction_current = false;
 };
 
-struct Running : Settings, Moving, StepControl, Found {};
+struct Running : Settings, Moving, StepHistory, Found {};
 
 /// Systems of equations that a scene may have.
 enum class System { scheme, statics };

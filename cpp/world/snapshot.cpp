@@ -308,8 +308,9 @@ void restore_loads(const std::vector<LoadDescription>& added, World::Implementat
 
 /// Refuses values that no simulation would have left.
 void check_running(const World::Implementation& self) {
-  require(self.level >= 0 && self.level <= self.levels_per_halving() * self.options.max_halvings &&
-              self.easy_steps >= 0 && self.patience >= 1 && self.easy_steps <= self.patience,
+  const StepLengths& lengths = self.lengths;
+  require(lengths.level >= 0 && lengths.level <= StepControl(self.options).deepest_level() && lengths.easy_steps >= 0 &&
+              lengths.patience >= 1 && lengths.easy_steps <= lengths.patience,
           "snapshot is damaged: impossible step size");
   require(self.state.q.allFinite() && self.state.v.allFinite(), "snapshot is damaged: not finite");
   require(std::isfinite(self.parameters.fluid_viscosity) && self.parameters.fluid_viscosity >= 0.0,

@@ -11,8 +11,6 @@ namespace {
 
 // Times that contact may be made stiffer before a step counts as failed.
 constexpr int kMostStiffenings = 4;
-// Easy steps before longer ones are tried, at most.
-constexpr int kMostPatience = 64;
 // Inner steps times nodes that error control may take in one time step by default: about half a minute on one core.
 constexpr double kMaxWork = 3e7;
 // Steps from one look at how well the mesh resolves the motion to the next, and at the energy, which costs a step.
@@ -22,9 +20,6 @@ constexpr int kResolutionPeriod = 64, kEnergyPeriod = 16;
 // In energy-momentum steps edges that turn by w have the rate 2 tan(w / 2) / dt. Parts of fourth-order steps twist
 // there and back, and so turn by less.
 constexpr double kMostHeldTurn = 0.25, kMostHeldTurnOfPart = 0.15;
-// Share of the tolerance that is kept for events, and of the duration, over what steps are averaged.
-constexpr double kEventShare = 0.2, kAverage = 1.0 / 64.0;
-
 /// Whether cutting a step lessened something: not where a function of the user's jumps within it, by as much in a
 /// shorter one.
 bool lessens(double now, double before) { return before == 0.0 || now < 0.9 * before; }
@@ -39,10 +34,6 @@ void World::Implementation::advance(double duration) {
   begin_crossing_watch();
   motions_before = motions;
   mark();
-  if (!options.adaptive && !options.tolerance) level = 0;
-  // Without a step before there is no estimate, so error control begins with a step too small to need one.
-  if (options.tolerance && predictor.empty())
-    level = std::max(level, levels_per_halving() * std::min(options.max_halvings, 8));
   spread_jumps(duration);
   try {
     advance_in_parts(duration);
@@ -65,148 +56,61 @@ void World::Implementation::advance(double duration) {
 
 void World::Implementation::advance_in_parts(double duration) {
   const double base = state.time;
-  Division division;
-  divide_rest(division);
+  const StepControl control(options);
+  StepProgress progress = control.begin(lengths, !predictor.empty());
   cut_turn = cut_way = 0.0;
   const long max_steps = options.max_steps.value_or(std::lround(kMaxWork / model.node_count));
-  for (long tries = 0;; ++tries) {
+  for (long tries = 0; !progress.division.finished(); ++tries) {
     work.newton.poll();
-    if (options.tolerance && tries >= max_steps) fail_error_control(tries, duration, base);
-    const double dt = duration * ((1.0 - division.from) / static_cast<double>(division.parts));
-    part = {division.from == 0.0 && division.done == 0,
-            division.from == 0.0 && division.parts == 1 && options.integrator != Integrator::fourth_order};
-    const Attempt attempt = try_step(dt);
-    if (attempt != Attempt::easy && attempt != Attempt::hard) {
-      cut(attempt, division, dt);
-      continue;
+    lengths = progress.lengths;
+    division = progress.division;
+    if (options.tolerance && tries >= max_steps)
+      fail_error_control(tries, duration, control.share_at(lengths.level), (state.time - base) / duration);
+    const double dt = duration * division.share();
+    const Verdict verdict = try_step(control, dt);
+    progress.lengths = lengths;
+    if (accepts(verdict)) {
+      progress = control.advance(progress, verdict, dt);
+      const bool finished = progress.division.finished();
+      state.time = finished ? base + duration : base + duration * progress.division.reached();
+    } else if (control.may_subdivide(lengths)) {
+      progress = control.subdivide(progress, verdict);
+    } else {
+      fail_step(verdict, dt);
     }
-    ++division.done;
-    const bool finished = division.done == division.parts;
-    state.time = finished ? base + duration : base + duration * division.reached();
-    const bool grown = grow(attempt, dt);
-    if (finished) break;
-    if (grown) divide_rest(division);
   }
+  lengths = progress.lengths;
 }
 
-void World::Implementation::fail_error_control(long tries, double duration, double base) const {
-  fail(NewtonResult{}, duration / std::exp2(static_cast<double>(level) / levels_per_halving()),
-       "error control has taken " + std::to_string(tries) + " inner steps for " +
-           text(100.0 * (state.time - base) / duration, 3) + " % of one time_step of " + text(duration) + " s",
+void World::Implementation::fail_error_control(long tries, double duration, double share_of_part,
+                                               double share_taken) const {
+  fail(NewtonResult{}, duration * share_of_part,
+       "error control has taken " + std::to_string(tries) + " inner steps for " + text(100.0 * share_taken, 3) +
+           " % of one time_step of " + text(duration) + " s",
        "Undamped motion of high frequency needs steps as short as its period: use a larger tolerance, viscosity of the "
        "material, integrator='backward_euler', or a greater max_steps");
 }
 
-/// Steps change by powers of two and rarely, or symmetry and energy suffer; under error control, whose error would
-/// change by four, by the fourth root of two.
-int World::Implementation::levels_per_halving() const { return options.tolerance ? 4 : 1; }
-
-/// What is left of a time step, in equal parts no longer than `level` says.
-void World::Implementation::divide_rest(Division& division) const {
-  division.from = division.reached();
-  const double wanted = std::exp2(static_cast<double>(level) / levels_per_halving());
-  division.parts = std::max(1L, static_cast<long>(std::ceil((1.0 - division.from) * wanted - 1e-9)));
-  division.done = 0;
-}
-
-bool World::Implementation::may_cut() const {
-  return (options.adaptive || options.tolerance) && level < levels_per_halving() * options.max_halvings &&
-         options.integrator != Integrator::verlet;
-}
-
-/// After a step of dt that was not accepted: shorter ones next, or the end.
-void World::Implementation::cut(Attempt why, Division& division, double dt) {
-  if (!may_cut())
-    fail(last_newton, dt,
-         options.integrator == Integrator::verlet ? "the explicit step broke down"
-         : why == Attempt::gained_energy          ? "the step gains energy from nowhere"
-         : why == Attempt::inaccurate             ? "the smallest step misses the tolerance"
-                                                  : "the step did not converge",
-         why == Attempt::inaccurate      ? "Try a larger tolerance, or more max_halvings"
-         : why == Attempt::gained_energy ? "Try a smaller time_step, or integrator='energy_momentum'"
-                                         : "");
-  const long left = division.parts - division.done;
-  level = std::min(level + (why == Attempt::inaccurate ? (levels_per_halving() + 1) / 2 : levels_per_halving()),
-                   levels_per_halving() * options.max_halvings);
-  for (divide_rest(division); division.parts <= left && may_cut(); divide_rest(division)) ++level;
-  if (why == Attempt::gained_energy && grown) patience = std::min(2 * patience, kMostPatience);
-  grown = false;
-  easy_steps = 0;
-}
-
-/// Steps grow back after a few that had more accuracy than was asked for; where they then gain energy at once, after
-/// twice as many the next time. Whether they do.
-bool World::Implementation::grow(Attempt attempt, double dt) {
-  if (attempt != Attempt::easy) {
-    easy_steps = 0;
-    return false;
-  }
-  if (level == 0 && !grown) return false;
-  ++easy_steps;
-  if (grown && easy_steps >= kLeastPatience) {
-    patience = std::max(patience / 2, kLeastPatience);
-    grown = false;
-  }
-  if (level == 0 || easy_steps < patience) return false;
-  easy_steps = 0;
-  grown = true;
-  int up = levels_per_halving();
-  while (up > 1 && !may_grow(dt, std::exp2(static_cast<double>(up) / levels_per_halving()))) --up;
-  level = std::max(0, level - up);
-  return true;
-}
-
-/// Power of a step's length that its error goes with.
-double World::Implementation::local_order() const {
-  switch (options.integrator) {
-    case Integrator::backward_euler:
-      return 2.0;
-    case Integrator::fourth_order:
-      return 5.0;
-    default:
-      return 3.0;
-  }
-}
-
-/// Error that is allowed in a step of dt [m]: its part of what is allowed over the duration.
-double World::Implementation::allowed_error(double dt) const {
-  if (!options.tolerance) return INFINITY;
-  return (1.0 - kEventShare) * *options.tolerance * dt / options.duration.value_or(1.0);
-}
-
-/// Most steps go by the error per unit of time. In an impact that would cost far more steps than it is worth: of all
-/// ways to make the same error in sum, equal errors in every step take the fewest. So an event may make as great an
-/// error in a step as the steps around it make on average, as long as what it makes beyond its time is left in a share
-/// of the tolerance that is kept for that, and that time brings back.
-bool World::Implementation::bears_event(double error, double dt) const {
-  const double excess = error - allowed_error(dt);
-  return error <= allowed_error(mean_step) && excess <= event_reserve * kEventShare * *options.tolerance;
-}
-
-void World::Implementation::account_for_error(double error, double dt) {
-  const double duration = options.duration.value_or(1.0);
-  const double excess = std::max(error - allowed_error(dt), 0.0);
-  event_reserve = std::min(1.0, event_reserve - excess / (kEventShare * *options.tolerance) + dt / duration);
-  mean_step -= (dt - mean_step) * std::expm1(-dt / (kAverage * duration));
-}
-
-/// Whether a step of dt `times` longer would be accurate enough, the tolerance too growing with it.
-bool World::Implementation::may_grow(double dt, double times) const {
-  if (!options.tolerance) return true;
-  const double allowed = allowed_error(dt);
-  return error_rate * std::pow(times * dt, local_order()) < 0.8 * times * allowed;
+void World::Implementation::fail_step(Verdict why, double dt) const {
+  fail(last_newton, dt,
+       options.integrator == Integrator::verlet ? "the explicit step broke down"
+       : why == Verdict::gained_energy          ? "the step gains energy from nowhere"
+       : why == Verdict::inaccurate             ? "the smallest step misses the tolerance"
+                                                : "the step did not converge",
+       why == Verdict::inaccurate      ? "Try a larger tolerance, or more max_halvings"
+       : why == Verdict::gained_energy ? "Try a smaller time_step, or integrator='energy_momentum'"
+                                       : "");
 }
 
 /// One step of dt, taken back where it gains energy from nowhere or is not accurate enough.
-World::Implementation::Attempt World::Implementation::try_step(double dt) {
+Verdict World::Implementation::try_step(const StepControl& control, double dt) {
   const bool fourth = options.integrator == Integrator::fourth_order;
   const bool euler = options.adaptive && options.integrator == Integrator::backward_euler;
   const bool watched = options.adaptive && equations->contact() && options.integrator != Integrator::verlet;
   const bool keeps = watched || euler || options.tolerance || fourth || turns_rods();
   if (keeps) kept = *this;
   if (tape) taped = tape->count();
-  const double allowed = allowed_error(dt);
-  work.newton.finest = 0.01 * allowed;  // so that what Newton leaves is no part of the error
+  work.newton.finest = 0.01 * control.allowed_error(dt);  // so that what Newton leaves is no part of the error
   double error = 0.0;
   bool done = false;
   try {
@@ -217,12 +121,11 @@ World::Implementation::Attempt World::Implementation::try_step(double dt) {
   }
   if (!done) {
     statistics.rejected_steps += 1;
-    return Attempt::failed;
+    return Verdict::failed;
   }
-  const bool event = error > allowed;
-  if (event && !bears_event(error, dt)) {
+  if (!control.bears(lengths, error, dt)) {
     take_back();
-    return Attempt::inaccurate;
+    return Verdict::inaccurate;
   }
   Contact* contact = watched ? equations->contact() : nullptr;
   const double held_turn =
@@ -231,26 +134,22 @@ World::Implementation::Attempt World::Implementation::try_step(double dt) {
   const bool unresolved =
       (held_turn > 1.0 && lessens(held_turn, cut_turn)) ||
       (contact && ((contact->unresolved(dt) && lessens(way, cut_way)) || contact->missed(kept.state.q)));
-  if (unresolved && may_cut()) {
+  if (unresolved && control.may_subdivide(lengths)) {
     cut_turn = held_turn;
     cut_way = way;
     take_back();
-    return Attempt::inaccurate;
+    return Verdict::inaccurate;
   }
   if (!unresolved && ((euler && gains_under_pressure()) || (watched && contact_pumps(dt)))) {
     take_back();
-    return Attempt::gained_energy;
+    return Verdict::gained_energy;
   }
   watch_step(dt, *equations);
   commit_step();
-  if (options.tolerance) account_for_error(error, dt);
-  if (event || 2.5 * held_turn > 1.0 || (contact && contact->unresolved(2.0 * dt))) return Attempt::hard;
-  if (!options.tolerance) return Attempt::easy;
-  // An oscillation has no error twice a period: what counts is the greatest of the last steps, were they longer.
-  // Far below what is allowed an estimate is mostly rounding.
-  const double seen = error > 0.01 * allowed ? error / std::pow(dt, local_order()) : 0.0;
-  error_rate = std::max(seen, error_rate * (1.0 - 1.0 / 256.0));
-  return may_grow(dt, std::exp2(1.0 / levels_per_halving())) ? Attempt::easy : Attempt::hard;
+  const bool near_limit = 2.5 * held_turn > 1.0 || (contact && contact->unresolved(2.0 * dt));
+  const auto [after, verdict] = control.accept(lengths, error, dt, near_limit);
+  lengths = after;
+  return verdict;
 }
 
 /// Undoes an accepted step.
@@ -362,7 +261,7 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
     return false;
   }
   for (std::size_t s = 0; s < motions.size(); ++s) motions[s].put(prescribed.supports[s]);
-  const bool begins = part.first && slot == 0;
+  const bool begins = division.first() && slot == 0;
   if (tape) record_step(rule_of_step(), dt, begins);
   error = r.error;
   turned = std::max(turned, r.largest_turn);

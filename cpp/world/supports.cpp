@@ -201,7 +201,8 @@ void World::Implementation::keep_reactions(double dt, bool begins) {
     impulses.clear();
     impulse_time = 0.0;
   }
-  if (part.only || model.supports.empty()) return;
+  const bool only = division.whole() && options.integrator != Integrator::fourth_order;
+  if (only || model.supports.empty()) return;
   impulses.resize(model.supports.size());
   impulse_time += dt;
   VectorX& held = work.assumed;

@@ -1,0 +1,107 @@
+#pragma once
+/// Lengths of the parts in which a time step is taken, as pure functions of what is known: a part that is rejected is
+/// subdivided, and parts grow back after some that had more accuracy than was asked for.
+///
+/// Lengths change by powers of two and rarely, or symmetry and energy suffer; under error control, whose error would
+/// change by four, by the fourth root of two.
+///
+/// Error control bounds the error per unit of time, allowed(dt) = (1 - s) tolerance dt / duration. In an impact that
+/// would cost far more steps than it is worth: of all ways to make the same error in sum, equal errors in every step
+/// take the fewest. So an event may make as great an error in a step as the steps around it make on average, as long as
+/// what it makes beyond its time is left in a share s of the tolerance that is kept for events, and that time brings
+/// back. A step may grow where C (times dt)^p, C the greatest of the last errors over dt^p, is allowed.
+
+#include <optional>
+
+#include "integrators/options.hpp"
+
+namespace withe {
+
+/// Verdict on a part of a time step. The last two accept it.
+enum class Verdict {
+  failed,         ///< no solution was found
+  gained_energy,  ///< contact or pressure added energy
+  inaccurate,     ///< the error is too great, or the part too long for a motion or a contact
+  hard,           ///< longer parts would be rejected
+  easy,
+};
+constexpr bool accepts(Verdict verdict) { return verdict == Verdict::hard || verdict == Verdict::easy; }
+
+/// Easy parts before longer ones are tried, at least.
+inline constexpr int kLeastPatience = 4;
+
+/// What is remembered from part to part.
+struct StepLengths {
+  int level = 0;                  ///< present halvings of the time step, in `StepControl::levels_per_halving` to each
+  int easy_steps = 0;             ///< since the level changed
+  int patience = kLeastPatience;  ///< easy parts before longer ones are tried
+  bool grown = false;             ///< fewer easy parts than the least patience ago
+  double error_rate = 0;          ///< C, greatest estimated error of the last parts over dt^p [m / s^p]
+  double mean_step = 0;           ///< under error control, over some of the last parts, weighed by their lengths [s]
+  double event_reserve = 1;       ///< share that is left of the error that events may make beyond their time [-]
+};
+
+/// Equal parts in which the rest of a time step is taken, from a fraction of it on.
+struct Division {
+  double from = 0.0;
+  long parts = 1, done = 0;
+
+  /// Fraction of the time step that has been taken.
+  double reached() const { return from + (1.0 - from) * (static_cast<double>(done) / static_cast<double>(parts)); }
+  bool finished() const { return done == parts; }
+  bool first() const { return from == 0.0 && done == 0; }
+  bool whole() const { return from == 0.0 && parts == 1; }
+  /// Length of a part over that of the time step.
+  double share() const { return (1.0 - from) / static_cast<double>(parts); }
+};
+
+struct StepProgress {
+  StepLengths lengths;
+  Division division;
+};
+
+class StepControl {
+ public:
+  explicit StepControl(const Options& options);
+
+  /// Parts at the start of a time step. `has_history`: parts were taken before, from which errors are estimated; else
+  /// error control begins with a part too short to need an estimate.
+  StepProgress begin(StepLengths lengths, bool has_history) const;
+  /// True if shorter parts may follow a rejected one.
+  bool may_subdivide(const StepLengths& lengths) const;
+  /// Parts after a rejected one, where `may_subdivide`.
+  StepProgress subdivide(StepProgress now, Verdict why) const;
+  /// Parts after an accepted one of dt.
+  StepProgress advance(StepProgress now, Verdict verdict, double dt) const;
+
+  /// Error that is allowed in a part of dt [m]; infinite without error control.
+  double allowed_error(double dt) const;
+  /// True if a part of dt may have the error, as every part may or as an event.
+  bool bears(const StepLengths& lengths, double error, double dt) const;
+  /// Lengths after an accepted part of dt with an error, and the verdict on it. `near_limit`: a longer part would be
+  /// rejected for another reason.
+  struct Accepted {
+    StepLengths lengths;
+    Verdict verdict = Verdict::easy;
+  };
+  Accepted accept(StepLengths lengths, double error, double dt, bool near_limit) const;
+
+  int levels_per_halving() const { return tolerance_ ? 4 : 1; }
+  int deepest_level() const { return levels_per_halving() * max_halvings_; }
+  /// Length of parts at a level over that of the time step.
+  double share_at(int level) const;
+
+ private:
+  /// The rest of a time step in parts no longer than `level` has them.
+  Division divided(const Division& division, int level) const;
+  bool may_grow(const StepLengths& lengths, double dt, double times) const;
+  StepProgress grown(StepProgress now, double dt) const;
+
+  bool adaptive_, explicit_;
+  int max_halvings_;
+  double order_;  ///< p
+  std::optional<double> tolerance_;
+  double duration_;
+};
+
+}  // namespace withe
