@@ -30,7 +30,7 @@ PYTHON_SOURCES := $(shell find python/withe -name '*.py' -o -name '*.pyi' -o -na
 # Folders too: a deleted file is a change.
 SOURCE_FOLDERS := $(wildcard cpp/*/) $(shell find python/withe -type d -not -name __pycache__)
 
-.PHONY: help demo view learn test ctest-build ctest ctest-baseline pytest asan tsan asan-python bench wheel lint format format-check types stubs stub-check \
+.PHONY: help demo view learn test ctest-build ctest ctest-baseline pytest asan tsan asan-python bench wheel lint format format-check prose types stubs stub-check \
     tidy tidy-changed clean distclean
 
 help:
@@ -46,6 +46,7 @@ help:
 	@echo "make wheel         dist/*.whl for machines without compiler"
 	@echo "make bench         all benchmarks (about an hour); NAME=work_precision runs one"
 	@echo "make lint          ruff; make format applies formatters, make format-check only looks"
+	@echo "make prose         house style of the prose on lines that changed since BASE="
 	@echo "make types         mypy --strict"
 	@echo "make stubs         regenerate the stubs of the compiled module (make stub-check compares)"
 	@echo "make tidy          clang-tidy over every C++ file; make tidy-changed over those changed since BASE="
@@ -171,6 +172,9 @@ format: $(STAMPS)/dev_tools
 format-check: $(STAMPS)/dev_tools
 	@ruff format --check .
 	@clang-format --dry-run --Werror $(CXX_FILES)
+
+prose: $(STAMPS)/venv
+	@python tools/prose_lint.py --changed $(BASE)
 
 types: $(STAMPS)/dev_tools
 	@mypy

@@ -1,0 +1,9 @@
+/// True if the rod touches, that is if a gap is below 0.07 mm.
+bool touches = false;
+constexpr int kPoints[] = {.5, 1'000};  // points of a rule of order 3.5, see file.7z and version v.2
+
+// The tip's distance from the wall. A second sentence follows here, after the first one, so that the whole comment has
+// more than thirty-five words. No sentence of it has that many, however, because each sentence ends before it comes to
+// so great a length.
+double distance = .5;
+const char* format = "{:.3f} and then %.5g m";
