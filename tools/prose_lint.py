@@ -151,7 +151,8 @@ def paragraphs_of(passage: Passage) -> Iterator[Lines]:
     in_fence = in_doctest = False
     if passage.kind == "message":
         words = sum(bool(SPOKEN.search(word)) for _, row in passage.lines for word in row.split())
-        if words >= MIN_MESSAGE_WORDS and not passage.lines[0][1].startswith("<"):  # markup is no prose
+        is_markup = "".join(row for _, row in passage.lines).lstrip().startswith("<")
+        if words >= MIN_MESSAGE_WORDS and not is_markup:
             yield [(number, PLACEHOLDER.sub("{}", row).replace("\\n", " ")) for number, row in passage.lines]
         return
     for index, (number, raw) in enumerate(passage.lines):

@@ -68,10 +68,10 @@ def git(folder, *arguments):
 def test_only_changed_lines_are_judged_when_asked(prose_lint, tmp_path, monkeypatch, capsys):
     git(tmp_path, "init", "--quiet")
     file = tmp_path / "notes.md"
-    file.write_text("In .4 ms.\n\nIt says so.\n")
+    file.write_text("In .4 ms.\n\n" + "It says so.\n")
     git(tmp_path, "add", "notes.md")
     git(tmp_path, "commit", "--quiet", "-m", "Begin")
-    file.write_text("In .4 ms.\n\nShe says so.\n")
+    file.write_text("In .4 ms.\n\n" + "She says so.\n")
     (tmp_path / "new.md").write_text("In .2 ms.\n")
     monkeypatch.setattr(prose_lint, "ROOT", tmp_path)
     monkeypatch.setattr(sys, "argv", ["prose_lint.py", "--changed", "HEAD"])
