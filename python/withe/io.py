@@ -54,7 +54,9 @@ def written_beside(path: Path) -> Iterator[Path]:
         The file cannot be written, or a device or a pipe has its name; the error names `path`, and says why.
     """
     if path.exists() and not path.is_file() and not path.is_dir():  # a user who may would lose /dev/full
-        raise OSError(errno.EINVAL, "no file takes the place of a device or a pipe; give another path than", f"{path}")
+        raise OSError(
+            errno.EINVAL, "file cannot take the place of a device or a pipe: give another path than", f"{path}"
+        )
     # Not made of the file's name, which may be as long as the system allows.
     temporary = path.with_name(f".withe-{uuid.uuid4().hex}.part{path.suffix[:8]}")
     try:

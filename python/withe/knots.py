@@ -134,7 +134,7 @@ def overhand_knot(
         low, high = (middle, high) if excess(middle) < shortening else (low, middle)
     tail = 0.5 * (length - shortening - braid)
     if tail <= 4.0 * braid_radius:
-        raise ValueError(f"length of the rod must leave tails beside the braid: {length:g} m is too short")
+        raise ValueError(f"length of the rod must leave tails beside the braid, got {length:g} m, which is too short")
     return _even(whole(low, tail), _node_count(nodes, length, radius), length, braid_radius)
 
 
@@ -431,7 +431,7 @@ def _polygon(points: npt.ArrayLike, least: int, closed: bool) -> FloatArray:
     if not closed:
         moves[:1] = True
     if moves.sum() < least:
-        raise ValueError(f"points must be at least {least} different ones in a row, got {moves.sum()}")
+        raise ValueError(f"points must have at least {least} different rows, got {moves.sum()}")
     return given[moves]
 
 

@@ -47,7 +47,7 @@ RODS = [
     (lambda: rod(radius=10**400), "radius of rod 'arm' must be finite"),
     (
         lambda: rod(end=(0.1, 0, 0), radius=5),
-        "radius of rod 'arm' must be no more than 10 times the length of the rod, 0.1 m, got 5 m: is all given in "
+        "radius of rod 'arm' must be no more than 10 times the length of the rod, 0.1 m, got 5 m: are all lengths in "
         "metres?",
     ),
     (lambda: rod(radius=[0.1, 0.1, 10.1, 0.1]), "radius of rod 'arm' must be no more than 10 times the length of the"),
@@ -83,7 +83,10 @@ RODS = [
     (lambda: from_points(np.zeros((4, 2))), "points of rod 'arm' must have shape (n, 3), got (4, 2)"),
     (lambda: from_points(np.zeros((4, 3))), "points of rod 'arm' must differ from each other"),
     (lambda: from_points([(0, 0, 0), (1, 0, 0), (1, 0, 0)]), "edge 1 has length 0"),
-    (lambda: from_points([(0, 0, 0), (1, 0, 0), (0.5, 0, 0)]), "points of rod 'arm' fold straight back after edge 0"),
+    (
+        lambda: from_points([(0, 0, 0), (1, 0, 0), (0.5, 0, 0)]),
+        "points of rod 'arm' must not fold straight back, but do after edge 0",
+    ),
     (lambda: from_points([[0, 0, 0], [1, 0]]), "points of rod 'arm' must be numbers of shape (n, 3)"),
     (lambda: from_points([(0, 0, 0), (1, 0, INF)]), "points of rod 'arm' must be finite, got inf at [1, 2]"),
     (lambda: from_points({"a": 1}), "points of rod 'arm' must be numbers"),
@@ -94,8 +97,8 @@ RODS = [
     (lambda: rod(material="rubber"), "material of rod 'arm' must be a withe.Material, got str"),
     (lambda: rod(stiffness=stiff()), "rod 'arm' must have either a material or a stiffness"),
     (lambda: rod(**STIFF, stiffness=3.0), "stiffness of rod 'arm' must be a withe.Stiffness, got float"),
-    (lambda: rod(material=None, stiffness=stiff()), "line_density of rod 'arm' must be given with a stiffness"),
-    (lambda: rod(line_density=1.0), "line_density of rod 'arm' must be given with a stiffness"),
+    (lambda: rod(material=None, stiffness=stiff()), "line_density of rod 'arm' must be given with stiffness="),
+    (lambda: rod(line_density=1.0), "line_density of rod 'arm' must be given with stiffness="),
     (lambda: rod(**STIFF, stiffness=stiff(stretch=0)), "stretch stiffness of rod 'arm' must be positive, got 0"),
     (lambda: rod(**STIFF, stiffness=stiff(bend=(1, -1))), "bend stiffness of rod 'arm' must be positive, got -1"),
     (
@@ -116,7 +119,7 @@ RODS = [
     (lambda: rod(natural_twist=NAN), "natural_twist of rod 'arm' must be finite, got nan"),
     (lambda: rod(name=""), "name of the rod must be printable text, got ''"),
     (lambda: rod(name=3), "name of the rod must be printable text, got 3"),
-    (lambda: rod(name="arm.end"), "name of the rod must not read like that of a node or edge"),
+    (lambda: rod(name="arm.end"), "name of the rod must not look like the name of a node or edge"),
 ]
 
 
@@ -163,8 +166,8 @@ SCENES = [
         lambda s, a, b: s.join(a.end, b.start, kind="glued"),
         "kind of the joint must be 'rigid' or 'pinned' or 'revolute'",
     ),
-    (lambda s, a, b: s.join(a.end, b.start, kind="revolute"), "axis of the joint must be given when kind='revolute'"),
-    (lambda s, a, b: s.join(a.end, b.start, axis=(0, 0, 1)), "axis of the joint must be given when kind='revolute'"),
+    (lambda s, a, b: s.join(a.end, b.start, kind="revolute"), "axis of the joint must be given for kind='revolute'"),
+    (lambda s, a, b: s.join(a.end, b.start, axis=(0, 0, 1)), "axis of the joint must be given for kind='revolute'"),
     (lambda s, a, b: s.join(a.end, b.start, kind="revolute", axis=(0, 0, 0)), "axis of the joint must not be zero"),
     (lambda s, a, b: s.join(a.end, b.start, kind="pinned", form="pairs"), "form of the joint must be 'frame' when"),
     (
@@ -181,7 +184,10 @@ SCENES = [
     (lambda s, a, b: s.clamp(a.start, hold="tight"), "hold of the clamp must be 'frame' or 'edge', got 'tight'"),
     (lambda s, a, b: s.clamp(a.start, free=(0, 0)), "free of the clamp must have shape (3,) or (1, 3) or (2, 3)"),
     (lambda s, a, b: s.pin(a.start, free=(0, 0, 0)), "free of the pin must not be zero"),
-    (lambda s, a, b: s.pin(a.start, free=[(0, 0, 1), (0, 0, 2)]), "free of the pin must be directions that differ"),
+    (
+        lambda s, a, b: s.pin(a.start, free=[(0, 0, 1), (0, 0, 2)]),
+        "free of the pin must be directions that are not parallel",
+    ),
     (lambda s, a, b: s.add_force(a.end, (0, 1)), "force 'force 1' must have shape (3,), got (2,)"),
     (
         lambda s, a, b: s.add_force(a.end, lambda t: NAN),
@@ -202,7 +208,7 @@ SCENES = [
     (lambda s, a, b: s.build(time_step=0), "time_step must be positive, got 0"),
     (lambda s, a, b: s.build(time_step=INF), "time_step must be finite, got inf"),
     (lambda s, a, b: s.build(tolerance=-1), "tolerance must be positive, got -1"),
-    (lambda s, a, b: s.build(duration=1), "duration must be given with a tolerance"),
+    (lambda s, a, b: s.build(duration=1), "duration needs a tolerance"),
     (lambda s, a, b: s.build(integrator="static", tolerance=1), "tolerance must be None with integrator='static'"),
     (lambda s, a, b: s.build(adaptive=0), "adaptive must be True or False, got 0"),
     (lambda s, a, b: s.build(planar="yes"), "planar must be True or False, got 'yes'"),
@@ -237,7 +243,7 @@ SIMULATIONS = [
     (lambda s, a: s.positions("leg"), "rod 'leg' is not in the scene, which has 'arm', 'wall'"),
     (lambda s, a: s.positions(a.end), "rod must not be a node or an edge, got 'arm.end'"),
     (lambda s, a: s.curvatures("wall"), "rod must be a rod, got the support 'wall'"),
-    (lambda s, a: s.reaction(a.end), "node 'arm.end' is not held: clamp or pin it first"),
+    (lambda s, a: s.reaction(a.end), "node 'arm.end' is not held: clamp or pin the node first"),
     (lambda s, a: s.reaction("arm"), "support must be a support, got the rod 'arm'"),
     (lambda s, a: s.release(a.end), "node 'arm.end' is not held"),
     (lambda s, a: s.clamp(a.start), "node 'arm.start' is already held by 'wall'"),
@@ -247,7 +253,7 @@ SIMULATIONS = [
     (lambda s, a: s.set_natural_twist(a, (1, 2)), "natural_twist of rod 'arm' must have shape (9,), got (2,)"),
     (lambda s, a: s.set_velocities(a, np.zeros((3, 3))), "velocities of rod 'arm' must have shape (11, 3) or (3,)"),
     (lambda s, a: s.set_velocities(a, (0, 0, NAN)), "velocities of rod 'arm' must be finite"),
-    (lambda s, a: s.set(a), "set must be given what to set"),
+    (lambda s, a: s.set(a), "set needs at least one parameter"),
     (lambda s, a: s.set(a, colour=3), "rod 'arm' has no 'colour' to set; it has youngs_modulus"),
     (lambda s, a: s.set(a, youngs_modulus=-1), "youngs_modulus of rod 'arm' must be positive, got -1"),
     (lambda s, a: s.set(a, poisson_ratio=2), "poisson_ratio of rod 'arm' must lie in (-1, 0.5], got 2"),
@@ -263,7 +269,7 @@ SIMULATIONS = [
     ),
     (lambda s, a: s.set(gravity=(0, np.ma.array([1.0], mask=True), 0)), "gravity must have a value everywhere"),
     (lambda s, a: s.run(5e-324), "duration must be long enough for the time_step, 0.005 s, got 4.94066e-324 s"),
-    (lambda s, a: s.get(a), "word must be given"),
+    (lambda s, a: s.get(a), "get needs a parameter"),
     (lambda s, a: s.move(a.end, (0, 0, 0)), "node 'arm.end' is not held"),
     (lambda s, a: s.move(a.start, (0, 0)), "position of support 'wall' must have shape (3,), got (2,)"),
     (lambda s, a: s.move(a.start, rotation=np.ones((3, 3))), "rotation of support 'wall' must be a rotation"),
@@ -274,13 +280,13 @@ SIMULATIONS = [
     (lambda s, a: s.move(a.start, rotation=np.eye(3), roll=1), "must not be given together with tangent or roll"),
     (lambda s, a: s.move(a.start, tangent=(0, 0, 0)), "tangent of support 'wall' must not be zero"),
     (lambda s, a: s.move(a.start, over=NAN), "over must be finite, got nan"),
-    (lambda s, a: s.move(a.start, (0, 0, 0), path=len), "path of support 'wall' must be given alone"),
+    (lambda s, a: s.move(a.start, (0, 0, 0), path=len), "path of support 'wall' must not be combined with position"),
     (
         lambda s, a: s.move(a.start, path=lambda t: "up"),
         "path of support 'wall' at t = 0 must be numbers of shape (3,)",
     ),
-    (lambda s, a: s.restore("s"), "snapshot must be a withe.Snapshot, got str"),
-    (lambda s, a: withe.run_many([s, s], 1.0), "simulations must differ: one is there twice"),
+    (lambda s, a: s.restore("s"), "snapshot must be a withe.Snapshot or a withe.Record, got str"),
+    (lambda s, a: withe.run_many([s, s], 1.0), "simulations must be different objects, got one twice"),
     (lambda s, a: withe.run_many([s, 3], 1.0), "simulations must be withe.Simulation, got int at [1]"),
     (lambda s, a: withe.run_many(3, 1.0), "simulations must be a list, got int"),
     (lambda s, a: withe.run_many([s], 1.0, workers=0), "workers must lie in 1..4096, got 0"),
@@ -301,7 +307,7 @@ def test_simulations(case):
 
 def test_a_closed_rod_has_no_ends():
     ring = from_points(RINGS, closed=True)
-    with pytest.raises(ValueError, match=r"rod 'arm' is closed and has no end: take one of its nodes"):
+    with pytest.raises(ValueError, match=r"rod 'arm' is closed and has no end: use one of its nodes"):
         _ = ring.end
 
 
@@ -315,7 +321,7 @@ def test_steps_that_no_duration_is_made_of_are_refused(time_step):
 def test_stiffness_given_directly_has_no_material_to_set():
     scene = withe.Scene()
     scene.add_rod(start=(0, 0, 0), end=(1, 0, 0), nodes=3, radius=0.1, stiffness=stiff(), line_density=1.0, name="arm")
-    with pytest.raises(ValueError, match="stiffness was given directly, without a material"):
+    with pytest.raises(ValueError, match="stiffness of the rod was given directly, without a material"):
         scene.build().set("arm", youngs_modulus=1.0)
 
 

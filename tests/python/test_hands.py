@@ -147,23 +147,23 @@ def test_what_is_held_already_is_refused_by_name():
     for stiffness in (None, (100.0, 0.1)):
         with pytest.raises(ValueError, match=r"overlaps 'left'"):
             simulation.grasp(rod, 0.23, 0.03, stiffness=stiffness)
-        with pytest.raises(ValueError, match=r"is on what is held by 'wall' at 'rod.start'"):
+        with pytest.raises(ValueError, match=r"overlaps 'wall' at 'rod.start'"):
             simulation.grasp(rod, 0.01, stiffness=stiffness)
-        with pytest.raises(ValueError, match=r"is on what is held by 'peg'"):
+        with pytest.raises(ValueError, match=r"overlaps 'peg'"):
             simulation.grasp(rod, 0.395, stiffness=stiffness)
-    with pytest.raises(ValueError, match=r"is on what is held by 'left'"):
+    with pytest.raises(ValueError, match=r"overlaps 'left'"):
         simulation.clamp(rod.node(10), name="new")
-    with pytest.raises(ValueError, match=r"is on what is held by 'left'"):
+    with pytest.raises(ValueError, match=r"overlaps 'left'"):
         simulation.pin(rod.node(9))
-    with pytest.raises(ValueError, match="hand must be what grasp returned, got the support 'wall'"):
+    with pytest.raises(ValueError, match="hand must be a hand returned by grasp, got the support 'wall'"):
         simulation.wrench("wall")
 
 
 @pytest.mark.parametrize(
     ("path", "message"),
     [
-        ([(0.0, 0, 0, 0)], "must have two rows or more"),
-        ([(0.0, 0, 0, 0), (0.0, 0, 0, 1)], "must have times that grow, got 0 s and then 0 s"),
+        ([(0.0, 0, 0, 0)], "must have at least two rows"),
+        ([(0.0, 0, 0, 0), (0.0, 0, 0, 1)], "must have increasing times, got 0 s and then 0 s"),
         ([(0.0, 0, 0), (1.0, 0, 0)], r"must have shape \(poses, 4\) or \(poses, 8\)"),
         ([(0.0, 0, 0, 0, 1, 1, 0, 0), (1.0, 0, 0, 0, 1, 0, 0, 0)], "row 0 of the path of hand 'hand 1'"),
         ([(0.0, 0, 0, np.nan), (1.0, 0, 0, 0)], "must be finite"),
@@ -180,5 +180,5 @@ def test_a_path_that_is_no_motion_is_refused(path, message):
 def test_what_hands_do_not_go_with_says_so():
     scene, rod = drawn()
     scene.grasp(rod, 0.2, stiffness=(100.0, 0.1), force_limit=1.0)
-    with pytest.raises(ValueError, match="knows rigid hands only"):
+    with pytest.raises(ValueError, match="supports rigid hands only"):
         scene.build(integrator="verlet", time_step=1e-6)

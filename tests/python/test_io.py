@@ -275,7 +275,7 @@ def test_a_header_that_no_tokenizer_reads_is_a_damaged_file(tmp_path):
 @pytest.mark.parametrize("name", ["tip.csv", "arm.h5", "arm.vtk", "arm.json", "arm.txt", "arm"])
 def test_records_and_snapshots_are_saved_as_npz_alone_and_say_so(name, record, tmp_path):
     _, _, simulation = cantilever(nodes=4)
-    with pytest.raises(ValueError, match=rf"end in \.npz, got '.*{name}'; to_vtk writes for ParaView; a table"):
+    with pytest.raises(ValueError, match=rf"end in \.npz, got '.*{name}'; use to_vtk for ParaView, or write a table"):
         record.save(tmp_path / name)
     with pytest.raises(ValueError, match=rf"path must end in \.npz, got '.*{name}'$"):
         simulation.snapshot().save(tmp_path / name)
@@ -310,7 +310,7 @@ def test_a_full_disk_leaves_the_file_that_was_there(record, tmp_path, monkeypatc
 def test_a_file_does_not_take_the_place_of_a_device_or_a_pipe(record, tmp_path):
     pipe = tmp_path / "pipe.npz"
     os.mkfifo(pipe)
-    with pytest.raises(OSError, match=r"device or a pipe; give another path than.*pipe.npz"):
+    with pytest.raises(OSError, match=r"device or a pipe: give another path than.*pipe.npz"):
         record.save(pipe)
     assert pipe.is_fifo()
     assert list(tmp_path.iterdir()) == [pipe]

@@ -26,14 +26,17 @@ WRONG = [
     ),
     (
         lambda s, m: s.add_rod(**ENDS, material=RUBBER, n_elements=20),
-        "add_rod() has no keyword 'n_elements'; did you mean nodes=, which are one more?",
+        "add_rod() has no keyword 'n_elements'; did you mean nodes=, one more than the edges?",
     ),
     (
         lambda s, m: s.add_rod(**ENDS, material=RUBBER, n_nodes=20),
         "add_rod() has no keyword 'n_nodes'; did you mean nodes=?",
     ),
     (lambda s, m: s.add_rod(**ENDS, nodes=5, E=1e6), "add_rod() has no keyword 'E'; did you mean material=?"),
-    (lambda s, m: s.add_rod(diameter=0.1), "add_rod() has no keyword 'diameter'; did you mean radius=, half of it?"),
+    (
+        lambda s, m: s.add_rod(diameter=0.1),
+        "add_rod() has no keyword 'diameter'; did you mean radius=, half of the diameter?",
+    ),
     (lambda s, m: s.add_floor(0.0, mu=0.3), "add_floor() has no keyword 'mu'; did you mean friction=?"),
     (lambda s, m: s.clamp("arm.end", nme="x"), "clamp() has no keyword 'nme'; did you mean name=?"),
     (

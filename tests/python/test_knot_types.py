@@ -118,7 +118,7 @@ def test_a_curve_that_is_laid_down_from_its_end_is_no_knot():
 @pytest.mark.parametrize(
     ("points", "message"),
     [
-        (np.zeros((3, 3)), "points must be at least 4"),
+        (np.zeros((3, 3)), "points must have at least 4"),
         (np.zeros((5, 2)), "points"),
         (np.full((5, 3), np.nan), "points"),
     ],
@@ -158,5 +158,5 @@ def test_points_that_repeat_change_nothing_and_too_few_are_refused():
     repeated = np.concatenate([curve[:1], curve, curve[-1:]])
     assert knots.writhe(repeated) == knots.writhe(curve)
     assert knots.signature(repeated) == knots.signature(curve)
-    with pytest.raises(ValueError, match="at least 3 different ones"):
+    with pytest.raises(ValueError, match="at least 3 different rows"):
         knots.writhe(curve[:1])

@@ -80,16 +80,16 @@ def test_snapshots_copies_pickles_and_files_go_on_with_the_same_bits(words, tmp_
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ({"at": 0.5}, "must be on rod 'rod', from 0 to 0.4 m"),
+        ({"at": 0.5}, "must lie on rod 'rod', from 0 to 0.4 m"),
         ({"slides": 1}, "slides of 'hand 1' must be"),
-        ({"length": 0.02}, "length of 'hand 1' must be 0: a ring"),
+        ({"length": 0.02}, "length of 'hand 1' must be 0 for a ring"),
         ({"stiffness": (1.0, 1.0)}, "stiffness of 'hand 1' must be one number"),
         ({"stiffness": 0.0}, "stiffness of 'hand 1' must be positive"),
         ({"friction": -0.1}, "friction of 'hand 1' must not be negative"),
         ({"friction": np.nan}, "friction of 'hand 1' must be"),
         ({"feed_rate": np.inf}, "feed_rate of 'hand 1' must be"),
-        ({"feed_rate": 0.1, "friction": 0.2}, "friction of 'hand 1' must be 0 where a drive"),
-        ({"force_limit": 1.0}, "force_limit of 'hand 1' is that of a drive"),
+        ({"feed_rate": 0.1, "friction": 0.2}, "friction of 'hand 1' must be 0 with a drive"),
+        ({"force_limit": 1.0}, "force_limit of 'hand 1' needs a drive"),
         ({"feed_rate": 0.1, "force_limit": 0.0}, "force_limit of 'hand 1' must be positive"),
         ({"slides": False, "friction": 0.2}, "friction of 'hand 1' needs a ring"),
         ({"slides": False, "feed_rate": 0.0}, "feed_rate of 'hand 1' needs a ring"),
@@ -107,16 +107,16 @@ def test_what_rings_do_not_go_with_says_so():
     ring, hand = simulation.grasp(rod, 0.2, slides=True, name="eye"), simulation.grasp(rod, 0.3, name="grip")
     with pytest.raises(ValueError, match="'eye' has no drive"):
         ring.feed(0.1)
-    with pytest.raises(ValueError, match="must be a ring, which grasp"):
+    with pytest.raises(ValueError, match="must be a ring returned by grasp"):
         simulation.passage(hand)
     with pytest.raises(ValueError, match="a rod slides through a ring"):
         simulation.run(0.01, differentiable=True).gradient({"positions": np.ones((11, 21, 3))}, ["gravity"])
     scene, rod = drawn()
     scene.clamp(rod.start)
     scene.grasp(rod, 0.2, slides=True, friction=0.1)
-    with pytest.raises(ValueError, match="knows rigid hands only"):
+    with pytest.raises(ValueError, match="supports rigid hands only"):
         scene.build(integrator="verlet", time_step=1e-6)
-    with pytest.raises(ValueError, match="hands that slip do not allow"):
+    with pytest.raises(ValueError, match="does not support hands that slip"):
         scene.build(integrator="fourth_order", time_step=1e-3)
 
 

@@ -36,7 +36,7 @@ def arm(guides=None, build=True, **options):
         ({"name": "arm"}, "name of the tendon must be new"),
         ({"guides": lambda rod: [rod.edge(2)]}, "tendon 'cord' must have at least two guides, got 1"),
         ({"guides": lambda rod: []}, "tendon 'cord' must have at least two guides, got 0"),
-        ({"guides": lambda rod: [rod.edge(2), rod.edge(2)]}, "guides 0 and 1 of tendon 'cord' must be apart"),
+        ({"guides": lambda rod: [rod.edge(2), rod.edge(2)]}, "guides 0 and 1 of tendon 'cord' must not coincide"),
         (
             {"guides": lambda rod: [rod.edge(2), rod.node(4)]},
             r"an edge, or an end of a rod, got 'arm.node\(4\)'",
@@ -219,5 +219,5 @@ def test_gradients_that_are_not_known_are_refused():
     scene.clamp(rods[0].end)
     simulation = scene.build(integrator="static", planar=False)
     found = simulation.equilibrium()
-    with pytest.raises(ValueError, match="two guides in a row on one joint"):
+    with pytest.raises(ValueError, match="two consecutive guides on one joint"):
         found.gradient(np.ones((9, 3)), [(tendon, "tension")])

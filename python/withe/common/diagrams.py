@@ -139,7 +139,10 @@ def alexander(found: Diagram) -> IntArray:
     numbers = np.fft.fft(values).real / (count + 1)
     whole = np.round(numbers).astype(int)
     if np.abs(numbers - whole).max() > _ROUND or abs(whole.sum()) != 1:
-        raise ValueError(f"points must have fewer crossings: among {count} the polynomial is lost in rounding")
+        raise ValueError(
+            f"points must have fewer crossings, got {count}: rounding errors would exceed the coefficients of the "
+            "polynomial"
+        )
     used = np.flatnonzero(whole)
     return np.asarray(whole.sum() * whole[used[0] : used[-1] + 1])
 

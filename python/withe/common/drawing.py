@@ -50,7 +50,7 @@ def check_edges(points: FloatArray, closed: bool, owner: str) -> FloatArray:
     turn = np.sum(tangents * np.roll(tangents, -1, axis=0), axis=1)[: None if closed else -1]
     folded = np.flatnonzero(turn < -1.0 + 1e-12)
     if len(folded):
-        raise ValueError(f"points of {owner} fold straight back after edge {folded[0]}")
+        raise ValueError(f"points of {owner} must not fold straight back, but do after edge {folded[0]}")
     return np.asarray(lengths, np.float64)
 
 

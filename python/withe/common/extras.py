@@ -38,4 +38,6 @@ def require(module: str, extra: str) -> Any:
         package = module.split(".")[0]
         if error.name is None or error.name.split(".")[0] != package:
             raise
-        raise ImportError(f"this needs {package}, which is not installed: {_how(extra)}", name=package) from error
+        raise ImportError(
+            f"this function needs the package {package}, which is not installed: {_how(extra)}", name=package
+        ) from error

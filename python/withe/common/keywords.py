@@ -103,13 +103,13 @@ _ELSEWHERE: dict[str, tuple[str, ...]] = {
 _COUNTED_OTHERWISE: dict[str, tuple[str, str]] = {
     "G": ("poisson_ratio", "poisson_ratio= with youngs_modulus=, where G = E / (2 (1 + nu))"),
     "shear_modulus": ("poisson_ratio", "poisson_ratio= with youngs_modulus=, where G = E / (2 (1 + nu))"),
-    "diameter": ("radius", "radius=, half of it"),
-    "elements": ("nodes", "nodes=, which are one more"),
-    "edges": ("nodes", "nodes=, which are one more"),
-    "n_elem": ("nodes", "nodes=, which are one more"),
-    "n_elements": ("nodes", "nodes=, which are one more"),
-    "n_segments": ("nodes", "nodes=, which are one more"),
-    "num_elements": ("nodes", "nodes=, which are one more"),
+    "diameter": ("radius", "radius=, half of the diameter"),
+    "elements": ("nodes", "nodes=, one more than the edges"),
+    "edges": ("nodes", "nodes=, one more than the edges"),
+    "n_elem": ("nodes", "nodes=, one more than the edges"),
+    "n_elements": ("nodes", "nodes=, one more than the edges"),
+    "n_segments": ("nodes", "nodes=, one more than the edges"),
+    "num_elements": ("nodes", "nodes=, one more than the edges"),
 }
 
 

@@ -182,10 +182,12 @@ def load_values(value: npt.ArrayLike, axis: FloatArray | None, edges: int | None
 
 def _area_normal(part: RodPart) -> FloatArray:
     if not part.closed:
-        raise ValueError(f"normal of the pressure on {part.owner} must be given: it is open")
+        raise ValueError(f"normal of the pressure on {part.owner} must be given, because the rod is open")
     points = part.points - part.points.mean(axis=0)
     area = 0.5 * np.cross(points, np.roll(points, -1, axis=0)).sum(axis=0)
     size = float(np.linalg.norm(area))
     if size < 1e-9 * float(part.lengths.sum()) ** 2:
-        raise ValueError(f"normal of the pressure on {part.owner} must be given: it goes round no area")
+        raise ValueError(
+            f"normal of the pressure on {part.owner} must be given, because the closed rod encloses no area"
+        )
     return np.asarray(area / size)

@@ -79,7 +79,9 @@ def pair_of(directory: Directory, a: Body, b: Body) -> tuple[str, str]:
     """
     first, second = touching(directory, a), touching(directory, b)
     if isinstance(first, ObstaclePart) and isinstance(second, ObstaclePart):
-        raise ValueError(f"{first.name!r} and {second.name!r} are both obstacles, which never touch")
+        raise ValueError(
+            f"{first.name!r} and {second.name!r} are both obstacles, which never touch: name at least one rod"
+        )
     return (first.name, second.name) if first.name <= second.name else (second.name, first.name)
 
 
@@ -102,7 +104,7 @@ def touching(directory: Directory, handle: Body) -> RodPart | ObstaclePart:
     """
     part = directory.find_any(handle, "what touches")
     if not isinstance(part, RodPart | ObstaclePart):
-        raise ValueError(f"what touches must be a rod or an obstacle, got {part.name!r}")
+        raise ValueError(f"bodies in contact must be rods or obstacles, got {part.name!r}")
     return part
 
 

@@ -167,12 +167,12 @@ def _describe_supports(directory: Directory) -> list[_core.SupportDescription]:
 def _held_twice(directory: Directory, first: SupportPart, second: SupportPart) -> str:
     if directory.row(first.node) == directory.row(second.node):
         return (
-            f"nodes {first.node_name!r} and {second.node_name!r} are joined, and held by both "
-            f"{first.name!r} and {second.name!r}: hold them once"
+            f"joined nodes {first.node_name!r} and {second.node_name!r} must have one support, got both "
+            f"{first.name!r} and {second.name!r}: remove one of the supports"
         )
     return (
-        f"since rods were joined, {first.name!r} at {first.node_name!r} and {second.name!r} at {second.node_name!r} "
-        "hold the same node (hold='edge' takes both nodes of an edge): hold it once"
+        f"{first.name!r} at {first.node_name!r} and {second.name!r} at {second.node_name!r} hold the same node, "
+        "because rods were joined (hold='edge' holds both nodes of an edge): remove one of the supports"
     )
 
 

@@ -101,7 +101,7 @@ class Directory:
         if name in self.parts:
             raise ValueError(f"name of the {word} must be new: {name!r} is a {_WORDS[type(self.parts[name])]}")
         if parse_place(name) is not None:
-            raise ValueError(f"name of the {word} must not read like that of a node or edge, got {name!r}")
+            raise ValueError(f"name of the {word} must not look like the name of a node or edge, got {name!r}")
         return name
 
     def find(self, handle: Handle | str, kind: type[P], what: str) -> P:

@@ -26,7 +26,7 @@ def make_fluid(
     """The fluid of a scene, checked; see `Scene.add_fluid`. Not yet in the directory."""
     others = directory.all(FluidPart)
     if others:
-        raise ValueError(f"fluid must be the only one: the scene has {others[0].name!r}")
+        raise ValueError(f"fluid must be the only one, but the scene already has {others[0].name!r}")
     name = directory.new_name(name, "fluid")
     validation.choice(model, "model of the fluid", get_args(FluidModel))
     return FluidPart(
@@ -61,7 +61,7 @@ def _regularization(directory: Directory) -> float:
     radii = np.concatenate([rod.section.radii for rod in directory.all(RodPart)])
     if np.ptp(radii) > 1e-9 * radii.max():
         raise ValueError(
-            "regularization of the fluid must be given where radii differ, "
-            f"here from {radii.min():g} to {radii.max():g} m"
+            f"regularization of the fluid must be given when radii differ, got radii from {radii.min():g} to "
+            f"{radii.max():g} m"
         )
     return math.sqrt(math.e) * float(radii.max())

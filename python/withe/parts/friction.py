@@ -111,7 +111,8 @@ def _directions(value: Friction | npt.ArrayLike, what: str, *, directed: bool) -
         return same, same, same
     if not directed:
         raise ValueError(
-            f"{what} must be one number: along and across are directions of a rod on an obstacle, got {value!r:.80}"
+            f"{what} must be one number, got {value!r:.80}: friction along and across a rod is defined on "
+            "obstacles only"
         )
     if np.size(value) == 3:  # type: ignore[arg-type]
         words = "towards the end of a rod", "towards its start", "across it"
@@ -148,8 +149,8 @@ def check_law(directions: Directions, friction_model: str, what: str) -> None:
     """Refuse directions where friction is that of the step's start."""
     if len(set(directions)) > 1 and friction_model in ("lagged", "semi_explicit"):
         raise ValueError(
-            f"{what} along and across a rod must be the same with friction_model={friction_model!r}: take 'anchored' "
-            "or 'implicit'"
+            f"{what} along and across a rod must be the same with friction_model={friction_model!r}: use "
+            "'anchored' or 'implicit' for different values"
         )
 
 

@@ -91,11 +91,11 @@ def field_shares(field: FrictionField, nodes: FloatArray, closed: bool, what: st
     try:
         given = np.asarray(found, float)
     except (TypeError, ValueError):
-        raise ValueError(f"{what} must give numbers, got {found!r:.80}") from None
+        raise ValueError(f"{what} must return numbers, got {found!r:.80}") from None
     if given.ndim == 0:
         given = np.broadcast_to(given, (len(points),))
     if given.shape != (len(points),):
-        raise ValueError(f"{what} must give one number a point, shape ({len(points)},), got {given.shape}")
+        raise ValueError(f"{what} must return one number per point, of shape ({len(points)},), got {given.shape}")
     wrong = np.flatnonzero(~(np.isfinite(given) & (given >= 0.0)))
     if len(wrong):
         x, y, z = points[wrong[0]]

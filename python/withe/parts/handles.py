@@ -289,7 +289,7 @@ class Rod(Handle):
 
     def _end(self, word: str, index: int) -> NodeHandle:
         if self.closed:
-            raise ValueError(f"rod {self.name!r} is closed and has no {word}: take one of its nodes, node(i)")
+            raise ValueError(f"rod {self.name!r} is closed and has no {word}: use one of its nodes, node(i)")
         return self.node(index)
 
     def node(self, index: int) -> NodeHandle:

@@ -49,12 +49,12 @@ def make_hand(
     if part.closed:
         if not -slack <= at <= whole + slack or length > whole + slack:
             raise ValueError(
-                f"{name!r} must be on {part.owner}, from 0 to {whole:g} m, and no longer, got at={at:g} m and "
-                f"length={length:g} m"
+                f"{name!r} must lie on {part.owner}, from 0 to {whole:g} m, and must not be longer than the rod, "
+                f"got at={at:g} m and length={length:g} m"
             )
     elif at - 0.5 * length < -slack or at + 0.5 * length > whole + slack:
         raise ValueError(
-            f"{name!r} must be on {part.owner}, from 0 to {whole:g} m, got {at - 0.5 * length:g} to "
+            f"{name!r} must lie on {part.owner}, from 0 to {whole:g} m, got {at - 0.5 * length:g} to "
             f"{at + 0.5 * length:g} m (at={at:g}, length={length:g})"
         )
     place = None if pose is None else pose_of(pose, f"pose of {name!r}")
@@ -64,13 +64,13 @@ def make_hand(
         return SupportPart(name, "hand", (part.index, edge), f"{part.name}.node({edge})", np.zeros((3, 3)), grasp)
     for word, value in (("friction", sliding.friction or None), ("feed_rate", sliding.feed_rate)):
         if value is not None:
-            raise ValueError(f"{word} of {name!r} needs a ring, which lets the rod slide: give slides=True")
+            raise ValueError(f"{word} of {name!r} needs a ring: use slides=True, which lets the rod slide")
     stiff = None if stiffness is None else _stiffness(stiffness, f"stiffness of {name!r}")
     limit = math.inf
     if force_limit is not None:
         limit = validation.positive(force_limit, f"force_limit of {name!r}")
         if stiff is None:
-            raise ValueError(f"force_limit of {name!r} needs a hand that yields: give its stiffness too")
+            raise ValueError(f"force_limit of {name!r} needs a hand that yields: give stiffness= too")
     edges = touched_edges(part, at, length)
     grasp = Grasp(at, length, place, stiff, limit, edges)
     node = (part.index, edges[0])
@@ -88,14 +88,15 @@ def _make_ring(
     name: str,
 ) -> Grasp:
     if length != 0.0:
-        raise ValueError(f"length of {name!r} must be 0: a ring holds a rod at one place, got {length:g} m")
+        raise ValueError(f"length of {name!r} must be 0 for a ring, got {length:g} m")
     if stiffness is None:
         # An edge stretches by more than the rod is off the middle of the ring then.
         edge = touched_edges(rod, at, 0.0)[0]
         k = float(rod.parameters.stretch_stiffness[edge] / rod.lengths[edge])
     elif not validation.is_scalar(stiffness):
         raise ValueError(
-            f"stiffness of {name!r} must be one number [N/m]: a ring holds no direction, got {stiffness!r:.80}"
+            f"stiffness of {name!r} must be one number [N/m], because a ring does not hold directions, got "
+            f"{stiffness!r:.80}"
         )
     else:
         k = validation.positive(stiffness, f"stiffness of {name!r}")
@@ -103,14 +104,13 @@ def _make_ring(
     rate = None if sliding.feed_rate is None else validation.number(sliding.feed_rate, f"feed_rate of {name!r}")
     if rate is not None and friction > 0.0:
         raise ValueError(
-            f"friction of {name!r} must be 0 where a drive feeds the rod (feed_rate): give the drive a force_limit, "
-            "beyond which it slips"
+            f"friction of {name!r} must be 0 with a drive (feed_rate=): use force_limit=, above which the drive slips"
         )
     limit = math.inf
     if force_limit is not None:
         limit = validation.positive(force_limit, f"force_limit of {name!r}")
         if rate is None:
-            raise ValueError(f"force_limit of {name!r} is that of a drive: give its feed_rate too, or friction instead")
+            raise ValueError(f"force_limit of {name!r} needs a drive: give feed_rate= too, or use friction= instead")
     return Grasp(at, 0.0, pose, np.full(6, k), limit, (), True, friction, rate)
 
 
@@ -164,12 +164,13 @@ def check_free(directory: Directory, part: SupportPart, others: list[SupportPart
             continue
         theirs, rows = held_edges(directory, other), _nodes(directory, other)
         if edges & theirs:
-            both = "overlaps" if other.grasp is not None and part.grasp is not None else "is on what is held by"
-            raise ValueError(f"{part.name!r} {both} {other.name!r}: they would hold the same edge; release that first")
+            raise ValueError(
+                f"{part.name!r} overlaps {other.name!r}, and both would hold an edge: release {other.name!r} first"
+            )
         hard = {row for row in nodes & rows if not (edges and theirs)}
         if hard:
             raise ValueError(
-                f"{part.name!r} is on what is held by {other.name!r} at {other.node_name!r}: release that first"
+                f"{part.name!r} overlaps {other.name!r} at {other.node_name!r}: release {other.name!r} first"
             )
 
 

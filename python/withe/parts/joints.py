@@ -94,7 +94,7 @@ def gather(joins: Sequence[JoinPart]) -> JointGroup:
             raise ValueError(f"{names} cannot be both rigidly joined and {join.kind} at one node")
         if join.axis is not None:
             if (a, b) in links or (b, a) in links:
-                raise ValueError(f"{names} already turn against each other about an axis")
+                raise ValueError(f"{names} already have a revolute joint at this node")
             links[a, b] = join
     return JointGroup(clusters, tuple((a, b, join) for (a, b), join in links.items()), forms[0] if forms else "frame")
 

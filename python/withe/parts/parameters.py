@@ -136,11 +136,13 @@ class RodParameters:
     def with_value(self, word: str, value: Any, section: SectionProperties, owner: str) -> RodParameters:
         """The same for the engine, which refuses what follows from the value and has over- or underflowed."""
         if word not in ROD_WORDS:
-            raise ValueError(f"a rod has no {word!r}; its words are {', '.join(ROD_WORDS)}")
+            raise ValueError(f"a rod has no parameter {word!r}; its parameters are {', '.join(ROD_WORDS)}")
         edges = len(section.area)
         what = f"{word} of {owner}"
         if word in MATERIAL_WORDS and self.youngs_modulus is None:
-            raise ValueError(f"{what} cannot be set: its stiffness was given directly, without a material")
+            raise ValueError(
+                f"{what} cannot be set, because the stiffness of the rod was given directly, without a material"
+            )
         if word == "poisson_ratio":
             return self._derived({word: check_poisson_ratio(value, what)}, section)
         if word == "bend_stiffness":

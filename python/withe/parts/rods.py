@@ -233,8 +233,8 @@ def _check_thickness(radii: FloatArray, lengths: FloatArray, what: str, owner: s
     thick, length = float(radii.max()), float(lengths.sum())
     if thick > _THICKEST * length:
         raise ValueError(
-            f"{what} of {owner} must be no more than {_THICKEST:g} times the length of the rod, {length:g} m, "
-            f"got {thick:g} m: is all given in metres?"
+            f"{what} of {owner} must be no more than {_THICKEST:g} times the length of the rod, {length:g} m, got "
+            f"{thick:g} m: are all lengths in metres?"
         )
 
 
@@ -248,7 +248,9 @@ def _parameters(
     if (material is None) == (stiffness is None):
         raise ValueError(f"{owner} must have either a material or a stiffness")
     if (stiffness is None) != (line_density is None):
-        raise ValueError(f"line_density of {owner} must be given with a stiffness, and only then")
+        raise ValueError(
+            f"line_density of {owner} must be given with stiffness=, and must not be given with a material"
+        )
     if line_density is not None:
         if not isinstance(stiffness, Stiffness):
             raise ValueError(f"stiffness of {owner} must be a withe.Stiffness, got {type(stiffness).__name__}")

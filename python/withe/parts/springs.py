@@ -42,8 +42,8 @@ def make_spring(
     )
     if distance == 0.0 and part.rest_length > 0.0:
         raise ValueError(
-            f"rest_length of spring {name!r} must be 0, since its nodes coincide and it has no direction to push in, "
-            f"got {part.rest_length:g}: draw the nodes apart, or leave rest_length out"
+            f"rest_length of spring {name!r} must be 0, because the nodes of the spring coincide, got "
+            f"{part.rest_length:g}: draw the nodes apart, or leave rest_length out"
         )
     return part
 

@@ -63,11 +63,11 @@ def check_not_held(directory: Directory, part: SupportPart, others: Iterable[Sup
         if part.grasp is not None or other.grasp is not None:
             continue
         if directory.row(other.node) == directory.row(part.node):
-            raise ValueError(f"node {part.node_name!r} is already held by {other.name!r}: release that first")
+            raise ValueError(f"node {part.node_name!r} is already held by {other.name!r}: release {other.name!r} first")
         if not held.isdisjoint(held_rows(directory, other)):
             raise ValueError(
                 f"{part.name!r} at {part.node_name!r} would hold a node that {other.name!r} at {other.node_name!r} "
-                "holds: hold='edge' takes both nodes of an edge; hands may hold neighbouring edges"
+                f"already holds: release {other.name!r} first (hold='edge' holds both nodes of an edge)"
             )
 
 
@@ -90,5 +90,5 @@ def _projector(free: npt.ArrayLike | None, what: str) -> FloatArray:
     units = np.array([validation.unit_vector(row, what) for row in directions])
     u, sizes, _ = np.linalg.svd(units.T, full_matrices=False)
     if sizes.min() < 1e-6:
-        raise ValueError(f"{what} must be directions that differ")
+        raise ValueError(f"{what} must be directions that are not parallel")
     return np.asarray(u @ u.T, np.float64)

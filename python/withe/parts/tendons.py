@@ -38,8 +38,7 @@ def make_tendon(
     for index, length in enumerate(np.linalg.norm(np.diff(points, axis=0), axis=1)):
         if length <= 1e-12 * np.abs(points).max():
             raise ValueError(
-                f"guides {index} and {index + 1} of tendon {name!r} must be apart, or it has no direction to pull in: "
-                f"both are at {points[index]}"
+                f"guides {index} and {index + 1} of tendon {name!r} must not coincide, but both are at {points[index]}"
             )
     rods = {rod.index: rod for rod in directory.all(RodPart)}
     radii = np.array([rods[rod].section.radii[edge] for rod, edge, _ in places])

@@ -83,14 +83,13 @@ class JoinedNodes:
         validation.choice(kind, "kind of the joint", ("rigid", "pinned", "revolute"))
         validation.choice(form, "form of the joint", ("frame", "pairs"))
         if (kind == "revolute") != (axis is not None):
-            raise ValueError(f"axis of the joint must be given when kind='revolute', and only then; kind is {kind!r}")
+            raise ValueError(
+                f"axis of the joint must be given for kind='revolute' and for no other kind, got kind={kind!r}"
+            )
         values = {word: checked_number(name, word, value) for word, value in zip(JOINT_WORDS, numbers, strict=True)}
         given = next((word for word in JOINT_WORDS if values[word] != 0.0), None)
         if given is not None and kind != "revolute":
-            raise ValueError(
-                f"{given} of joint {name!r} is that of a joint with an axis: take kind='revolute', or leave it out; "
-                f"kind is {kind!r}"
-            )
+            raise ValueError(f"{given} of joint {name!r} needs kind='revolute', got kind={kind!r}")
         if form == "pairs" and kind != "rigid":
             raise ValueError(f"form of the joint must be 'frame' when kind={kind!r}")
         if node_a == node_b:
@@ -98,7 +97,7 @@ class JoinedNodes:
         distance = float(np.linalg.norm(self._point(node_a) - self._point(node_b)))
         if distance > 1e-9 * self._extent():
             raise ValueError(
-                f"nodes {name_a!r} and {name_b!r} must coincide to be joined, they are {distance:g} m apart"
+                f"nodes {name_a!r} and {name_b!r} must coincide to be joined, but are {distance:g} m apart"
             )
         direction = None if axis is None else validation.unit_vector(axis, "axis of the joint")
         return JoinPart(name, (node_a, node_b), (name_a, name_b), kind, direction, form, **values)

@@ -31,7 +31,7 @@ FloatArray = npt.NDArray[np.float64]
 
 
 @keyword_hints
-@known_attributes("its methods describe it, such as set_friction, and what steps are made of is for build")
+@known_attributes("use a method such as set_friction, or an option of build")
 class Scene(AppliedLoads, Loads, Contacts, Supports):
     """A description of rods, joints, supports and loads, from which simulations are built.
 
