@@ -367,7 +367,7 @@ def main() -> None:
     # Four nodes under forces of any size are coarse, and are right to say so.
     warnings.simplefilter("ignore", category=withe.CoarseMeshWarning)
     warnings.simplefilter("ignore", category=withe.RingLeftWarning)
-    warnings.filterwarnings("ignore", ".* has not begun to go where over= leads it")
+    warnings.filterwarnings("ignore", "the ramp of .* has not begun")
     count, number = int(sys.argv[1]), int(sys.argv[2])
     make_test(count, number)()
     print(f"{calls['sequences']} sequences, {calls['results']} results, {calls['refusals']} refusals")

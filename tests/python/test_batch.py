@@ -320,7 +320,7 @@ BAD = [
     (lambda b: b.step(1, lanes=[1, -3]), "lanes must differ, got [1, -3]"),
     (
         lambda b: b.reset([0, 1, 0, 0]),
-        "mask must differ, got [0, 1, 0, 0]: numbers of simulations, where a mask is of bool",
+        "mask must be different numbers of simulations, got [0, 1, 0, 0]: a mask must hold booleans",
     ),
     (lambda b: b.step(1, lanes=[0.5]), "lanes must be a mask of shape (4,), or numbers of simulations, got [0.5]"),
     (lambda b: b.reset([True] * 5), "mask must have shape (4,) as a mask, got (5,)"),
@@ -343,7 +343,7 @@ BAD = [
     (lambda b: b.move("wall", roll=[0.1, 0.2]), "roll must have shape (4,), got (2,)"),
     (lambda b: b.move("wall", roll=[0.1, 0.2], lanes=[1, 2, 3]), "roll must have shape (3,), got (2,)"),
     (lambda b: b.move("wall", roll=[0, 0, np.nan, 0]), "roll must be finite, got nan at [2]"),
-    (lambda b: b.move("wall", roll=4.0), "roll of support 'wall' must turn by at most half a turn in a time step"),
+    (lambda b: b.move("wall", roll=4.0), "roll of support 'wall' must be at most half a turn per time step"),
     (lambda b: b.move("wall", tangent=(1, 0, 0)), "tangent must have shape (4, 3), got (3,)"),
     (lambda b: b.restore(b.snapshot()[:2]), "snapshots must be one for each of 4 simulations, got 2"),
     (lambda b: b.restore([1, 2, 3, 4]), "snapshots must be withe.Snapshot, got int at [0]"),

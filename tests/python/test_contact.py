@@ -174,7 +174,7 @@ def test_the_plan_warns_of_edges_that_are_too_long_for_contact() -> None:
 
     assert warnings(21) == []
     (warning,) = warnings(11)
-    assert "edges of rod 'rope' are 2 times as long as it is thick" in warning
+    assert "edges of rod 'rope' are 2 times as long as the rod is thick" in warning
 
 
 def test_the_plan_says_what_contact_adds_and_what_is_skipped() -> None:

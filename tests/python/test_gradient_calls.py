@@ -279,7 +279,7 @@ def test_calls_without_a_gradient_have_none():
         differentiable=True,
         before_step=lambda s: s.add_force(drawn.arm.end, (0, 0, 0.01)),
     )
-    with pytest.raises(ValueError, match="loads came or went"):
+    with pytest.raises(ValueError, match="loads were added or removed"):
         added.gradient({"positions": zeros}, ["gravity"])
     assert isinstance(record, withe.Record)
 

@@ -134,16 +134,16 @@ def test_contact_that_no_gradient_goes_through_says_what_to_do():
         scene.enable_contact(stiffness=stiffness, friction_model=law)
         simulation = scene.build(integrator=integrator, time_step=1e-3)
         record = simulation.run(0.05, record_every=0.05, progress=False, differentiable=True)
-        with pytest.raises(ValueError, match="no gradient is known of this run") as refused:
+        with pytest.raises(ValueError, match="no gradient of this run is available") as refused:
             record.gradient({"positions": np.full((2, 5, 3), (0.0, 0.0, 1.0))}, ["gravity"])
         return str(refused.value)
 
     for law in ("anchored", "semi_explicit"):
-        assert "take friction_model='implicit' or 'lagged'" in refusal(friction=0.3, stiffness=1e5, law=law)
-    assert "take restitution=1" in refusal(restitution=0.5, stiffness=1e5)
+        assert "use friction_model='implicit' or 'lagged'" in refusal(friction=0.3, stiffness=1e5, law=law)
+    assert "use restitution=1" in refusal(restitution=0.5, stiffness=1e5)
     for integrator in INTEGRATORS:
-        assert "give enable_contact(stiffness=)" in refusal(integrator=integrator)
-        assert "give enable_contact(stiffness=)" in refusal(integrator=integrator, stiffness=5.0)  # repeated stiffer
+        assert "use enable_contact(stiffness=)" in refusal(integrator=integrator)
+        assert "use enable_contact(stiffness=)" in refusal(integrator=integrator, stiffness=5.0)  # repeated stiffer
 
 
 @pytest.mark.parametrize("friction", ["implicit", "lagged"])
@@ -194,15 +194,15 @@ def test_friction_without_a_gradient_says_what_to_do():
     zeros = np.zeros((4, NODES, 3))
     record = touching.run(differentiable=True)
     for unknown, message in (
-        ((floor, "rotation"), "no gradient is known by 'rotation'"),
-        ("friction", "set a small one"),
-        (((arm, floor), "friction"), "by set_friction"),
-        (((arm, floor, arm), "friction"), "are a pair"),
+        ((floor, "rotation"), "no gradient with respect to 'rotation'"),
+        ("friction", "set a small value"),
+        (((arm, floor), "friction"), "call set_friction first"),
+        (((arm, floor, arm), "friction"), "wrt must name two bodies by a pair"),
         (((arm, "nobody"), "friction"), "nobody"),
     ):
         with pytest.raises(ValueError, match=message):
             record.gradient({"positions": zeros}, [unknown])
-    with pytest.raises(ValueError, match="an equilibrium that friction holds"):
+    with pytest.raises(ValueError, match="an equilibrium with friction"):
         sim.equilibrium().gradient(zeros[0], ["gravity"])
 
 
@@ -220,7 +220,7 @@ def test_runs_in_which_friction_comes_or_goes_say_so(pair):
             simulation.set(touching.other, friction=0.0)
 
     record = touching.run(differentiable=True, before_step=before_step)
-    with pytest.raises(ValueError, match="friction came or went"):
+    with pytest.raises(ValueError, match="friction, or a coefficient of a pair of bodies, was added or removed"):
         record.gradient({"positions": np.zeros((4, NODES, 3))}, ["gravity"])
 
 
@@ -253,10 +253,10 @@ def test_gradient_of_an_equilibrium_in_contact_of_a_given_stiffness_is_that_of_d
 
 def test_equilibria_in_contact_without_a_gradient_say_what_to_do():
     _, arm, found = leaning(None)
-    with pytest.raises(ValueError, match=r"give enable_contact\(stiffness=\)"):
+    with pytest.raises(ValueError, match=r"use enable_contact\(stiffness=\)"):
         found.gradient(np.zeros((NODES, 3)), [(arm, "youngs_modulus")])
     _, arm, found = leaning(2e4, friction=0.3)
-    with pytest.raises(ValueError, match="an equilibrium that friction holds"):
+    with pytest.raises(ValueError, match="an equilibrium with friction"):
         found.gradient(np.zeros((NODES, 3)), [(arm, "youngs_modulus")])
 
 
@@ -268,16 +268,16 @@ def test_runs_of_integrators_without_a_gradient_say_so(integrator):
     scene.clamp(arm.start)
     simulation = scene.build(integrator=integrator, time_step=1e-5)
     record = simulation.run(2e-5, record_every=2e-5, progress=False, differentiable=True)
-    with pytest.raises(ValueError, match=f"integrator '{integrator}' has none; take any other"):
+    with pytest.raises(ValueError, match=f"integrator '{integrator}' has no gradients; use another integrator"):
         record.gradient({"positions": np.zeros((2, 5, 3))}, ["gravity"])
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda s, arm, floor: s.set(contact_stiffness=3e5), "the stiffness of contact was set"),
-        (lambda s, arm, floor: s.set_contact_stiffness(arm, floor, 3e5), "the stiffness of contact was set"),
-        (lambda s, arm, floor: s.set(floor, restitution=0.5), "take restitution=1"),
+        (lambda s, arm, floor: s.set(contact_stiffness=3e5), "the contact stiffness was set"),
+        (lambda s, arm, floor: s.set_contact_stiffness(arm, floor, 3e5), "the contact stiffness was set"),
+        (lambda s, arm, floor: s.set(floor, restitution=0.5), "use restitution=1"),
     ],
 )
 def test_runs_in_which_contact_becomes_stiffer_or_loses_energy_say_so(change, message):

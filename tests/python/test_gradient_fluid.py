@@ -101,7 +101,7 @@ def test_what_a_fluid_leaves_without_a_gradient_says_what_to_do():
         record = sim.run(4e-3, record_every=4e-3, progress=False, differentiable=True)
         return record.gradient({"positions": zeros}, [(arm, word)])
 
-    with pytest.raises(ValueError, match="take model='resistive' or drag"):
+    with pytest.raises(ValueError, match="use model='resistive' or drag"):
         gradient("stokeslets", "density")
-    with pytest.raises(ValueError, match="resistance would change with it"):
+    with pytest.raises(ValueError, match="resistance would change with the radius"):
         gradient("resistive", "radius")

@@ -363,7 +363,7 @@ def test_what_has_no_gradient_with_hands_says_what_to_do():
         record.gradient({"positions": np.zeros((7, NODES, 3))}, [(moving.hand, "force_limit")])
     rigid = Held("rigid", planar=True)
     record = rigid.run(differentiable=True)
-    with pytest.raises(ValueError, match="it is no hand that yields"):
+    with pytest.raises(ValueError, match="is not a hand that yields"):
         record.gradient({"positions": np.zeros((7, NODES, 3))}, [(rigid.hand, "stiffness")])
 
 

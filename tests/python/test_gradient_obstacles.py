@@ -70,7 +70,7 @@ def test_an_obstacle_that_turns_has_gradients_by_where_it_goes_but_with_lagged_f
 
     assert found.calls[1].gradients["position"] @ way == pytest.approx(extrapolated(moved, 1e-7), rel=1e-5)
     lagged = run(Touching("floor", "lagged", integrator), targets, 0.05, differentiable=True)
-    with pytest.raises(ValueError, match="on an obstacle that turns: take friction_model='implicit'"):
+    with pytest.raises(ValueError, match="on an obstacle that turns: use friction_model='implicit'"):
         lagged.gradient({"positions": weights}, ["gravity"])
 
 

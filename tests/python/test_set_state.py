@@ -137,7 +137,7 @@ def test_a_closed_rod_spreads_what_twist_its_new_shape_cannot_have():
     simulation.set_state(rod, wavy)
     assert np.ptp(simulation.twists(rod)) < 1e-9
     assert simulation.link(rod) == pytest.approx(link, abs=1e-9)
-    with pytest.raises(ValueError, match="must close it"):
+    with pytest.raises(ValueError, match="must close the rod"):
         simulation.set_state(rod, ring, twist=1.0)
     length = np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1).sum()
     simulation.set_state(rod, ring, twist=2 * np.pi / length)
@@ -148,7 +148,7 @@ def test_supports_are_not_moved_and_nothing_changes_where_they_would_be():
     scene, arm, _ = cantilever()
     simulation = scene.build()
     before = simulation.snapshot()
-    with pytest.raises(ValueError, match=r"support holds, by 0\.1 m at node 0 of rod 'arm'"):
+    with pytest.raises(ValueError, match=r"support holds, but do by 0\.1 m at node 0 of rod 'arm'"):
         simulation.set_state(arm, simulation.positions(arm) + np.array([0, 0, 0.1]))
     assert simulation.snapshot() == before
     bent = simulation.positions(arm)
@@ -306,7 +306,7 @@ def test_a_support_on_its_way_says_how_it_gets_there():
     _, arm, simulation = cantilever(planar=False)
     place = simulation.positions(arm) + np.array([0.01, 0, 0])
     simulation.move("wall", position=(0.01, 0, 0), over=0.1)
-    with pytest.raises(ValueError, match=r"still on its way \(over=\), so move it there without over="):
+    with pytest.raises(ValueError, match=r"on a ramp \(over=\), so move the support without over="):
         simulation.set_state(arm, positions=place)
     simulation.move("wall", position=(0.01, 0, 0))
     simulation.set_state(arm, positions=place)

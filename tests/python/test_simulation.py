@@ -255,7 +255,7 @@ def test_rods_of_unlike_stiffness_are_named_where_a_step_fails():
     scene.join(soft.end, stiff.start)
     simulation = scene.build(max_iterations=1, max_halvings=0)
     with pytest.raises(
-        withe.ConvergenceError, match=r"Try stiffnesses .* rods 'soft' and 'stiff' differ by 2e\+07 times"
+        withe.ConvergenceError, match=r"Try more similar stiffnesses: .* rods 'soft' and 'stiff' differ by 2e\+07 times"
     ):
         simulation.step(50)
 

@@ -52,5 +52,5 @@ def test_what_is_no_client_is_refused(client):
     simulation = cantilever(nodes=4)[2]
     with pytest.raises(ValueError, match=r"client must be a dask\.distributed\.Client, got str"):
         withe.run_many([simulation], 0.1, client="tcp://scheduler:8786")
-    with pytest.raises(ValueError, match="workers is a number of threads of this process"):
+    with pytest.raises(ValueError, match="workers are threads of this process"):
         withe.run_many([simulation], 0.1, client=client, workers=2)

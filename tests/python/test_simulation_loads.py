@@ -251,7 +251,7 @@ def test_a_moment_that_follows_stays_about_the_tangent_of_its_edge():
 
 def test_a_pressure_is_a_number_and_needs_a_normal_on_an_open_rod():
     scene, arm, _ = weightless()
-    with pytest.raises(ValueError, match="must be given: it is open"):
+    with pytest.raises(ValueError, match="must be given, because the rod is open"):
         scene.add_pressure(arm, 1.0)
     wind = scene.add_pressure(arm, 0.05, normal=(0, -1, 0))
     simulation = scene.build()

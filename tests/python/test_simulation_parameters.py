@@ -418,9 +418,9 @@ def test_what_is_wrong_with_contact_that_is_set_is_named():
     scene.add_rod(start=(0, 0, 0.1), end=(0.2, 0, 0.1), nodes=6, radius=5e-3, material=RUBBER)
     scene.add_floor(name="table")
     explicit = scene.build(integrator="verlet", time_step=1e-5)
-    with pytest.raises(ValueError, match="'verlet' knows elastic impacts only"):
+    with pytest.raises(ValueError, match="'verlet' supports elastic impacts only"):
         explicit.set("table", restitution=0.5)
-    with pytest.raises(ValueError, match="rods, which do not touch: see Scene"):
+    with pytest.raises(ValueError, match="contact between rods, which is off: call Scene"):
         explicit.set(restitution=0.5)
     assert explicit.get("table", "restitution") == 1.0
 

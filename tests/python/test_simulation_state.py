@@ -123,7 +123,7 @@ def test_functions_of_time_must_be_there_when_a_snapshot_from_a_file_needs_them(
     state.save(tmp_path / "s.npz")
     loaded = withe.Snapshot.load(tmp_path / "s.npz")
     _, _, other = cantilever(planar=False)
-    with pytest.raises(ValueError, match="needs the function of time of 'wall'"):
+    with pytest.raises(ValueError, match="do not store functions of time: set the function of 'wall'"):
         other.restore(loaded)
     other.move(arm.name + ".start", path=lambda t: (0, 0, t))
     other.restore(loaded)

@@ -68,7 +68,7 @@ def test_a_support_moves_and_turns_to_where_it_is_told(hold, planar):
     assert simulation.positions(arm)[-1] == pytest.approx((-0.1, 0, 0.2), abs=1e-2)
 
 
-WAYS = {  # where a clamp was told to go in pairs of calls, the second at .3 s, and where it is at .5 s and in the end
+WAYS = {  # where a clamp was told to go in pairs of calls, the second at 0.3 s, and where it is at 0.5 s and in the end
     "position, rotation": [
         {"position": (0.1, 0, 0.2), "over": 1.0},
         {"rotation": Rotation.from_euler("y", -80, True), "over": 0.4},
@@ -98,7 +98,7 @@ def test_a_position_and_a_rotation_go_on_when_the_other_is_given(pair, planar, p
     first, second = WAYS[pair]
 
     def moved(*calls):
-        """Where the support is at .5 s and at 2 s, of calls (time, arguments)."""
+        """Where the support is at 0.5 s and at 2 s, of calls (time, arguments)."""
         scene = withe.Scene(gravity=(0, 0, -1e-3))
         arm = scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=9, radius=5e-3, material=RUBBER)
         if part != "hand":
@@ -230,7 +230,7 @@ def test_rolls_count_full_turns(hold):
 @pytest.mark.parametrize("over", [0.0, 0.01, 0.012])
 def test_a_roll_by_more_than_half_a_turn_in_a_step_is_refused_with_the_time_that_would_do(over):
     _, _, simulation = cantilever(planar=False, time_step=0.01)
-    with pytest.raises(ValueError, match=r"at most half a turn in a time step, got 4\.39823 rad .*take over=0\.021"):
+    with pytest.raises(ValueError, match=r"at most half a turn per time step, got 4\.39823 rad .*use over=0\.021"):
         simulation.move("wall", roll=1.4 * np.pi, over=over)
     simulation.move("wall", roll=1.4 * np.pi, over=0.021)
     simulation.move("wall", roll=0.9 * np.pi)
@@ -273,9 +273,9 @@ def test_a_pin_moves_but_does_not_turn():
     simulation.move(rod.start, (0, 0, 0.1), over=0.05)
     simulation.step(10)
     assert simulation.positions(rod)[0] == pytest.approx((0, 0, 0.1), abs=1e-14)
-    with pytest.raises(ValueError, match="a pin holds no direction"):
+    with pytest.raises(ValueError, match="a pin does not hold directions"):
         simulation.move(rod.start, roll=1.0)
-    with pytest.raises(ValueError, match="a pin holds no direction"):
+    with pytest.raises(ValueError, match="a pin does not hold directions"):
         simulation.move(rod.start, path=lambda t: ((0, 0, 0), np.eye(3)))
 
 

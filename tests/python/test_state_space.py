@@ -199,9 +199,9 @@ def test_what_is_no_state_vector_is_refused():
     for call, message in (
         (lambda: sim.displace_state(np.zeros(3)), "numbers, got 3"),
         (lambda: sim.displace_state(np.full(count, np.nan)), "finite"),
-        (lambda: sim.state_difference(np.zeros(3)), "must be a Simulation"),
+        (lambda: sim.state_difference(np.zeros(3)), "must be a copy"),
         (lambda: sim.state_difference(other), "same supports"),
-        (lambda: sim.step_jacobian(["initial_positions"]), "leave them out"),
+        (lambda: sim.step_jacobian(["initial_positions"]), "wrt must not hold initial states"),
         (lambda: sim.step_jacobian([(sim["arm"], "colour")]), "no 'colour'"),
     ):
         with pytest.raises(ValueError, match=message):

@@ -35,7 +35,7 @@ _MAX_STEPS = 2**31 - 1
 
 
 @keyword_hints
-@known_attributes("set changes what acts, such as set(gravity=[(0, 0, -1.6)])")
+@known_attributes("use set, such as set(gravity=[(0, 0, -1.6)])")
 class Batch(Setting, Reading):
     """Many simulations of one shape, stepped in one call over threads, and read out into one array.
 
@@ -166,7 +166,7 @@ class Batch(Setting, Reading):
             if left:
                 lane, name, time = left[0]
                 more = f", and {len(left) - 1} more" if len(left) > 1 else ""
-                report_left(f"ring {name!r} of simulation {lane} (time {time:.6g} s){more}: released")
+                report_left(f"ring {name!r} of simulation {lane} (time {time:.6g} s){more}: the ring was released")
 
     def run(
         self,

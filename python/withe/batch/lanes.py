@@ -106,7 +106,9 @@ class Lanes:
             raise ValueError(f"{what} must lie in {-size}..{size - 1}, got {number}")
         numbers = (numbers % size).astype(np.intc)
         if len(np.unique(numbers)) < len(numbers):
-            raise ValueError(f"{what} must differ, got {given!r:.80}: numbers of simulations, where a mask is of bool")
+            raise ValueError(
+                f"{what} must be different numbers of simulations, got {given!r:.80}: a mask must hold booleans"
+            )
         return numbers
 
     @property

@@ -37,8 +37,8 @@ _UNITS = {
     "radii": "m",
 }
 _OTHER_FORMATS = (
-    "to_vtk writes for ParaView; a table is numpy.savetxt(path, "
-    "numpy.column_stack([record.times, record.positions(rod)[:, -1]]), delimiter=','), of a tip say"
+    "use to_vtk for ParaView, or write a table such as numpy.savetxt(path, numpy.column_stack([record.times, "
+    "record.positions(rod)[:, -1]]), delimiter=',')"
 )
 ROD_READOUTS = ("directors", "curvatures", "twists", "tensions", "spins")
 
@@ -132,7 +132,10 @@ class Record:
         files, and unpickled ones, have none.
         """
         if self._derivatives is None:
-            raise ValueError("this record has no gradient: run with differentiable=True, and ask before it is saved")
+            raise ValueError(
+                "this record has no gradient: run with differentiable=True, and compute gradients before the record is "
+                "saved"
+            )
         return self._derivatives.gradient(by, wrt)
 
     def _check(self) -> None:
@@ -284,7 +287,7 @@ class Record:
             A record from a file that was written before spins were recorded.
         """
         if f"rod_{self._index(rod)}_spins" not in self._arrays:
-            raise ValueError("record holds no spins: its file was written before they were recorded")
+            raise ValueError("record holds no spins, because its file was written by an older version")
         return self._of_rod("spins", rod)
 
     def energy(self) -> EnergyHistory:
@@ -311,7 +314,7 @@ class Record:
         """
         if name not in self._extras:
             known = ", ".join(map(repr, self._extras)) or "nothing"
-            raise KeyError(f"nothing was recorded as {name!r}; known: {known}")
+            raise KeyError(f"record has no quantity {name!r}; it has {known}")
         return self._arrays[f"extra_{self._extras.index(name)}"].copy()
 
     def _nodal(self, name: str, rod: Named | None) -> FloatArray:

@@ -247,8 +247,8 @@ class Ledger:
         }
         if self._poses and not by_moves:
             raise ValueError(
-                "no gradient of reaction moments by the pose of a support or an obstacle is available with "
-                "integrator='implicit_midpoint' or 'fourth_order', nor in space with hold='edge': take "
+                "no gradient of reaction moments with respect to the pose of a support or obstacle is available "
+                "with integrator='implicit_midpoint' or 'fourth_order', nor in space with hold='edge': use "
                 "integrator='energy_momentum' or 'backward_euler', and hold='frame'"
             )
         for place in self._poses:
@@ -334,7 +334,8 @@ class Ledger:
                 return reader(OfRun(found))
             if word == "radius":
                 raise ValueError(
-                    f"no gradient by the radius of {part.owner}: its numbers were set in the course of the run"
+                    f"no gradient with respect to radius of {part.owner} is available, because parameters of the "
+                    "rod were set during the run"
                 )
             arrays = set() if key in epoch.live else epoch.arrays(part, word, initial=True)
             return self._by_rod(epoch, part, word, arrays, np.shape(reader(OfRun(found))), found)

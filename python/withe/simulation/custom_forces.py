@@ -88,10 +88,10 @@ class CustomForces:
             count, (word, unit) = len(positions), words[which]
             kind = "force" if row < 3 * count else "moment"
             raise ValueError(
-                f"jacobian of custom force {part.name!r} must be the derivative of what the function returns: for the "
-                f"{kind} on node {row // 3 % count} along {'xyz'[row % 3]} by the {word} of node {column // 3} along "
-                f"{'xyz'[column % 3]} it says {found[row, column]:.6g} {unit}, differences say "
-                f"{expected[row, column]:.6g} {unit}"
+                f"jacobian of custom force {part.name!r} must be the derivative of the returned forces and "
+                f"moments: for the {kind} on node {row // 3 % count} along {'xyz'[row % 3]} by the {word} of node "
+                f"{column // 3} along {'xyz'[column % 3]}, the jacobian has {found[row, column]:.6g} {unit} and "
+                f"finite differences give {expected[row, column]:.6g} {unit}"
             )
 
     def _value(self, part: CustomForcePart, time: float, positions: FloatArray, velocities: FloatArray) -> FloatArray:

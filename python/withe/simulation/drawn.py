@@ -215,18 +215,18 @@ def _springs_as_drawn(session: Session, parts: list[RodPart], begin: Moment) -> 
 
 
 def _refuse(part: RodPart, why: str) -> None:
-    raise ValueError(f"no gradient by points of {part.owner} is known {why}")
+    raise ValueError(f"no gradient with respect to points of {part.owner} is available {why}")
 
 
 def _check_run(session: Session, asked: RodPart, part: RodPart, begin: Moment) -> None:
     """Refuses runs that do not begin where rods were drawn, and what moves only runs."""
     if session.directory.all(FluidPart):
-        _refuse(asked, "in a fluid, whose resistance goes with the whole length of a rod")
+        _refuse(asked, "in a fluid, whose resistance depends on the whole length of a rod")
     near = 1e-9 * part.lengths.min()
     off = np.abs(begin.positions[session.directory.layout.rows(part.index)] - part.points).max() > near
     turned = session.world.plane_normal is None and np.abs(begin.directors[part.index] - part.directors).max() > 1e-9
     if off or turned or not begin.frames_as_drawn:
-        _refuse(asked, "by a run that began elsewhere than it was drawn: run from where it is built")
+        _refuse(asked, "for a run that began away from the drawn state: run from the state after build")
 
 
 def _check(session: Session, asked: RodPart, part: RodPart, begin: Moment) -> None:
@@ -236,17 +236,17 @@ def _check(session: Session, asked: RodPart, part: RodPart, begin: Moment) -> No
         _refuse(asked, why)
 
     if part.drawing is None or not np.array_equal(part.arcs, part.lengths):
-        whose = "" if part is asked else f" of {part.owner}, which is joined to it,"
-        refuse(f"where nodes= found those{whose} or curvature is discrete: draw the nodes themselves")
+        whose = "" if part is asked else f"of {part.owner}, which is joined to the rod,"
+        refuse(f"when nodes= resampled the points{whose} or curvature is discrete: draw one point per node")
     for index, support in session.settings.supports.values():
         if support.node[0] != part.index:
             continue
         if support.grasp is not None:
-            refuse("where a hand holds a rod")
+            refuse("when a hand holds a rod")
         if support.kind in ("spinning_clamp", "spinning_edge"):
-            refuse(f"where {support.name!r} lets it spin about how it was drawn")
+            refuse(f"when {support.name!r} lets the rod spin about its drawn tangent")
         if index not in begin.supports:
-            refuse(f"where {support.name!r} came while it ran")
+            refuse(f"when {support.name!r} was added during the run")
         at, turn = begin.supports[index][0] - part.points[support.node[1]], begin.supports[index][1] - np.eye(3)
         if np.abs(at).max() > 1e-9 * part.lengths.min() or np.abs(turn).max() > 1e-9:
-            refuse(f"once {support.name!r} has moved")
+            refuse(f"after {support.name!r} has moved")

@@ -81,7 +81,7 @@ def check_jacobian(session: Session, force: CustomForce | str | None) -> None:
         given = [session.directory.find(force, CustomForcePart, "custom force")]
     custom = force_function(session)
     if custom is None or not given:
-        raise ValueError("there is no jacobian to check: give add_custom_force one")
+        raise ValueError("scene has no jacobian to check: use add_custom_force(jacobian=)")
     positions, velocities = np.array(session.world.positions()), np.array(session.world.velocities())
     for part in given:
         custom.check(part, session.world.time, positions, velocities)

@@ -106,8 +106,8 @@ def _gradients(session: Session, by: list[_core.ReadoutAdjoint], wrt: Sequence[U
             if drives > _DRIVES * typical:
                 name = unknown if isinstance(unknown, str) else f"{unknown[1]} of {spoken(unknown[0])}"
                 raise ValueError(
-                    f"no gradient by {name} is known: it drives a motion that costs nothing, and where that "
-                    "leads does not follow from what acts; hold what is free to move or to spin"
+                    f"no gradient with respect to {name} is available, because {name} drives a motion without "
+                    "resistance: support the rods so that none can move or spin freely"
                 )
         out.append([read(gradient) for gradient in scalars])
     return out
@@ -288,5 +288,7 @@ class RunDerivatives:
     def _drawn(self, unknown: Any) -> DrawnNodes:
         part = self._session.directory.rod(unknown[0])
         if any(isinstance(call.part, SupportPart) for call in self._journal.calls):
-            raise ValueError(f"no gradient by points of {part.owner} is known once a support has moved")
+            raise ValueError(
+                f"no gradient with respect to points of {part.owner} is available after a support has moved"
+            )
         return DrawnNodes(self._session, part, self._begin, run=True)

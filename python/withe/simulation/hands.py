@@ -164,7 +164,7 @@ def find_hand(session: Session, hand: Handle | str) -> int:
     """
     index, part = find_support(session, hand)
     if part.grasp is None:
-        raise ValueError(f"hand must be what grasp returned, got the support {part.name!r}")
+        raise ValueError(f"hand must be a hand returned by grasp, got the support {part.name!r}")
     return index
 
 
@@ -197,7 +197,7 @@ def feed_ring(session: Session, hand: Handle | str, rate: float) -> None:
     index, grasp = _find_ring(session, hand)
     name = hand if isinstance(hand, str) else hand.name
     if grasp.feed_rate is None:
-        raise ValueError(f"hand {name!r} has no drive: grasp with slides=True and feed_rate=0")
+        raise ValueError(f"hand {name!r} has no drive: use grasp with slides=True and feed_rate=0")
     session.world.feed(index, validation.number(rate, f"rate of {name!r}"))
 
 
@@ -227,7 +227,7 @@ def forget_left_rings(session: Session, left: Iterable[tuple[int, float]]) -> No
 def _find_ring(session: Session, hand: Handle | str) -> tuple[int, Grasp]:
     index, part = find_support(session, hand)
     if part.grasp is None or not part.grasp.slides:
-        raise ValueError(f"hand must be a ring, which grasp(slides=True) returns, got {part.name!r}")
+        raise ValueError(f"hand must be a ring returned by grasp(slides=True), got {part.name!r}")
     return index, part.grasp
 
 

@@ -44,5 +44,5 @@ def find_joint(session: Session, joint: Joint | str) -> int:
     """
     part = session.directory.find(joint, JoinPart, "joint")
     if part.axis is None:
-        raise ValueError(f"joint {part.name!r} is {part.kind}: revolute ones have an angle")
+        raise ValueError(f"joint {part.name!r} must be revolute to have an angle, got kind {part.kind}")
     return joint_index(session, part)

@@ -73,7 +73,8 @@ def remove_load(session: Session, load: Load | str) -> None:
     part = session.directory.find(load, LoadPart, "load")
     if part.name not in session.settings.loads:
         raise ValueError(
-            f"load {part.name!r} was drawn with the scene, and stays: set({part.name!r}, {part.kind}=...) to zero"
+            f"load {part.name!r} belongs to the scene and cannot be removed: use set({part.name!r}, "
+            f"{part.kind}=...) to make it zero"
         )
     session.world.remove_load(load_index(session, part))
     del session.settings.loads[part.name]

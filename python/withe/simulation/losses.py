@@ -38,7 +38,7 @@ def readout_shape(session: Session, of: Rod | Support | NodeHandle | str, word: 
         return (len(part.tangents), *_OF_EDGES[word])
     if word in _OF_STENCILS:
         return (len(part.voronoi), *_OF_STENCILS[word])
-    raise ValueError(f"there is no read-out {word!r} of {part.owner}; it has {', '.join(READOUTS)}")
+    raise ValueError(f"{part.owner} has no read-out {word!r}; its read-outs are {', '.join(READOUTS)}")
 
 
 def readout_adjoints(
@@ -50,7 +50,7 @@ def readout_adjoints(
     """
     if not isinstance(by, Mapping) or not by or not set(by) <= set(READOUTS):
         got = ", ".join(map(repr, by)) or "none" if isinstance(by, Mapping) else type(by).__name__
-        raise ValueError(f"what a gradient is of must be derivatives by {', '.join(READOUTS)}, got {got}")
+        raise ValueError(f"gradient needs derivatives with respect to {', '.join(READOUTS)}, got {got}")
     tables = {word: _table(session, word, value, frames) for word, value in by.items()}
     for word in set(tables) & set(_NODAL) if in_plane else ():
         check_in_plane(session, tables[word], word)
@@ -72,8 +72,8 @@ def check_in_plane(session: Session, array: FloatArray, name: str) -> None:
         return
     if np.abs(array @ normal).max() > 1e-9 * max(np.abs(array).max(), 1e-300):
         raise ValueError(
-            f"{name} must lie in the plane of the scene, where it moves: build with planar=False, or leave out "
-            f"what points along its normal, {normal}"
+            f"{name} must lie in the plane of the scene: set the component along the normal {normal} to zero, or "
+            "build with planar=False"
         )
 
 

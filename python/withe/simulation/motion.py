@@ -168,13 +168,13 @@ def make_path(path: PathLike, turns: bool, owner: str) -> Path:
         return Both(*path)
     rows = validation.number_array(path, what, ("poses", 4), ("poses", 8))
     if len(rows) < 2:
-        raise ValueError(f"{what} must have two rows or more to lead anywhere, got {len(rows)}")
+        raise ValueError(f"{what} must have at least two rows, got {len(rows)}")
     steps = np.diff(rows[:, 0])
     if steps.min() <= 0.0:
         row = int(np.argmin(steps))
-        raise ValueError(f"{what} must have times that grow, got {rows[row, 0]:g} s and then {rows[row + 1, 0]:g} s")
+        raise ValueError(f"{what} must have increasing times, got {rows[row, 0]:g} s and then {rows[row + 1, 0]:g} s")
     if rows.shape[1] == 8 and not turns:
-        raise ValueError(f"{what} must have positions only, (t, x, y, z): a pin holds no direction")
+        raise ValueError(f"{what} must have positions only, (t, x, y, z), because a pin does not hold directions")
     turned = [
         validation.quaternion_matrix(row[4:], f"row {i} of the {what}") for i, row in enumerate(rows) if len(row) == 8
     ]
@@ -234,6 +234,6 @@ def evaluate_path(path: Path, time: float, turns: bool, owner: str) -> Pose:
     if isinstance(value, tuple | list) and len(value) == 2:
         position = validation.vector(value[0], f"position on the {what}")
         if not turns:
-            raise ValueError(f"{what} must be a position only: a pin holds no direction")
+            raise ValueError(f"{what} must be a position only, because a pin does not hold directions")
         return position, validation.rotation_matrix(value[1], f"rotation on the {what}")
     return validation.vector(value, what), None

@@ -45,7 +45,7 @@ def move_obstacle(
     part = session.directory.all(ObstaclePart)[index]
     if path is not None:
         if any(value is not None for value in (position, tangent, roll)) or over != 0.0:
-            raise ValueError(f"path of {name!r} must be given alone")
+            raise ValueError(f"path of {name!r} must not be combined with position, tangent, roll or over")
         validation.function(path, f"path of {name!r}")
         _, turned = obstacle_pose(session, index, path, session.world.time)
         session.settings.paths[name, "position"] = path
@@ -58,11 +58,11 @@ def move_obstacle(
     place = None if position is None else validation.vector(position, f"position of {name!r}")
     turn, axis = None, part.axis
     if (tangent is None) != (axis is not None or roll is None):
-        what = "a sphere turns about the tangent that is given with a roll"
+        what = "a sphere needs a tangent as the axis of its roll"
         raise ValueError(
             f"tangent of {name!r} must be given: {what}"
             if tangent is None
-            else f"tangent of {name!r} must be None: only {what}, others about their axis"
+            else f"tangent of {name!r} must be None: only a sphere takes a tangent"
         )
     if roll is not None:
         about = validation.unit_vector(tangent, f"tangent of {name!r}") if axis is None else axis

@@ -68,7 +68,7 @@ _SET_ROD = (*ROD_WORDS, *NATURAL_WORDS)
 def set_values(session: Session, target: Settable | str | None, values: dict[str, Any]) -> None:
     """Change parameters; see `Simulation.set`."""
     if not values:
-        raise ValueError("set must be given what to set, such as youngs_modulus=1e6")
+        raise ValueError("set needs at least one parameter, such as youngs_modulus=1e6")
     if isinstance(target, tuple):
         _set_between(session, target, values)
         return
@@ -96,14 +96,14 @@ def _set_support(session: Session, part: SupportPart, values: dict[str, Any]) ->
 
 def _set_between(session: Session, bodies: tuple[Any, ...], values: dict[str, Any]) -> None:
     if len(bodies) != 2:
-        raise ValueError(f"target must be a part, or two bodies that touch, got {len(bodies)}")
+        raise ValueError(f"target must be a part or a pair of bodies, got {len(bodies)} bodies")
     _only(values, ("friction",), "a pair of bodies")
     set_pair_friction(session, *bodies, values["friction"])
 
 
 def _between(session: Session, bodies: tuple[Any, ...], word: str) -> Any:
     if len(bodies) != 2 or word != "friction":
-        raise ValueError(f"two bodies that touch have 'friction' only, got {word!r} of {len(bodies)}")
+        raise ValueError(f"a pair of bodies has 'friction' only, got {word!r} of {len(bodies)} bodies")
     given = pair_value(session, *bodies)
     if given is not None:
         return given
@@ -159,7 +159,7 @@ def get_value(session: Session, target: Settable | Support | str, word: str | No
         if isinstance(target, str) and target in SCENE_WORDS:
             return scene_value(session, target)
         if not isinstance(target, str) or target != "gravity":
-            raise ValueError("word must be given, such as get(arm, 'youngs_modulus')")
+            raise ValueError("get needs a parameter, such as get(arm, 'youngs_modulus')")
         return session.settings.gravity.copy()
     if isinstance(target, tuple):
         return _between(session, target, word)
@@ -230,7 +230,7 @@ def _set_rod(session: Session, part: RodPart, values: dict[str, Any]) -> None:
 def _set_fluid(session: Session, part: FluidPart, values: dict[str, Any]) -> None:
     numbers = {word: validation.positive(value, f"{word} of {part.name!r}") for word, value in values.items()}
     if "regularization" in numbers and part.model != "stokeslets":
-        raise ValueError(f"regularization of {part.name!r} is that of Stokeslets: its model is {part.model!r}")
+        raise ValueError(f"regularization of {part.name!r} needs model='stokeslets', got model={part.model!r}")
     session.world.set(0, {f"fluid_{word}": number for word, number in numbers.items()})
     if "viscosity" in numbers:
         session.settings.fluids = session.settings.fluids | {part.name: numbers["viscosity"]}

@@ -99,12 +99,12 @@ def path_options(
     parts = [directory.find(handle, LoadPart, "load") for handle in handles]
     for part in parts:
         if part.name in functions:
-            raise ValueError(f"load {part.name!r} is a function of time, which a load factor has no place in")
+            raise ValueError(f"load {part.name!r} must be constant to be scaled along a path, got a function of time")
     begin, end = validation.number(start, "start"), validation.number(to, "to")
     if begin == end:
-        raise ValueError(f"to must be another load factor than start, got {end} for both")
+        raise ValueError(f"to must differ from start, got {end} for both")
     if begin != 0.0 and not parts:
-        raise ValueError(f"start must be 0 where no load is given, got {begin}")
+        raise ValueError(f"start must be 0 when no load is given, got {begin}")
     count = validation.integer(steps, "steps", 1, _MAX_STEPS)
     return PathOptions(parts, begin, end, count, validation.positive(turn, "turn"))
 

@@ -209,7 +209,9 @@ class Placement:
         if path is not None and not callable(path):
             raise ValueError(f"path of {obstacle[1]!r} must be a function of time")
         if rotation is not None:
-            raise ValueError(f"rotation of {obstacle[1]!r} must be None: an obstacle turns by a roll about its axis")
+            raise ValueError(
+                f"rotation of {obstacle[1]!r} must be None, because an obstacle turns by a roll about its axis"
+            )
         move_obstacle(self._session, *obstacle, position, tangent, roll, over, path)
 
     def set_friction(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, friction: Friction) -> None:

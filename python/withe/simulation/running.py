@@ -76,11 +76,11 @@ def run_many(
     """
     listed = listed_simulations(simulations)
     if len({id(simulation) for simulation in listed}) < len(listed):
-        raise ValueError("simulations must differ: one is there twice, take a copy()")
+        raise ValueError("simulations must be different objects, got one twice: use a copy()")
     validation.choice(errors, "errors", ("raise", "return"))
     if client is not None:
         if workers is not None:
-            raise ValueError("workers is a number of threads of this process: leave it out beside client")
+            raise ValueError("workers must not be given with client: workers are threads of this process")
         options = {"record_every": record_every, "before_step": before_step, "until": until, "record": record}
         return run_on(client, listed, duration, errors, progress, options)
     threads = thread_count(workers)

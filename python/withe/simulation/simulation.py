@@ -48,9 +48,7 @@ _MAX_STEPS = 2**31 - 1
 
 
 @keyword_hints
-@known_attributes(
-    "set changes what acts, such as set(gravity=(0, 0, -1.6)), and Scene.build takes what steps are made of"
-)
+@known_attributes("use set, such as set(gravity=(0, 0, -1.6)), or an option of Scene.build")
 class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
     """A scene while it runs. Made by `Scene.build`.
 
@@ -313,7 +311,7 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
             There was none.
         """
         if self._stepping.recorder is None:
-            raise RuntimeError("there is no record: call run first")
+            raise RuntimeError("simulation has no record: call run first")
         return self._stepping.recorder.record
 
     # At a moment
@@ -382,9 +380,7 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
         elif isinstance(snapshot, Snapshot):
             restore(self._session, snapshot)
         else:
-            raise ValueError(
-                f"snapshot must be a withe.Snapshot, got {type(snapshot).__name__}; a withe.Record will do too"
-            )
+            raise ValueError(f"snapshot must be a withe.Snapshot or a withe.Record, got {type(snapshot).__name__}")
         self._stepping.frame_time = None
         self._session.restorations += 1
 

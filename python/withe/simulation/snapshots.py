@@ -289,8 +289,8 @@ def _matched(snapshot: Snapshot, mine: Settings, directory: Directory, scene: Di
     for names in snapshot._fields:
         if names not in settings.frictions:
             raise ValueError(
-                f"snapshot needs the friction of {' and '.join(map(repr, names))}, a function of position, which no"
-                " file holds: set it on this simulation first"
+                "snapshot files do not store functions of position: set the friction of "
+                f"{' and '.join(map(repr, names))} on this simulation first"
             )
     for name in snapshot._missing:
         drawn = scene.parts.get(name)
@@ -306,7 +306,7 @@ def _matched(snapshot: Snapshot, mine: Settings, directory: Directory, scene: Di
             settings.functions[name] = drawn.function
         else:
             raise ValueError(
-                f"snapshot needs the function of time of {name!r}, which no file holds: set it on this simulation first"
+                f"snapshot files do not store functions of time: set the function of {name!r} on this simulation first"
             )
     return settings
 

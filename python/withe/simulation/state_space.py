@@ -79,7 +79,10 @@ class StateSpace:
         check_list(wrt, may_be_empty=True)
         readers = [unknown_reader(session, unknown) for unknown in wrt]
         if any(isinstance(unknown, str) and unknown.startswith("initial_") for unknown in wrt):
-            raise ValueError("step_jacobian has the derivatives by the present state in A: leave them out of wrt")
+            raise ValueError(
+                "wrt must not hold initial states, because step_jacobian returns the derivatives by the present state "
+                "as A"
+            )
         ahead = Stepping(session.copy())
         if session.settings.functions:  # loads as they act in the step
             now, dt = session.world.time, session.options.time_step
@@ -110,7 +113,7 @@ class StateSpace:
             A simulation of another scene, or with other supports.
         """
         if not isinstance(reference, StateSpace):
-            raise ValueError(f"reference must be a Simulation, a copy() of this one; got {type(reference).__name__}")
+            raise ValueError(f"reference must be a copy() of this simulation, got {type(reference).__name__}")
         return np.array(self._session.world.state_difference(reference._session.world))
 
     def displace_state(self, by: npt.ArrayLike) -> None:

@@ -121,7 +121,7 @@ def _tangents(points: FloatArray, part: RodPart) -> FloatArray:
     lengths = np.linalg.norm(edges, axis=1)
     if not lengths.min() > 1e-6 * part.lengths.min():
         raise ValueError(
-            f"positions of {part.owner} must not leave an edge without length, as at {int(lengths.argmin())}"
+            f"positions of {part.owner} must not give an edge zero length, but do for edge {int(lengths.argmin())}"
         )
     return np.asarray(edges / lengths[:, None])
 
@@ -182,8 +182,8 @@ def _laid(
         excess -= 2.0 * np.pi * round(excess / (2.0 * np.pi))
         if must_close and abs(excess) > 1e-6:
             raise ValueError(
-                f"twist of {part.owner} must close it: its last edge meets the first off by {excess:.6g} rad; "
-                "give directors instead, or spread that over the rod"
+                f"twist of {part.owner} must close the rod, but the last edge is turned by {excess:.6g} rad "
+                "against the first: give directors instead, or spread the difference over the rod"
             )
         if abs(excess) < 1e-12:
             break

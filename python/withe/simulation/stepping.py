@@ -85,8 +85,8 @@ class Stepping:
         begun = [name for (_, name), time in self.session.settings.ramps.items() if time == world.time]
         if begun:
             warn(
-                f"{begun[0]!r} has not begun to go where over= leads it: time stands still in equilibrium(), so leave "
-                "out over= to be there at once, or step() or run() first",
+                f"the ramp of {begun[0]!r} (over=) has not begun, and time does not advance in equilibrium(): "
+                "leave out over= to apply the target at once, or call step() or run() first",
                 cause="over",
             )
         apply_functions(self.session, world.time, world.time)
@@ -115,7 +115,9 @@ class Stepping:
 
         def check() -> None:
             if session.world.positions().tobytes() != found:
-                raise ValueError("the simulation has left this equilibrium: ask for gradients before it goes on")
+                raise ValueError(
+                    "the simulation has left this equilibrium: compute gradients before the next step or change"
+                )
 
         def gradient(dL_dx: Any, wrt: Sequence[Unknown]) -> list[Any]:
             check()
@@ -169,8 +171,8 @@ class Stepping:
         """Refuse what would change the time or the state behind the back of a run, whose record were wrong then."""
         if self._running:
             raise RuntimeError(
-                f"{what} cannot be called while the simulation runs: before_step may read, set and hold it, until and "
-                "record may read it, and all may go on with a copy()"
+                f"{what} cannot be called while the simulation runs. before_step may read, set values and hold "
+                "rods; until and record may only read. Use a copy() for everything else"
             )
 
     @contextmanager
@@ -218,4 +220,4 @@ def pass_on(sessions: Sequence[Session], found: _core.Warnings) -> None:
 
 def report_left(what: str) -> None:
     """Say that a ring was left, which one, and what came of it."""
-    warn(f"the end of a rod has passed out of {what}", RingLeftWarning)
+    warn(f"the end of a rod has left {what}", RingLeftWarning)

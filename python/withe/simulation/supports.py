@@ -65,7 +65,7 @@ def find_support(session: Session, support: Handle | str) -> tuple[int, SupportP
         for index, part in session.settings.supports.values():
             if session.directory.row(part.node) == row:
                 return index, part
-        raise ValueError(f"node {name!r} is not held: clamp or pin it first")
+        raise ValueError(f"node {name!r} is not held: clamp or pin the node first")
     # One that came while running leaves the directory when it goes.
     gone = (
         isinstance(support, Support)
@@ -77,7 +77,7 @@ def find_support(session: Session, support: Handle | str) -> tuple[int, SupportP
         if part.name in session.settings.supports:
             return session.settings.supports[part.name]
     name = support if isinstance(support, str) else support.name
-    raise ValueError(f"support {name!r} is released: it is not in the scene any more")
+    raise ValueError(f"support {name!r} is released and no longer in the scene")
 
 
 def move_support(
@@ -96,7 +96,7 @@ def move_support(
     owner = _owner(part)
     if path is not None:
         if any(value is not None for value in (position, rotation, tangent, roll)) or over != 0.0:
-            raise ValueError(f"path of {owner} must be given alone")
+            raise ValueError(f"path of {owner} must not be combined with position, rotation, tangent, roll or over")
         way = make_path(path, turns, owner)
         _, turned = evaluate_path(way, session.world.time, turns, owner)
         session.settings.paths[part.name, "position"] = way
@@ -107,7 +107,7 @@ def move_support(
     if rotation is not None and (tangent is not None or roll is not None):
         raise ValueError(f"rotation of {owner} must not be given together with tangent or roll")
     if not turns and any(value is not None for value in (rotation, tangent, roll)):
-        raise ValueError(f"rotation, tangent and roll of {owner} must be None: a pin holds no direction")
+        raise ValueError(f"rotation, tangent and roll of {owner} must be None, because a pin does not hold directions")
     over = validation.non_negative(over, "over")
     target = None if position is None else validation.vector(position, f"position of {owner}")
     matrix = None if rotation is None else validation.rotation_matrix(rotation, f"rotation of {owner}")
@@ -201,9 +201,9 @@ def _check_turns(session: Session, way: float, over: float, owner: str) -> None:
         return
     if abs(way) * min(step / over if over > 0.0 else 1.0, 1.0) > np.pi:
         raise ValueError(
-            f"roll of {owner} must turn by at most half a turn in a time step, got {way:g} rad "
-            f"{'at once' if over == 0.0 else f'over {over:g} s'}: take over={1.5 * abs(way) / np.pi * step:.2g} or "
-            "more and step there, or build(integrator='static') for equilibria, which count full turns at once"
+            f"roll of {owner} must be at most half a turn per time step, got {way:g} rad "
+            f"{'at once' if over == 0.0 else f'over {over:g} s'}: use over={1.5 * abs(way) / np.pi * step:.2g} or "
+            "more and call step, or build(integrator='static') for equilibria, which count full turns at once"
         )
 
 

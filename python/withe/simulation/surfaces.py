@@ -57,14 +57,15 @@ def set_scene(session: Session, values: dict[str, Any]) -> None:
             setattr(contact, word, check(values[word], word))
             if not contact.rods:
                 raise ValueError(
-                    f"{word} of the scene is that between rods, which do not touch: see Scene.enable_contact"
+                    f"{word} of the scene applies to contact between rods, which is off: call Scene.enable_contact "
+                    "before build"
                 )
     if "slip_tolerance" in values:
         contact.slip_tolerance = validation.positive(values["slip_tolerance"], "slip_tolerance")
     if "contact_stiffness" in values:
         stiffness = values["contact_stiffness"]
         if not (contact.rods or contact.obstacles):
-            raise ValueError("contact_stiffness cannot be set: nothing touches in this scene")
+            raise ValueError("contact_stiffness cannot be set, because this scene has no contact")
         contact.stiffness = 0.0 if stiffness is None else validation.positive(stiffness, "contact_stiffness")
     session.world.set_contact(contact)
 
@@ -183,12 +184,14 @@ def _pair(
     """Two bodies that may touch."""
     first, second = (touching(session.directory, body) for body in (a, b))
     if isinstance(first, ObstaclePart) and isinstance(second, ObstaclePart):
-        raise ValueError(f"{first.name!r} and {second.name!r} are both obstacles, which never touch")
+        raise ValueError(
+            f"{first.name!r} and {second.name!r} are both obstacles, which never touch: name at least one rod"
+        )
     contact = session.world.contact
     if isinstance(first, RodPart) and isinstance(second, RodPart) and not contact.rods:
         raise ValueError(
-            f"{word} of {first.name!r} and {second.name!r} cannot be set: rods do not touch in this scene, see "
-            "Scene.enable_contact"
+            f"{word} of {first.name!r} and {second.name!r} cannot be set, because contact between rods is off: "
+            "call Scene.enable_contact before build"
         )
     return first, second, contact
 

@@ -104,7 +104,7 @@ def unknown_readers(session: Session, wrt: Sequence[Unknown]) -> list[Reader]:
 def check_list(wrt: Sequence[Unknown], *, may_be_empty: bool = False) -> None:
     """Refuse what is no list, or empty."""
     if isinstance(wrt, str) or not isinstance(wrt, Sequence) or not (wrt or may_be_empty):
-        raise ValueError('wrt must be a list of what to differentiate by, such as [(arm, "youngs_modulus"), "gravity"]')
+        raise ValueError('wrt must be a list of parameters, such as [(arm, "youngs_modulus"), "gravity"]')
 
 
 def is_points(unknown: Unknown) -> bool:
@@ -119,10 +119,10 @@ def unknown_reader(session: Session, unknown: Unknown | Remaining) -> Reader:
     if isinstance(unknown, str):
         return scene_reader(session, unknown)
     if not isinstance(unknown, tuple) or len(unknown) != 2 or not isinstance(unknown[1], str):
-        raise ValueError(f"wrt must hold pairs of a part and a word of set, or words of the scene; got {unknown!r}")
+        raise ValueError(f"wrt must hold pairs of a part and a parameter, or parameters of the scene, got {unknown!r}")
     target, word = unknown
     if isinstance(target, NodeHandle):
-        raise ValueError(f"wrt must name a part, got the node {target.name}: the support there, or its rod")
+        raise ValueError(f"wrt must name a part, got the node {target.name}: name the support at the node, or the rod")
     return reader_of(session, part_of(session, target), word)
 
 
@@ -130,7 +130,7 @@ def part_of(session: Session, target: Any) -> Part | BodyPair:
     """What `wrt` names: a part, or two bodies."""
     if isinstance(target, tuple):
         if len(target) != 2:
-            raise ValueError(f"two bodies with a friction of their own are a pair, got {target!r}")
+            raise ValueError(f"wrt must name two bodies by a pair, got {target!r}")
         return BodyPair(*(touching(session.directory, body) for body in target))
     return session.directory.find_any(target, "wrt")
 
@@ -172,7 +172,7 @@ def reader_of(session: Session, part: Part | BodyPair, word: str) -> Reader:
         return _pose_reader(session, part, word)
     if isinstance(part, SupportPart) and word in HAND_WORDS:
         return _hand_reader(session, part, word)
-    raise ValueError(f"no gradient is known by {word!r} of {part.name!r}")
+    raise ValueError(f"no gradient with respect to {word!r} of {part.name!r} is available")
 
 
 def _remaining_reader(session: Session, remaining: Remaining) -> Reader:
@@ -187,7 +187,9 @@ def _remaining_reader(session: Session, remaining: Remaining) -> Reader:
 def _load_reader(session: Session, part: LoadPart) -> Reader:
     rows, axis, shape = load_rows(session, part), part.axis, part.value.shape
     if part.name in session.settings.functions:
-        raise ValueError(f"{part.name!r} is a function of time: no gradient by its one value")
+        raise ValueError(
+            f"no gradient with respect to {part.name!r} is available, because {part.name!r} is a function of time"
+        )
     if axis is None:
         return lambda g: g.parameters.loads[rows].reshape(shape)
     return lambda g: (g.parameters.loads[rows].reshape(shape) @ axis)[()]
@@ -211,7 +213,8 @@ def _place_reader(session: Session, part: ObstaclePart) -> Reader:
 def _of_equilibrium(gradient: _core.EquilibriumGradient | OfRun, name: str) -> _core.EquilibriumGradient:
     if isinstance(gradient, OfRun):
         raise ValueError(
-            f"a step has no derivative by the pose of {name!r}; equilibria, runs and calls of move have one"
+            f"step_jacobian is not available with respect to the pose of {name!r}; gradients of equilibria, runs "
+            "and calls of move are"
         )
     return gradient
 
@@ -219,9 +222,13 @@ def _of_equilibrium(gradient: _core.EquilibriumGradient | OfRun, name: str) -> _
 def _hand_reader(session: Session, part: SupportPart, word: str) -> Reader:
     grasp = part.grasp
     if grasp is None or grasp.stiffness is None:
-        raise ValueError(f"{part.name!r} has no {word} to differentiate by: it is no hand that yields")
+        raise ValueError(
+            f"{part.name!r} has no {word} to differentiate by, because {part.name!r} is not a hand that yields"
+        )
     if grasp.slides:
-        raise ValueError(f"no gradient is known by the {word} of {part.name!r}, which is a ring")
+        raise ValueError(
+            f"no gradient with respect to the {word} of {part.name!r} is available, because {part.name!r} is a ring"
+        )
     index = session.settings.supports[part.name][0]
     if word == "stiffness":
         return lambda g: np.array(g.parameters.hand_stiffness[index])
@@ -247,7 +254,7 @@ def _friction_given(session: Session, part: ObstaclePart | BodyPair) -> float | 
     else:
         directions = own_friction(pair_between(contact.pairs, part.bodies(session.directory)))
         if directions is None:
-            raise ValueError(f"{part.name} have no friction of their own: give them one by set_friction")
+            raise ValueError(f"{part.name} have no friction of their own to differentiate by: call set_friction first")
         given = as_given(directions)
     _check_rubs(np.max(given), part.name)
     return given
@@ -255,7 +262,7 @@ def _friction_given(session: Session, part: ObstaclePart | BodyPair) -> float | 
 
 def _check_rubs(friction: float, what: str) -> None:
     if not friction > 0.0:
-        raise ValueError(f"friction of {what} is 0, where its derivative has one side alone: set a small one")
+        raise ValueError(f"friction of {what} must be positive to differentiate by, got 0: set a small value")
 
 
 def scene_reader(session: Session, word: str) -> Reader:
@@ -268,10 +275,10 @@ def scene_reader(session: Session, word: str) -> Reader:
         return lambda g: float(getattr(g.parameters, word))
     if word not in INITIAL_WORDS:
         words = ", ".join((*SCENE_WORDS, *INITIAL_WORDS))
-        raise ValueError(f"wrt knows {words}, and pairs of a part and a word; got {word!r}")
+        raise ValueError(f"wrt must hold {words}, or pairs of a part and a parameter, got {word!r}")
 
     def refuse(gradient: _core.EquilibriumGradient | OfRun) -> Any:
-        raise ValueError(f"an equilibrium has no {word}; a run has")
+        raise ValueError(f"{word} is a parameter of runs, not of equilibria")
 
     return refuse
 
@@ -292,7 +299,10 @@ def _points_reader(session: Session, part: RodPart) -> Reader:
 
     def checked(gradient: _core.EquilibriumGradient | OfRun) -> FloatArray:
         if isinstance(gradient, OfRun):
-            raise ValueError(f"a step has no derivative by points of {part.owner}; equilibria and runs have one")
+            raise ValueError(
+                f"step_jacobian is not available with respect to points of {part.owner}; gradients of equilibria and "
+                "runs are"
+            )
         return read(gradient)
 
     return checked
@@ -350,7 +360,10 @@ def _slopes(parameters: RodParameters, word: str) -> dict[str, FloatArray]:
     if word in ACTING_WORDS:
         return {word: np.ones_like(getattr(p, word))}
     if p.youngs_modulus is None or p.poisson_ratio is None or p.density is None:
-        raise ValueError(f"no gradient by {word}: the rod's stiffness was given directly, without a material")
+        raise ValueError(
+            f"no gradient with respect to {word} is available, because the stiffness of the rod was given directly, "
+            "without a material"
+        )
     softness = 1.0 / p.youngs_modulus
     if word == "youngs_modulus":
         return {
@@ -374,13 +387,20 @@ def _radius_slopes(session: Session, part: RodPart, parameters: RodParameters) -
     """
     section, p = part.section, parameters
     if section.widths is not None or not np.allclose(section.area, np.pi * section.radii**2, rtol=1e-12):
-        raise ValueError(f"no gradient by radius: the section of {part.owner} is no withe.Circle")
+        raise ValueError(
+            f"no gradient with respect to radius is available, because the section of {part.owner} is not a "
+            "withe.Circle"
+        )
     if session.world.contact.rods or session.directory.all(ObstaclePart):
         raise ValueError(
-            f"no gradient by radius of {part.owner} where rods or obstacles touch: their surfaces would move with it"
+            f"no gradient with respect to radius of {part.owner} is available with contact, because the surfaces "
+            "would move with the radius"
         )
     if session.directory.all(FluidPart):
-        raise ValueError(f"no gradient by radius of {part.owner} in a fluid, whose resistance would change with it")
+        raise ValueError(
+            f"no gradient with respect to radius of {part.owner} is available in a fluid, because the resistance would "
+            "change with the radius"
+        )
     per_radius = 1.0 / section.radii
     if p.youngs_modulus is None:
         return {"rotary_inertia": 2.0 * p.rotary_inertia * per_radius}

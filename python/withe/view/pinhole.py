@@ -35,7 +35,7 @@ def check_pinhole(camera: Pinhole) -> None:
             f"distortion of the camera must be zero, for pictures have no lens, got {np.ravel(camera.distortion)}"
         )
     if getattr(camera, "_flat", False):
-        raise ValueError("camera must have a pose: it was calibrated on a plane only; give its matrix to from_points")
+        raise ValueError("camera must have a pose, but was calibrated on a plane only: give its matrix to from_points")
 
 
 def towards(camera: Pinhole) -> FloatArray:
@@ -62,8 +62,8 @@ def look_through(view: Any, camera: Pinhole, size: tuple[int, int], points: Floa
     depths = points @ camera.rotation[2] + camera.translation[2]
     if not depths.max() > 0.0:
         raise ValueError(
-            "camera must see the rods, got one that has them behind it: rotation and translation are those from the "
-            "world to the camera, which looks along its z"
+            "camera must see the rods, but the rods lie behind the camera: rotation and translation must map the "
+            "world to the camera, which looks along its z axis"
         )
     place = -camera.rotation.T @ camera.translation
     view.position = place
