@@ -156,7 +156,7 @@ def test_a_plan_is_read_back_as_it_was(options, tmp_path):
         (lambda text: text.replace('"radius": 0.0016', '"radius": -1'), "damaged .*: radius must be positive"),
         (lambda text: text.replace('"name": "lay"', '"name": "fly"'), "damaged .*: name of a phase must be"),
         (lambda text: text.replace('"t": [', '"t": [-1.0, '), "damaged .*: quaternion_xyzw must have shape"),
-        (lambda text: text.replace('"arc_length": [', '"arc_length": [-1.0, '), "damaged .*: arc_length must grow"),
+        (lambda text: text.replace('"arc_length": [', '"arc_length": [-1.0, '), "damaged .*: arc_length must increase"),
     ],
 )
 def test_a_plan_that_is_damaged_is_refused(damage, message, motion, tmp_path):
@@ -247,7 +247,7 @@ def loop(count=300):
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: plan(Cable(0.4, 1.6e-3, 0.032), Pattern(wave())), "the cable is 0.4 m long, the pattern 0.5"),
+        (lambda: plan(Cable(0.4, 1.6e-3, 0.032), Pattern(wave())), "the cable must be longer than the pattern, 0.5"),
         (lambda: plan(CABLE, Pattern(wave()), tail=0.5), "pattern and tail"),
         (lambda: plan(CABLE, Pattern(wave()), tail=-0.1), "tail must not be negative"),
         (lambda: plan(CABLE, Pattern(wave()), "clever"), "controller must be"),
@@ -257,13 +257,19 @@ def loop(count=300):
         (lambda: plan(CABLE, Pattern(wave()), "optimised"), "'optimised' needs friction"),
         (lambda: plan(CABLE, Pattern(wave()), time_step=-1.0), "time_step must be positive"),
         (lambda: plan(CABLE, Pattern(loop())), "must not cross itself"),
-        (lambda: plan(Cable.dlo(5), Pattern(wave(0.12))), "no floor holds this cable on this pattern"),
-        (lambda: plan(Cable(1.5, 0.015, 0.1), Pattern(wave(0.2))), "no floor holds this cable .*: no grasp found"),
-        (lambda: plan(Cable(1.5, 0.04, 0.09), Pattern(wave(0.2)), "intuitive"), "tighter than the cable's own of 40"),
+        (lambda: plan(Cable.dlo(5), Pattern(wave(0.12))), "no friction is enough to keep this cable on this pattern"),
+        (
+            lambda: plan(Cable(1.5, 0.015, 0.1), Pattern(wave(0.2))),
+            "no friction is enough to keep this cable .*: no grasp found",
+        ),
+        (
+            lambda: plan(Cable(1.5, 0.04, 0.09), Pattern(wave(0.2)), "intuitive"),
+            "less than the radius of the cable, 40",
+        ),
         (lambda: plan(CABLE, wave()), "pattern must be a withe.deployment.Pattern, got ndarray"),
         (
             lambda: plan(Cable(1.2, 1.6e-3, 0.01), Pattern(arc_of(0.1))),
-            "stretch by an eighth .* is 6.2 times its radius",
+            "stretch by an eighth .* is 6.2 times the radius",
         ),
         (lambda: plan(2, Pattern(wave())), "cable must be a withe.deployment.Cable, got int"),
     ],
@@ -311,12 +317,12 @@ def nearly_a_circle(turns, radius):
 def test_a_pattern_that_only_lacks_a_tail_says_so():
     hook = Pattern(nearly_a_circle(0.93, 0.07))
     cable = Cable(hook.length + 0.3, 1.6e-3, 0.032)
-    lacking = r"no floor .* \(lift-off\): .* A tail is missing: with 128 mm .* there are {} mm, it would need 0\.\d\d"
+    lacking = r"no friction .* \(lift-off\): .* The tail is too short: with 128 mm .* instead of {} mm, .* of 0\.\d\d"
     with pytest.raises(ValueError, match=lacking.format(16)):
         plan(cable, hook)  # a longer one would cross it
     with pytest.raises(ValueError, match=lacking.format(0)):
         plan(cable, hook, tail=0.0)
-    with pytest.raises(ValueError, match=r"no floor (?!.*A tail is missing)"):
+    with pytest.raises(ValueError, match=r"no friction (?!.*The tail is too short)"):
         plan(Cable.dlo(5), Pattern(wave(0.12)), tail=0.0)  # which a tail does not hold either
 
 
@@ -349,7 +355,7 @@ def test_a_tail_lies_straight_on_behind_a_pattern_that_ends_straight(turns, node
 
 
 def test_a_bend_at_the_end_fades_out_within_the_tail():
-    """From .05 to nothing; the end that the jaw lets go does not spring back."""
+    """From 0.05 to nothing; the end that the jaw lets go does not spring back."""
     angle = np.linspace(0.0, np.pi, 200)
     half = Pattern(0.08 * np.stack([np.sin(angle), 1.0 - np.cos(angle)], 1))
     path = lengthened(half, CABLE, 4.0 * CABLE.gravito_bending_length)

@@ -55,7 +55,7 @@ def test_a_cable_that_lies_beyond_a_post_or_on_it_has_not_passed_it(bend):
 
 
 def test_what_stands_in_the_way_is_refused(bend):
-    with pytest.raises(ValueError, match=r"Post\(.*\) stands in the way: 0.4 mm from the pattern"):
+    with pytest.raises(ValueError, match=r"Post\(.*\) is too close to the pattern: the distance is 0.4 mm"):
         plan(CABLE, bend, posts=[Post(0.02, 0.0)])
     with pytest.raises(ValueError, match="height of a post must be at least its radius"):
         Post(0.0, 0.0, radius=0.01, height=0.005)

@@ -53,9 +53,9 @@ def test_a_later_cable_is_laid_over_an_earlier_one():
     ("plans", "steps", "message"),
     [
         (0, [], "plans must be one or more"),
-        (1, [[Move(1, 0.0, [(0, 0, 1)])]], "step 0 moves cable 1, there are 1"),
-        (1, [[Move(0, 0.3, [(0, 0, 1)])]], "step 0 holds cable 0 at 0.3 m, it is 0.15"),
-        (1, [[Move(0, 0.0, [(0, 0, 1)]), Move(0, 0.1, [(0, 0, 1), (0, 0, 0)])]], "must have as many legs"),
+        (1, [[Move(1, 0.0, [(0, 0, 1)])]], "cable of step 0 must be less than 1, got 1"),
+        (1, [[Move(0, 0.3, [(0, 0, 1)])]], "step 0 must hold cable 0 at most at 0.15"),
+        (1, [[Move(0, 0.0, [(0, 0, 1)]), Move(0, 0.1, [(0, 0, 1), (0, 0, 0)])]], "must have the same number of legs"),
     ],
 )
 def test_bad_steps_are_named(plans, steps, message):
@@ -66,7 +66,7 @@ def test_bad_steps_are_named(plans, steps, message):
 def test_what_is_no_list_of_plans_or_moves_is_named():
     for plans, steps, message in (
         (line(), [], "plans must be one or more"),
-        ([line()], [Move(0, 0.0, [(0, 0, 1)])], "step 0 must be a list of moves"),
+        ([line()], [Move(0, 0.0, [(0, 0, 1)])], "step 0 must be a list of simultaneous moves"),
         ([line()], [[(0, 0.0, [(0, 0, 1)])]], "step 0 must hold withe.deployment.Move"),
     ):
         with pytest.raises(ValueError, match=message):

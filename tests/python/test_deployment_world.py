@@ -135,7 +135,7 @@ def test_the_world_imports_no_planner():
         ({"floor": 0.4, "nodes": 5}, "nodes must lie in"),
         ({"floor": 0.4, "time_step": 0.0}, "time_step must be positive"),
         ({"floor": 0.4, "seed": -1}, "seed"),
-        ({"floor": 0.4, "cable": Cable(0.1, 1e-3, 0.02)}, "the plan holds it at"),
+        ({"floor": 0.4, "cable": Cable(0.1, 1e-3, 0.02)}, "must be as long as planned"),
         ({"floor": 0.4, "cable": 0.4}, "cable must be a withe.deployment.Cable, got 0.4"),
     ],
 )
@@ -153,7 +153,7 @@ def test_quasi_static_laying_is_what_slow_laying_tends_to(arc):
 
 
 def test_bends_of_a_thick_cable_are_laid_where_they_should_lie():
-    """Had friction across acted where the cable lifts off, and not behind it, .97 mm."""
+    """Had friction across acted where the cable lifts off, and not behind it, 0.97 mm."""
     sine = np.genfromtxt(PATTERNS / "sine.csv", delimiter=",", skip_header=1)
     found = deploy(plan(Cable.dlo(1), Pattern(sine)), floor=0.4, quasi_static=True, progress=False)
     assert found.error < 0.7e-3

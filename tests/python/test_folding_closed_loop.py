@@ -103,7 +103,7 @@ def test_a_sheet_that_slides_off_the_manifold_is_led_on_to_where_it_can_be_held(
     paper, slid = Paper.us_letter(), 0.01
     slow = plan_above(plan(paper, 0.2), 0.8 * paper.gravito_bending_length)
     parts = list(watched_parts(slow, 5, lambda _: slid))
-    with pytest.raises(ValueError, match="none is lifted with the jaw's inner edge"):
+    with pytest.raises(ValueError, match="none exists with the jaw's inner edge"):
         replan(slow, parts[0].poses[-1], slid)
     assert parts[-1].poses[-1, [0, 2]] == pytest.approx(slow.poses[-1, [0, 2]] + [slid, 0.0], abs=1e-8)
     for before, after in pairwise(parts):

@@ -151,8 +151,8 @@ def test_positions_outside_the_manifold_are_refused(x, z):
         ({"x": float("nan"), "z": 1.0}, "x must"),
         ({"x": "far", "z": 1.0}, "x must"),
         ({"x": 1.0, "z": 1.0, "width": [(0.0, -1.0)]}, "width must be positive"),
-        ({"x": 1.0, "z": 1.0, "width": [(0.0, 1.0), (0.0, 2.0)]}, "width must have places that grow from 0"),
-        ({"x": 1.0, "z": 1.0, "width": [(1.0, 1.0)]}, "width must have places that grow from 0"),
+        ({"x": 1.0, "z": 1.0, "width": [(0.0, 1.0), (0.0, 2.0)]}, "width must have places that increase from 0"),
+        ({"x": 1.0, "z": 1.0, "width": [(1.0, 1.0)]}, "width must have places that increase from 0"),
         ({"x": 1.0, "z": 1.0, "width": 2.0}, "width"),
     ],
 )

@@ -113,7 +113,7 @@ def test_the_rest_of_a_plan_from_the_network_is_from_it_too():
 
 @pytest.mark.parametrize("options", [{"method": "intuitive"}, {"method": "slip", "grasp": "free"}])
 def test_poses_that_it_has_not_learned_are_refused(options):
-    with pytest.raises(ValueError, match=r"manifold 'network' knows sheets without moment"):
+    with pytest.raises(ValueError, match=r"manifold 'network' covers grasps without moment only"):
         plan(Paper.a4(), manifold="network", **options)
 
 

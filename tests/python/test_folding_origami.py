@@ -49,7 +49,7 @@ def test_what_hangs_begins_at_the_jaw(paper):
 
 
 def test_the_uniform_strip_is_wrong_for_it(paper):
-    """By .1 to .2 rad and .1 to .16 in the ratio of forces, somewhere on the way."""
+    """By 0.1 to 0.2 rad and 0.1 to 0.16 in the ratio of forces, somewhere on the way."""
     width = free_width(paper, 0.01)
     rows = np.stack([width.places[:2], width.widths[:2]], axis=1)
     x, z = np.meshgrid(np.linspace(1.0, 4.0, 7), np.linspace(1.0, 3.0, 5))
@@ -116,11 +116,11 @@ def test_its_far_corner_is_seen(paper):
 
 
 def test_what_needs_a_strip_says_so(paper):
-    with pytest.raises(ValueError, match="paper must be as wide everywhere"):
+    with pytest.raises(ValueError, match="paper must have uniform width"):
         WideSheet(paper)
-    with pytest.raises(ValueError, match="manifold 'network' is for sheets that are as wide everywhere"):
+    with pytest.raises(ValueError, match="manifold 'network' needs a sheet of uniform width"):
         plan(paper, 0.30, manifold="network")
-    with pytest.raises(ValueError, match="grasp 'free' is for sheets that are as wide everywhere"):
+    with pytest.raises(ValueError, match="grasp 'free' needs a sheet of uniform width"):
         plan(paper, 0.30, method="slip", grasp="free")
 
 

@@ -90,7 +90,7 @@ def test_two_readings_of_a_strip_that_does_not_curl_say_what_one_says_with_less_
 
 
 def test_strips_that_say_little_are_named():
-    with pytest.warns(UserWarning, match="measure one of 75 to 150 mm"):
+    with pytest.warns(UserWarning, match="measure a strip of 75 to 150 mm"):
         measure(length=0.05, drop=0.05 * droop(1.0))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -101,11 +101,11 @@ def test_strips_that_say_little_are_named():
     ("arguments", "message"),
     [
         ({"length": 0.0, "drop": 0.1}, "length must be positive"),
-        ({"length": 100, "drop": 30}, "length must be less than 10 m, got 100 m: are all in metres"),
-        ({"length": 0.1, "drop": 0.2}, "tells nothing"),
+        ({"length": 100, "drop": 30}, "length must be less than 10 m, got 100 m: are all sizes in metres"),
+        ({"length": 0.1, "drop": 0.2}, "does not determine Lgb"),
         ({"length": 0.1, "drop": -0.1}, "drop must be positive"),
         ({"length": 0.1, "drop": 0.04, "error": -1.0}, "error must not be negative"),
-        ({"length": 0.1, "drop": 0.04, "turned": 0.2}, "turned is 2 of length"),
+        ({"length": 0.1, "drop": 0.04, "turned": 0.2}, "turned does not determine Lgb at 2 of length"),
         ({"length": 0.1, "drop": 0.09, "turned": 0.001}, "a reading of the same strip"),
     ],
 )

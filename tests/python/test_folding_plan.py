@@ -98,7 +98,7 @@ def test_a_free_moment_needs_no_friction_and_bears_another_stiffness(paper, targ
 
 @pytest.mark.parametrize("stiffer", [0.9639, 0.9645, 1.0, 1.03])
 def test_an_edge_with_a_free_moment_comes_down_where_it_is_to_lie_and_grazes_nothing_before(stiffer):
-    """At .9639 and .9645 the shortest way was on the sheet over its last 15 mm, which it pushed 11 mm along."""
+    """At 0.9639 and 0.9645 the shortest way was on the sheet over its last 15 mm, which it pushed 11 mm along."""
     paper = replace(Paper.a4(), gravito_bending_length=stiffer * Paper.a4().gravito_bending_length)
     found = plan(paper, method="slip", grasp="free", progress=False)
     x, _, z = found.poses[:, :3].T
@@ -112,14 +112,14 @@ def test_curvature_of_2_11_folds_a4_in_half():
 
 
 def test_us_letter_is_folded_in_half_without_slide_if_it_is_as_thought():
-    with pytest.warns(UserWarning, match=r"the sheet slides .* within its uncertainty, where Lgb is 0\.066 m"):
+    with pytest.warns(UserWarning, match=r"within its uncertainty the sheet slides .*, for Lgb 0\.066 m"):
         folded = freely("us_letter")
     assert 0 < folded.slip_ratio.max() < 0.12
     assert np.abs(folded.slide).max() == 0.0
 
 
 def test_a_bound_of_curvature_that_is_too_low_says_which_would_do():
-    with pytest.raises(ValueError, match="the least with which it can be there is") as raised:
+    with pytest.raises(ValueError, match="the least possible curvature there is") as raised:
         plan(Paper.cardboard(), method="slip", grasp="free", curvature=3.5)
     least = float(str(raised.value).split()[-1])
     assert 3.5 < least < 4.2
@@ -159,7 +159,7 @@ def test_least_slide_without_a_moment_is_less_than_that_of_least_force():
 @pytest.mark.filterwarnings("ignore:the sheet slides")
 @pytest.mark.parametrize(("paper", "frictions"), [("a4", (0.12, 0.3)), ("us_letter", (0.28, 0.36))])
 def test_more_friction_gives_no_worse_plan(paper, frictions):
-    """At .24, .26 and .275 A4 slid by .03 to .08 mm on ways that were without slide at their nodes alone."""
+    """At 0.24, 0.26 and 0.275 A4 slid by 0.03 to 0.08 mm on ways that were without slide at their nodes alone."""
     sheet = PAPERS[paper]()
     plans = [
         plan(replace(sheet, friction=friction), method="slip", uncertainty=(0.0, 0.0))
@@ -177,14 +177,14 @@ def test_more_friction_gives_no_worse_plan(paper, frictions):
 @pytest.mark.filterwarnings("ignore:the sheet slides by")
 @pytest.mark.parametrize(("friction", "target"), [(0.12, "half"), (0.2, "half"), (0.2, 0.25)])
 def test_the_friction_that_a_warning_names_is_the_least_that_is_enough(friction, target):
-    """A bottleneck search of its own over lengths and angles, `benchmarks/folding.py`, finds .22955 for A4."""
+    """A bottleneck search of its own over lengths and angles, `benchmarks/folding.py`, finds 0.22955 for A4."""
     options = {"target": target, "method": "slip", "uncertainty": (0.0, 0.0)}
-    with pytest.warns(UserWarning, match="not to slide it needs friction") as warned:
+    with pytest.warns(UserWarning, match="the fold needs a friction coefficient of") as warned:
         plan(replace(Paper.a4(), friction=friction), **options)
-    needed = float(str(warned[0].message).split("friction ")[1].split(",")[0])
+    needed = float(str(warned[0].message).split("coefficient of ")[1].split(",")[0])
     assert needed == pytest.approx(0.22955, abs=1e-3)
     assert np.abs(plan(replace(Paper.a4(), friction=needed), **options).slide).max() == 0.0
-    with pytest.warns(UserWarning, match=f"needs friction {needed:.3f}"):
+    with pytest.warns(UserWarning, match=f"needs a friction coefficient of {needed:.3f}"):
         less = plan(replace(Paper.a4(), friction=0.99 * needed), **options)
     assert np.abs(less.slide).max() > 1e-4
 
@@ -215,7 +215,7 @@ def test_what_is_said_of_half_a_circle_is_known():
 
 @pytest.mark.parametrize(("paper", "target"), [("us_letter", 0.2), ("cardboard", "half"), ("cardboard", 0.2)])
 def test_a_path_on_which_the_sheet_jumps_says_so_and_promises_no_slide(paper, target):
-    """In simulation US Letter at .20 m slides back by 88 mm at .24 m/s, and cardboard snaps."""
+    """In simulation US Letter at 0.20 m slides back by 88 mm at 0.24 m/s, and cardboard snaps."""
     folded = planned(paper, target)
     assert 0.5 * folded.times[-1] < folded.jumps_at < folded.times[-1]
     before = folded.times < folded.jumps_at
@@ -260,13 +260,13 @@ def test_a_target_out_of_reach_is_refused_with_those_that_can_be_reached(paper, 
 
 
 def test_that_a_sheet_jumps_on_every_way_is_told_from_that_there_is_none():
-    with pytest.raises(ValueError, match=r"no path .*: the sheet jumps on all of them"):
+    with pytest.raises(ValueError, match=r"no path .*: the sheet jumps on every path"):
         plan(Paper.cardboard(), method="slip")
 
 
 def test_a_pose_far_from_any_sheet_is_refused():
     folded = planned("a4")
-    with pytest.raises(ValueError, match="pose must be one of a sheet without moment"):
+    with pytest.raises(ValueError, match="pose must be near a pose without moment"):
         replan(folded, [2.0, 0, 0.1, 0, 0, 0, 1], 0.0)
     with pytest.raises(ValueError, match="slide must"):
         replan(folded, folded.poses[100], float("nan"))
@@ -323,7 +323,7 @@ def test_the_command_takes_any_size_of_paper_and_warns_in_one_line(tmp_path, cap
     folded = Plan.load(tmp_path / "fold.json")
     assert folded.paper == Paper(0.28, 0.1, 0.05, friction=0.2, thickness=2e-4)
     said = capsys.readouterr().err
-    assert said.startswith("withe: the sheet slides: not to slide it needs friction 0.")
+    assert said.startswith("withe: the sheet slides: the fold needs a friction coefficient of 0.")
     assert said.count("\n") == 1
 
 
@@ -358,20 +358,23 @@ def test_an_edge_that_is_pressed_into_the_table_is_held_from_the_side():
         ({"target": -0.1}, "target must be positive"),
         ({"target": float("nan")}, "target must"),
         ({"target": "fifth"}, "target, if not in m or a fraction such as '1/3', must be 'half'"),
-        ({"target": 0.02}, "target is 0.02 m"),
+        ({"target": 0.02}, "target must be reachable without moment, got 0.02 m"),
         ({"method": "best"}, "method must be"),
         ({"grasp": "tight"}, "grasp must be"),
         ({"ending": "soft"}, "ending must be"),
-        ({"grasp": "free"}, "of method 'slip'"),
-        ({"uncertainty": (0.1, 1.5)}, "uncertainty must be shares"),
+        ({"grasp": "free"}, "grasp 'free' needs method='slip'"),
+        ({"uncertainty": (0.1, 1.5)}, "uncertainty must be at most 0.3 for Lgb"),
         ({"uncertainty": 0.1}, "uncertainty must"),
         ({"curvature": 0.0}, "curvature must be positive"),
-        ({"curvature": 3.0}, "curvature bounds sheets of grasp 'free', whose moment may be any, not of 'moment_free'"),
-        ({"curvature": 2.5, "method": "intuitive"}, "curvature bounds sheets of grasp 'free'"),
+        (
+            {"curvature": 3.0},
+            "curvature needs grasp='free', whose moment is not limited otherwise, got grasp='moment_free'",
+        ),
+        ({"curvature": 2.5, "method": "intuitive"}, "curvature needs grasp='free'"),
         ({"speed": 0.0}, "speed must be positive"),
         ({"acceleration": float("nan")}, "acceleration must"),
         ({"jaw": Jaw(depth=0.1)}, "jaw must hold less than a fifth"),
-        ({"paper": Paper(1.2, 0.2, 0.048)}, "no pose without moment"),
+        ({"paper": Paper(1.2, 0.2, 0.048)}, "target must be reachable without moment"),
     ],
 )
 def test_bad_input_says_what_is_wrong(arguments, message):

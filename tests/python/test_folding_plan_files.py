@@ -86,7 +86,7 @@ def test_a_plan_is_read_back_as_it_was(tmp_path):
         (lambda text: text.replace('"method": "ucs"', '"method": "best"'), "damaged .*: method must be"),
         (lambda text: without(text, "times"), "damaged .*: poses must have shape"),
         (lambda text: without(text, "angles"), "damaged .*: angles must have shape"),
-        (lambda text: json.dumps({**json.loads(text), "sheet": None}), "damaged .*: sheet must be known"),
+        (lambda text: json.dumps({**json.loads(text), "sheet": None}), "damaged .*: sheet must be given"),
         (
             lambda text: json.dumps({**json.loads(text), "angles": [0.1] * 251}),
             "poses must be turned about y by angles",

@@ -104,12 +104,12 @@ def test_where_nothing_bears_the_uncertainty_the_plan_says_so():
     """Cardboard on a table that is all but without friction."""
     paper = replace(Paper.cardboard(), friction=0.02)
     with pytest.warns(
-        UserWarning, match=r"not to slide it needs friction 0\.6\d+, the paper has 0\.02; no plunge folds"
+        UserWarning, match=r"the fold needs a friction coefficient of 0\.6\d+, and the paper has 0\.02; no plunge folds"
     ):
         found = plan(paper, method="slip", grasp="free", curvature=4.0, progress=False)
     assert found.plunges_at is None
-    assert "needs friction 0.6" in found.blocked
-    assert "does not bear its uncertainty" in repr(found)
+    assert "would need friction 0.6" in found.blocked
+    assert "fails within its uncertainty" in repr(found)
 
 
 def test_cardboard_is_folded_in_half_on_a_table_on_which_it_would_slide():
@@ -143,7 +143,7 @@ def test_a_plunge_that_cannot_be_is_refused_with_the_friction_that_is_missing(wa
 def test_nonsense_is_refused(ways):
     with pytest.raises(ValueError, match="plan must be a Plan"):
         plunge("down")
-    with pytest.raises(ValueError, match="plan must come down slowly, it plunges at"):
+    with pytest.raises(ValueError, match="plan must end slowly, but already plunges at"):
         plunge(ways[2])
     with pytest.raises(ValueError, match="press"):
         plunge(ways[1], press=0.0)

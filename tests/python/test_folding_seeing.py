@@ -33,7 +33,7 @@ def lying(paper: Paper, slide: float) -> np.ndarray:
 
 
 def drawn_camera(random: np.random.Generator, x: float) -> Camera:
-    """Some .6 m over the far edge, tilted by some degrees, with a lens that distorts."""
+    """Some 0.6 m over the far edge, tilted by some degrees, with a lens that distorts."""
     down = Rotation.from_rotvec(random.uniform(-0.06, 0.06, 3)).as_matrix() @ np.diag([1.0, -1.0, -1.0])
     height = random.uniform(0.58, 0.62)
     place = np.array([x - 0.02, 0.0, 0.0]) + down[2] * height / down[2, 2]
@@ -62,7 +62,7 @@ def test_a_picture_may_be_mirrored_or_a_file(tmp_path):
     path = tmp_path / "strip.png"
     cv2.imwrite(str(path), image[..., ::-1])
     assert measure(image=path, scale=SCALE) == found
-    with pytest.raises(ValueError, match="scale must be in pixels a metre"):
+    with pytest.raises(ValueError, match="scale must be in pixels per metre"):
         measure(image=path, scale=1.0 / SCALE)
 
 

@@ -103,7 +103,7 @@ def test_noise_has_the_spread_that_it_says(a4):
         assert np.abs(relative.mean(axis=0)).max() < 0.2 * 0.2
         return list(relative.std(axis=0))
 
-    # A normal distribution that ends at two standard deviations has .88 of its spread.
+    # A normal distribution that ends at two standard deviations has 0.88 of its spread.
     assert spread(Noise()) == pytest.approx([0.88 * 0.05, 0.88 * 0.2], rel=0.15)
     assert spread(replace(Noise.none(), friction=0.1)) == pytest.approx([0.0, 0.088], rel=0.15)
 
@@ -173,7 +173,10 @@ def test_motions_follow_each_other_and_are_asked_for_in_time(a4):
     ("motion", "message"),
     [
         (still([(0.05, 0, 0), (0.1, 0, 0)]), "must begin where the jaw is"),
-        (still([(0, 0, 0), (0, 0.01, 0)], np.array([0.0, 0.0])), "times of a motion must be two or more and grow"),
+        (
+            still([(0, 0, 0), (0, 0.01, 0)], np.array([0.0, 0.0])),
+            "times of a motion must be two or more increasing values",
+        ),
         (still([(0, 0, 0), (0, np.nan, 0)]), "poses of a motion"),
     ],
 )

@@ -101,7 +101,7 @@ def test_ctrl_c_ends_processes_at_once_and_keeps_what_has_come(tmp_path):
 def test_bad_input_is_named():
     with pytest.raises(ValueError, match="trials must be Trials"):
         run_trials(["a4"])
-    with pytest.raises(ValueError, match="not in both"):
+    with pytest.raises(ValueError, match="processes and client must not be given together"):
         run_trials(TRIALS, processes=2, client=object())
     with pytest.raises(ValueError, match="processes must lie in"):
         run_trials(TRIALS, processes=0)

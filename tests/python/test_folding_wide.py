@@ -109,7 +109,7 @@ def test_a_seed_says_what_differs():
     [
         ({"paper": "a4"}, "paper must be a Paper"),
         ({"paper": A4, "noise": "loud"}, "noise must be a Noise"),
-        ({"paper": A4, "unevenness": 0.6}, "unevenness must be .5 at most"),
+        ({"paper": A4, "unevenness": 0.6}, "unevenness must be at most 0.5"),
         ({"paper": A4, "edges": 3}, "edges"),
     ],
 )

@@ -151,7 +151,7 @@ def measure(
         pixel = pixel_size(scale)
         height = pixel * _loop_height(image)
         if not height < _HIGHEST_LOOP:
-            raise ValueError(f"scale must be in metres a pixel: at {pixel:g} the loop is {height:.3g} m high")
+            raise ValueError(f"scale must be in metres per pixel, got {pixel:g}: the loop would be {height:.3g} m high")
         error = 0.5 * pixel if error is None else error
     height, error = (
         validation.positive(height, "height"),
@@ -183,11 +183,13 @@ def _loop_height(image: str | os.PathLike[str] | npt.ArrayLike) -> float:
     mask = border_filter(picture)
     rows = np.flatnonzero(mask.any(1))
     if not rows.size:
-        raise ValueError("image must show a loop of cable, it is plain")
+        raise ValueError("image must show a loop of cable, got a uniform image")
     extent = int(rows[-1] - rows[0]) + 1
     upper = np.zeros_like(mask)
     upper[: rows[0] + extent // 2] = True  # there the two layers are apart
     thickness = 2.0 * float(distance_transform_edt(mask)[upper].max()) - 1.0
     if extent < 4.0 * thickness:
-        raise ValueError(f"image must show a loop of cable, got what is {extent} pixels high and {thickness:.0f} thick")
+        raise ValueError(
+            f"image must show a loop of cable, got a shape {extent} pixels high and {thickness:.0f} pixels thick"
+        )
     return extent - thickness

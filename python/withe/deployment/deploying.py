@@ -139,7 +139,9 @@ def deploy(
     nodes = validation.integer(nodes, "nodes", 20, 2000)
     true = plan.cable if cable is None else cable
     if true.length < plan.cable.length:
-        raise ValueError(f"the cable is {true.length:g} m long, the plan holds it at {plan.cable.length:g} m")
+        raise ValueError(
+            f"the cable must be as long as planned, {plan.cable.length:g} m, or longer, got {true.length:g} m"
+        )
     setup = drawn_setup(
         plan,
         true,

@@ -55,8 +55,8 @@ class Slip:
     def __str__(self) -> str:
         where = f"{1e3 * self.start:.0f} to {1e3 * self.end:.0f} mm"
         if self.test == "overlap":
-            return f"{where} lies on the cable itself, which pushes itself aside"
-        return f"{where} slips ({self.test}): it would need a coefficient of friction of {self.needed:.2f}"
+            return f"{where} lies on another part of the cable, which is pushed aside"
+        return f"{where} slips ({self.test}): a friction coefficient of {self.needed:.2f} is needed"
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,25 +199,28 @@ def grasps_along(pattern: Laid, cable: Cable, controller: str) -> Grasp:
     """
     lgb = cable.gravito_bending_length
     if cable.length < pattern.length:
-        raise ValueError(f"the cable is {cable.length:g} m long, the pattern {pattern.length:.4g} m")
+        raise ValueError(
+            f"the cable must be at least as long as the pattern, {pattern.length:.4g} m, got {cable.length:g} m"
+        )
     tightest, at = require_bendable(pattern, cable)
     limit = float(table().greatest_curvature)
     if tightest * lgb > limit:
         raise ValueError(
-            f"the pattern bends to a radius of {1e3 / tightest:.2g} mm at {at:.0f} mm; this cable is laid down to"
-            f" {1e3 * lgb / limit:.2g} mm, its gravito-bending length over {limit:g}"
+            f"the pattern bends to a radius of {1e3 / tightest:.2g} mm at {at:.0f} mm, but this cable needs at "
+            f"least {1e3 * lgb / limit:.2g} mm, which is its gravito-bending length over {limit:g}"
         )
     suspended = np.maximum((cable.length - 0.5 * JAW - pattern.arc_length) / lgb, table().shortest)
     if suspended.max() > table().longest:
         raise ValueError(
-            f"the cable is {suspended.max():.0f} of its gravito-bending lengths long, those of up to"
-            f" {table().longest:g} are laid down: hold it nearer to its free end, or is {lgb:g} m in metres?"
+            f"the cable must be at most {table().longest:g} gravito-bending lengths long, got "
+            f"{suspended.max():.0f}: hold the cable nearer to its free end, or check that the gravito-bending "
+            f"length of {lgb:g} m is in metres"
         )
     if np.any(cable.stretch_stiffness < least_stiffness(suspended)):
         raise ValueError(
-            f"the cable would stretch by an eighth under its own weight: {lgb * suspended.max():.2g} m of it hang, and"
-            f" its gravito-bending length, {lgb:g} m, is {lgb / cable.radius:.2g} times its radius. Hold it nearer to"
-            " its free end, or are both in metres?"
+            f"the cable would stretch by an eighth under its own weight: {lgb * suspended.max():.2g} m hang, and "
+            f"the gravito-bending length, {lgb:g} m, is {lgb / cable.radius:.2g} times the radius. Hold the cable "
+            "nearer to its free end, or check that both are in metres"
         )
     curvature = -lgb * pattern.curvature  # grasps bend to the right
     thick = cable.radius / lgb
@@ -233,8 +236,8 @@ def grasps_along(pattern: Laid, cable: Cable, controller: str) -> Grasp:
             return least_friction(suspended, curvature, shear, laid, cable.stretch_stiffness, thick)
         return grasp(suspended, curvature, cable.stretch_stiffness, radius=thick)
     except ConvergenceError as error:
-        bend = f"whose radius at {at:.0f} mm is {1e3 / tightest:.2g} mm"
-        raise ValueError(f"no floor holds this cable on this pattern, {bend}: {error}") from error
+        bend = f"whose bend at {at:.0f} mm has a radius of {1e3 / tightest:.2g} mm"
+        raise ValueError(f"no friction is enough to keep this cable on this pattern, {bend}: {error}") from error
 
 
 def require_bendable(pattern: Laid, cable: Cable) -> tuple[float, float]:
@@ -243,8 +246,9 @@ def require_bendable(pattern: Laid, cable: Cable) -> tuple[float, float]:
     tightest, at = float(sizes.max()), 1e3 * float(pattern.arc_length[sizes.argmax()])
     if tightest * cable.radius >= 1.0:
         raise ValueError(
-            f"the pattern bends to a radius of {1e3 / tightest:.2g} mm at {at:.0f} mm, tighter than the cable's own of"
-            f" {1e3 * cable.radius:.2g} mm: draw it wider, or, if it is noise, give the Pattern a greater smoothing="
+            f"the pattern bends to a radius of {1e3 / tightest:.2g} mm at {at:.0f} mm, less than the radius of "
+            f"the cable, {1e3 * cable.radius:.2g} mm: draw wider bends, or increase smoothing= of the Pattern "
+            "if the points are noisy"
         )
     return tightest, at
 

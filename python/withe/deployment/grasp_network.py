@@ -169,7 +169,7 @@ class GraspNetwork(Surrogate):
         asked = (suspended, curvature, stretch_stiffness)
         if not all(isinstance(values, torch.Tensor) for values in asked):
             raise ValueError(
-                "suspended, curvature and stretch_stiffness must be tensors: ask the network itself for arrays"
+                "suspended, curvature and stretch_stiffness must be tensors: for arrays, call the network itself"
             )
         asked = torch.broadcast_tensors(*asked)
         said = self.network(torch.stack(self._form.ask(torch, *asked), dim=-1))
@@ -186,7 +186,7 @@ def require_learned(suspended: FloatArray, curvature: FloatArray, stretch_stiffn
         beyond = values[(values < low) | (values > high)]
         if beyond.size:
             raise ValueError(
-                f"{name} must be from {low:g} to {high:g} for a network, got {beyond[0]:g}: exact grasps go further"
+                f"{name} must be from {low:g} to {high:g} for a network, got {beyond[0]:g}: use grasp for other values"
             )
 
 

@@ -108,8 +108,8 @@ def measure_curvature(
     total = float(np.hypot(x, away))
     if total > (most := float(_known().x[-1])):
         raise ValueError(
-            f"aside must be {most * length:.3g} m at most, depth included, got {total * length:.3g} m: the cable curls"
-            " up, and how far aside it is does not tell how much"
+            f"aside must be at most {most * length:.3g} m, depth included, got {total * length:.3g} m: the cable "
+            "curls up, so that aside does not determine its curvature"
         )
     (curvature, _), (slope, _) = _known()(total), _known()(total, 1)
     # It hangs in the plane in which it bends: the curvature's components are as those of how far it hangs aside.
@@ -181,7 +181,7 @@ def _seen_aside(image: str | os.PathLike[str] | npt.ArrayLike, scale: float, dep
     found = least_squares(off, [guess, 0.5 * radius, far, 0.0], bounds=(low, high), x_scale=[1.0, radius, 1.0, 1.0])
     end = float(found.x[0])
     if abs(end) > 0.99 * most:
-        raise ValueError("image must show a cable whose end hangs at 70 degrees at most: give aside")
+        raise ValueError("image must show a cable whose end hangs at 70 degrees at most: give aside= instead")
     return end, float(np.hypot(0.5 * scale, radius / np.sqrt(12.0) * np.tan(hanging(end).tilt)))
 
 

@@ -148,7 +148,7 @@ def optimised(
     unshifted = np.zeros(len(engine.centres) + 3)
     tried = [trial for controller in get_args(Controller) if (trial := engine.trial(unshifted, controller))]
     if not tried:
-        raise ConvergenceError("the rod engine found no equilibrium on the way to be optimised")
+        raise ConvergenceError("the rod engine found no equilibrium along the path to be optimised")
     best = engine.aligned(min(tried, key=lambda trial: trial.error))
     for _ in range(_ROUNDS):
         if best.error < _GOOD:

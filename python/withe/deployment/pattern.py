@@ -280,8 +280,8 @@ class Pattern:
         if self.deviation > _MUCH_FARTHER * smoothing:
             away, asked = 1e3 * self.deviation, 1e3 * smoothing
             warn(
-                f"the pattern is {away:.1f} mm from what was given, for a smoothing of {asked:.1f} mm: {nodes} nodes"
-                f" sample that every {1e3 * even[1]:.1f} mm, too coarsely for its bends; give more nodes",
+                f"the pattern deviates by {away:.1f} mm from the given points, for a smoothing of {asked:.1f} mm: "
+                f"{nodes} nodes, one every {1e3 * even[1]:.1f} mm, are too coarse for the bends. Give more nodes",
                 cause="pattern",
             )
 
@@ -304,7 +304,7 @@ class Pattern:
         pattern.arc_length = validation.number_array(content["arc_length"], "arc_length", ("nodes",))
         count = len(pattern.arc_length)
         if count < 2 or pattern.arc_length[0] != 0.0 or (np.diff(pattern.arc_length) <= 0.0).any():
-            raise ValueError("arc_length must grow from 0")
+            raise ValueError("arc_length must increase from 0")
         for name, shape in _COLUMNS.items():
             setattr(pattern, name, validation.number_array(content[name], name, (count, *shape)))
         behind = content.get("curvature_behind", [0.0])  # as in files from before that was kept
@@ -394,8 +394,7 @@ def _require_smooth(speed: FloatArray, s: FloatArray) -> None:
     slowest = int(speed.argmin())
     if speed[slowest] < _SLOWEST:
         raise ValueError(
-            f"a pattern must not turn back on itself, it does at {1e3 * s[slowest]:.0f} mm: draw the bend in which the"
-            " cable is to turn"
+            f"a pattern must not turn back on itself, but does at {1e3 * s[slowest]:.0f} mm: draw a bend there"
         )
 
 

@@ -82,8 +82,8 @@ def require_room(posts: Sequence[Post], pattern: Pattern, cable: Cable) -> None:
             raise ValueError(f"posts must be withe.deployment.Post, got {post!r:.80}")
         away = float(distances(np.array([[post.x, post.y]]), pattern.points)[0])
         if away < (post.radius + cable.radius) * (1.0 - 1e-6):
-            needs = f"its radius and the cable's are {1e3 * (post.radius + cable.radius):.1f} mm"
-            raise ValueError(f"{post} stands in the way: {1e3 * away:.1f} mm from the pattern, {needs}")
+            needs = f"the radii of post and cable together are {1e3 * (post.radius + cable.radius):.1f} mm"
+            raise ValueError(f"{post} is too close to the pattern: the distance is {1e3 * away:.1f} mm, and {needs}")
 
 
 def passed(posts: Sequence[Post], pattern: Pattern, cable: Cable, laid: FloatArray) -> npt.NDArray[np.bool_]:

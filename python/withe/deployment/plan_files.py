@@ -32,7 +32,7 @@ def parts_of(content: Mapping[str, Any]) -> dict[str, Any]:
     times = validation.number_array(motion["t"], "t", ("n",))
     rotations = validation.number_array(motion["quaternion_xyzw"], "quaternion_xyzw", (len(times), 4))
     if len(times) < 2 or times[0] != 0.0 or (np.diff(times) <= 0.0).any():
-        raise ValueError("t must be two or more that grow from 0")
+        raise ValueError("t must be two or more values that increase from 0")
     if (np.abs(np.linalg.norm(rotations, axis=1) - 1.0) > _UNIT).any():
         raise ValueError("quaternion_xyzw must have length 1")
     tail = validation.non_negative(cable.pop("tail"), "tail")

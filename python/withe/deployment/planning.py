@@ -349,7 +349,7 @@ def _needed(pattern: Pattern, cable: Cable, controller: Controller, grasps: Gras
     worst = _worst_slip(found)
     if worst is not None and not helped:
         missing = _missing_tail(pattern, cable, controller, worst)
-        raise ValueError(f"no floor holds this cable on this pattern: {worst}{missing}")
+        raise ValueError(f"no friction is enough to keep this cable on this pattern: {worst}{missing}")
     return found.needed
 
 
@@ -357,7 +357,7 @@ def _slips(pattern: Pattern, needed: FloatArray, friction: float) -> str:
     """How much of a pattern needs more friction than there is, and most where."""
     share, most = 100.0 * float((needed > friction).mean()), int(needed.argmax())
     where = f"{needed[most]:.2f} at {1e3 * pattern.arc_length[most]:.0f} mm"
-    return f"the cable slips: {share:.0f} % of the pattern needs more than friction {friction:g}, most {where}"
+    return f"the cable slips: {share:.0f} % of the pattern needs more than friction {friction:g}, at most {where}"
 
 
 def _worst_slip(found: Feasibility) -> Slip | None:
@@ -378,9 +378,9 @@ def _missing_tail(pattern: Pattern, cable: Cable, controller: Controller, worst:
         return ""
     stretch = (found.arc_length >= worst.start) & (found.arc_length <= worst.end)
     return (
-        f". A tail is missing: with {1e3 * usual:.0f} mm of cable beyond the pattern, where there are"
-        f" {1e3 * there:.0f} mm, it would need {found.needed[stretch].max():.2f}. Give a longer tail or cable;"
-        " crossings='over' lets the tail cross the pattern"
+        f". The tail is too short: with {1e3 * usual:.0f} mm of cable beyond the pattern instead of "
+        f"{1e3 * there:.0f} mm, a coefficient of {found.needed[stretch].max():.2f} is enough. Give a longer "
+        "tail or cable, or use crossings='over', which lets the tail cross the pattern"
     )
 
 
@@ -388,16 +388,18 @@ def _held(cable: Cable, pattern: Pattern, tail: float | None) -> tuple[Cable, fl
     """The cable up to the middle of the jaw, and how much of it lies beyond the pattern."""
     room = cable.length - 0.5 * JAW - pattern.length
     if room < 0.0:
-        holds = f"; a jaw holds {1e3 * JAW:g} mm of it"
+        hint = f": the jaw holds {1e3 * JAW:g} mm of the cable"
         if pattern.length > _MUCH_LONGER * cable.length:
-            holds = ": is the pattern in metres?"
-        raise ValueError(f"the cable is {cable.length:g} m long, the pattern {pattern.length:.4g} m{holds}")
+            hint = ": is the pattern in metres?"
+        raise ValueError(
+            f"the cable must be longer than the pattern, {pattern.length:.4g} m, got {cable.length:g} m{hint}"
+        )
     if tail is None:
         tail = min(room, _TAIL * cable.gravito_bending_length)
     tail = validation.non_negative(tail, "tail")
     if tail > room:
-        both = f"pattern and tail {pattern.length + tail:.4g} m; a jaw holds {1e3 * JAW:g} mm of it"
-        raise ValueError(f"the cable is {cable.length:g} m long, {both}")
+        both = f"pattern and tail, {pattern.length + tail:.4g} m, plus {1e3 * JAW:g} mm in the jaw"
+        raise ValueError(f"the cable must be longer than {both}, got {cable.length:g} m")
     return replace(cable, length=pattern.length + tail), tail
 
 
@@ -405,8 +407,8 @@ def _uncrossed(pattern: Pattern, cable: Cable, tail: float | None) -> tuple[Cabl
     """The longest of a few tails that does not cross the pattern or itself, or the one that was asked for."""
     if len(pattern.crossings):
         first, second = 1e3 * pattern.crossings[0]
-        where = f"it does at {first:.0f} and {second:.0f} mm"
-        raise ValueError(f"the pattern must not cross itself, {where}; crossings='over' lays it so")
+        where = f"but does at {first:.0f} and {second:.0f} mm"
+        raise ValueError(f"the pattern must not cross itself, {where}: use crossings='over' to allow crossings")
     held, given = _held(cable, pattern, tail)
     shares = (1.0,) if tail is not None else _TAIL_SHARES
     for share in shares:
@@ -416,5 +418,5 @@ def _uncrossed(pattern: Pattern, cable: Cable, tail: float | None) -> tuple[Cabl
         if not len(found):
             return held, given, path
     first, second = 1e3 * found[0]
-    where = f"{second:.0f} mm from the free end it crosses the cable at {first:.0f} mm"
-    raise ValueError(f"the tail must not cross the pattern, {where}: give a shorter tail, or crossings='over'")
+    where = f"but {second:.0f} mm from the free end it crosses the cable at {first:.0f} mm"
+    raise ValueError(f"the tail must not cross the pattern, {where}: give a shorter tail, or use crossings='over'")

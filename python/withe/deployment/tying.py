@@ -166,19 +166,20 @@ def _check(
         raise ValueError(f"plans must be one or more withe.deployment.Plan in a list, got {plans!r:.80}")
     for number, step in enumerate(steps):
         if isinstance(step, Move):
-            raise ValueError(f"step {number} must be a list of moves that are done together, got one Move")
+            raise ValueError(f"step {number} must be a list of simultaneous moves, got one Move")
         for move in step:
             if not isinstance(move, Move):
                 raise ValueError(f"step {number} must hold withe.deployment.Move, got {move!r:.80}")
             if move.cable >= len(plans):
-                raise ValueError(f"step {number} moves cable {move.cable}, there are {len(plans)}")
+                raise ValueError(f"cable of step {number} must be less than {len(plans)}, got {move.cable}")
             longest = plans[move.cable].cable.length + 0.5 * JAW
             if move.at > longest:
                 raise ValueError(
-                    f"step {number} holds cable {move.cable} at {move.at:g} m, it is {longest:.4g} m long to the jaw"
+                    f"step {number} must hold cable {move.cable} at most at {longest:.4g} m, where its jaw is, got "
+                    f"{move.at:g} m"
                 )
         if len({len(np.asarray(move.by)) for move in step}) > 1:
-            raise ValueError(f"the moves of step {number} must have as many legs as each other")
+            raise ValueError(f"moves of step {number} must have the same number of legs")
     if picks is not None and [len(step) for step in steps] != [len(step) for step in picks]:
         raise ValueError("picks must be one for each move of each step")
 

@@ -99,8 +99,7 @@ def carried(
     watch.slip = max(float(np.linalg.norm(simulation.deflection(hand).slip)) for hand in hands)
     if watch.slip > _SLIPS:
         warn(
-            f"the sheet slipped by {1e3 * watch.slip:.1f} mm in the jaw: it presses too little, and a greater "
-            "force_limit of the Jaw holds the sheet",
+            f"the sheet slipped by {1e3 * watch.slip:.1f} mm in the jaw: increase force_limit of the Jaw",
             cause="slipped in the jaw",
         )
     return watch

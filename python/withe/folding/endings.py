@@ -135,7 +135,10 @@ def plan(
         said = _slides(slow)
         if slow.slip_ratio.max() > paper.friction:
             needed = np.ceil(1e3 * least_friction(slow)) / 1e3  # as said it is enough
-            said = f"the sheet slides: not to slide it needs friction {needed:.3f}, the paper has {paper.friction:g}"
+            said = (
+                f"the sheet slides: the fold needs a friction coefficient of {needed:.3f}, and the paper has "
+                f"{paper.friction:g}"
+            )
     elif method != "intuitive" and replans:
         said = _unseen(slow)
     if said is None:
@@ -159,13 +162,13 @@ def _slides(slow: Plan) -> str | None:
         return None
     how = f"by {1e3 * slide:.1f} mm" if np.isfinite(slide) else "and jumps"
     lgb = paper.gravito_bending_length
-    return f"the sheet slides {how} within its uncertainty, where Lgb is {lgb:.4g} m and friction {paper.friction:.3g}"
+    return f"within its uncertainty the sheet slides {how}, for Lgb {lgb:.4g} m and friction {paper.friction:.3g}"
 
 
 def _jumps(slow: Plan) -> str:
     """That the sheet will not follow to the end, and what may."""
-    free = "" if slow.grasp == "free" else ": method='slip' with grasp='free' holds the sheet by a moment too"
-    return f"the sheet jumps at {slow.jumps_at:.1f} of {slow.times[-1]:.1f} s, where no equilibrium follows{free}"
+    free = "" if slow.grasp == "free" else ": use method='slip' with grasp='free', which also applies a moment"
+    return f"the sheet jumps at {slow.jumps_at:.1f} of {slow.times[-1]:.1f} s, where its equilibrium ends{free}"
 
 
 def _unseen(slow: Plan) -> str | None:
@@ -176,6 +179,6 @@ def _unseen(slow: Plan) -> str | None:
     if needed <= least:
         return None
     return (
-        f"the end of the fold needs friction {needed:.3f}: there may be {least:.3g}, and no camera sees the sheet "
-        "slide there"
+        f"the end of the fold needs friction {needed:.3f}, but may have only {least:.3g}, and no camera sees the "
+        "sheet slide there"
     )

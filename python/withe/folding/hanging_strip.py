@@ -96,7 +96,7 @@ def droop(length: float) -> float:
     """
     length = validation.positive(length, "length")
     if not 0.05 <= length <= 20.0:
-        raise ValueError(f"length is {length:g} Lgb, not from .05 to 20")
+        raise ValueError(f"length must be from 0.05 to 20 Lgb, got {length:g} Lgb")
     return length * _hanging(_angle_where(0, length))[1]
 
 
@@ -161,7 +161,9 @@ def measure(
     if by_ruler:
         along = validation.positive(length, "length")
         if not along < _LONGEST_REACH:
-            raise ValueError(f"length must be less than {_LONGEST_REACH:g} m, got {along:g} m: are all in metres?")
+            raise ValueError(
+                f"length must be less than {_LONGEST_REACH:g} m, got {along:g} m: are all sizes in metres?"
+            )
         readings = {"drop": drop, "turned": turned}
         drops = [_checked_drop(down, along, name) for name, down in readings.items() if down is not None]
         error = validation.non_negative(5e-4 if error is None else error, "error")
@@ -173,7 +175,7 @@ def measure(
     ends = np.array([strip_ends(x) for x in (image, turned) if x is not None]) / per_metre
     across, down = (float(x) for x in ends.mean(axis=0))
     if not across < _LONGEST_REACH:
-        raise ValueError(f"scale must be in pixels a metre: at {per_metre:g} the strip reaches {across:.3g} m")
+        raise ValueError(f"scale must be in pixels per metre, got {per_metre:g}: the strip would reach {across:.3g} m")
     flat = _measured(_angle_where_tip_is(across, down), across, down, error, by_reach=True)
     return flat if turned is None else _uncurled(flat, ends.ravel(), error)
 
@@ -182,8 +184,8 @@ def _checked_drop(drop: object, length: float, name: str) -> float:
     down = validation.positive(drop, name)
     if not 1e-5 < down / length < 0.98:
         raise ValueError(
-            f"{name} is {down / length:.2g} of length, which tells nothing: strips that tell most droop by .2 to .7 of "
-            "it"
+            f"{name} does not determine Lgb at {down / length:.2g} of length: use a strip that droops by 0.2 to "
+            "0.7 of its length"
         )
     return down
 
@@ -217,10 +219,12 @@ def _uncurled(flat: Measured, read: FloatArray, error: float) -> Measured:
     try:
         found = least_squares(lambda x: misfits(x[:, None])[:, 0], begin, slopes, method="lm", xtol=1e-10)
     except RuntimeError as none:
-        raise ValueError("turned must be a reading of the same strip, clamped as far from its tip") from none
+        raise ValueError(
+            "turned must be a reading of the same strip, clamped at the same distance from its tip"
+        ) from none
     lgb, length, curl = found.x * scales
     if not found.success or lgb <= 0.0 or np.abs(found.fun).max() > max(0.02, 10.0 * error / lgb):
-        raise ValueError("turned must be a reading of the same strip, clamped as far from its tip")
+        raise ValueError("turned must be a reading of the same strip, clamped at the same distance from its tip")
     spread = np.sqrt(np.diag(np.linalg.inv(found.jac.T @ found.jac))) * error / size * scales
     return Measured(float(lgb), float(spread[0]), float(length / lgb), float(curl), float(spread[2]))
 
@@ -239,7 +243,7 @@ def _curled(strip: FloatArray, curl: FloatArray, near: FloatArray) -> tuple[Floa
             drop, reach = (place[:, : len(strip)] for place in places)
             return angle, drop, reach
         angle = angle - change * here / (ahead - here)
-    raise RuntimeError("no strip hangs so")
+    raise RuntimeError("no elastic strip hangs like this: check length and drop")
 
 
 def _hung(strip: FloatArray, curl: FloatArray, angle: FloatArray) -> FloatArray:
@@ -284,7 +288,8 @@ def _measured(angle: float, over: float, drop: float, error: float, by_reach: bo
     if not _TELLING[0] < strip < _TELLING[1]:
         low, high = (1e3 * bound * length / strip for bound in _TELLING)
         warn(
-            f"the strip is {strip:.2g} Lgb long, and its droop says little: measure one of {low:.0f} to {high:.0f} mm",
+            f"the strip is {strip:.2g} Lgb long, and its droop is not sensitive to Lgb: measure a strip of "
+            f"{low:.0f} to {high:.0f} mm",
             cause="strip",
         )
     ahead, back = _hanging(angle + _STEP), _hanging(angle - _STEP)

@@ -45,7 +45,7 @@ class _Way:
         times = validation.number_array(motion.times, "times of a motion", ("n",))
         poses = validation.number_array(motion.poses, "poses of a motion", (len(times), 7))
         if len(times) < 2 or (np.diff(times) <= 0).any():
-            raise ValueError("times of a motion must be two or more and grow")
+            raise ValueError("times of a motion must be two or more increasing values")
         angles = np.unwrap(2.0 * np.arctan2(poses[:, 4], poses[:, 6]))
         angles += 2.0 * np.pi * np.round((before[2] - angles[0]) / (2.0 * np.pi))
         self.times = times - times[0] + begin

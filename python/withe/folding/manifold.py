@@ -115,7 +115,7 @@ def elastica(
 def _checked_width(width: npt.ArrayLike) -> Width:
     places, widths = validation.number_array(width, "width", ("places", 2)).T
     if not len(places) or places[0] != 0.0 or (np.diff(places) <= 0.0).any():
-        raise ValueError(f"width must have places that grow from 0, got {places.tolist()}")
+        raise ValueError(f"width must have places that increase from 0, got {places.tolist()}")
     if (widths <= 0.0).any():
         raise ValueError(f"width must be positive everywhere, got {widths.tolist()}")
     return Width(tuple(places.tolist()), tuple(widths.tolist()))

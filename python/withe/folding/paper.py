@@ -146,10 +146,10 @@ def _checked_outline(outline: Sequence[tuple[float, float]]) -> tuple[tuple[floa
     rows = validation.number_array(outline, "outline", ("places", 2))
     shares, widths = rows.T
     if len(rows) < 2 or shares[0] != 0.0 or shares[-1] != 1.0 or (np.diff(shares) <= 0.0).any():
-        raise ValueError(f"outline must have shares of the length that grow from 0 to 1, got {shares.tolist()}")
+        raise ValueError(f"outline must have shares of the length that increase from 0 to 1, got {shares.tolist()}")
     if (widths < 0.0).any() or widths.max() != 1.0 or (widths[1:-1] == 0.0).any():
         raise ValueError(
-            "outline must have shares of the width of which the greatest is 1, and none is 0 between the ends, "
-            f"got {widths.tolist()}"
+            "outline must have shares of the width whose maximum is 1 and that are positive between the ends, got "
+            f"{widths.tolist()}"
         )
     return tuple((float(share), float(width)) for share, width in rows)

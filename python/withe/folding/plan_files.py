@@ -48,7 +48,7 @@ def parts_of(content: Mapping[str, Any]) -> dict[str, Any]:
     poses = validation.number_array(content["poses"], "poses", (count, 7))
     angles = validation.number_array(content["angles"], "angles", (count,))
     if count < 2 or times[0] != 0.0 or (np.diff(times) <= 0.0).any():
-        raise ValueError("times must be two or more that grow from 0")
+        raise ValueError("times must be two or more values that increase from 0")
     turned = np.stack([np.sin(0.5 * angles), np.zeros(count), np.cos(0.5 * angles)], axis=1)
     if (np.abs(poses[:, 4:] - turned) > _ROUNDED).any() or poses[:, 3].any():
         raise ValueError("poses must be turned about y by angles")
@@ -57,11 +57,11 @@ def parts_of(content: Mapping[str, Any]) -> dict[str, Any]:
     clearance = validation.number(jaw.pop("clearance"), "clearance")
     plunges_at, blocked = content["plunges_at"], content["blocked"]
     if blocked is not None and not isinstance(blocked, str):
-        raise ValueError("blocked must be words or null")
+        raise ValueError("blocked must be text or null")
     methods = ("intuitive", "local", "ucs", "slip")
     sheet = _sheet(content["sheet"], count)
     if (sheet is None) != (content["method"] == "intuitive"):
-        raise ValueError("sheet must be known, but for method 'intuitive'")
+        raise ValueError("sheet must be given, except for method 'intuitive'")
     return {
         "paper": Paper(**content["paper"]),
         "target": validation.number(content["target"], "target"),

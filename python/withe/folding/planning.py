@@ -108,25 +108,25 @@ def slow_plan(
     validation.choice(method, "method", ("intuitive", "local", "ucs", "slip"))
     validation.choice(grasp, "grasp", ("moment_free", "free"))
     if grasp == "free" and method != "slip":
-        raise ValueError(f"grasp 'free' is one of method 'slip', not of {method!r}")
+        raise ValueError(f"grasp 'free' needs method='slip', got method={method!r}")
     bound = _CURVATURE if curvature is None else validation.positive(curvature, "curvature")
     if curvature is not None and grasp != "free":
-        raise ValueError(f"curvature bounds sheets of grasp 'free', whose moment may be any, not of {grasp!r}")
+        raise ValueError(f"curvature needs grasp='free', whose moment is not limited otherwise, got grasp={grasp!r}")
     validation.choice(manifold, "manifold", ("exact", "network"))
     if manifold == "network" and (grasp == "free" or method == "intuitive"):
         raise ValueError(
-            f"manifold 'network' knows sheets without moment: method {method!r} with grasp {grasp!r} asks for others"
+            f"manifold 'network' covers grasps without moment only, got method={method!r} with grasp={grasp!r}"
         )
     if not paper.is_strip and (manifold == "network" or grasp == "free"):
         what = "manifold 'network'" if manifold == "network" else "grasp 'free'"
-        raise ValueError(f"{what} is for sheets that are as wide everywhere: paper's outline is another")
+        raise ValueError(f"{what} needs a sheet of uniform width, but the paper has an outline")
     lgb_share, friction_share = validation.number_array(uncertainty, "uncertainty", (2,))
     if not (0 <= lgb_share <= 0.3 and 0 <= friction_share < 1):
-        raise ValueError(f"uncertainty must be shares up to .3 of Lgb and below 1 of friction, got {uncertainty}")
+        raise ValueError(f"uncertainty must be at most 0.3 for Lgb and below 1 for friction, got {uncertainty}")
     if jaw.depth > 0.2 * paper.length:
         raise ValueError(f"jaw must hold less than a fifth of the sheet, {paper.length:g} m long, got {jaw.depth:g} m")
     if paper.width_at(jaw.depth) <= 0.0:
-        raise ValueError(f"jaw must hold a sheet whose edge is a corner by some of it, got {jaw.depth:g} m")
+        raise ValueError(f"jaw must have a positive depth to hold a sheet by its corner, got {jaw.depth:g} m")
     task = _Task(
         paper=paper,
         target=_target(paper, target),
@@ -175,12 +175,16 @@ def _over_manifold(task: _Task) -> Plan:
         search = moment_free.uniform_cost if task.method == "ucs" else moment_free.greedy
         sheet = _smoothed(task, search(task.solve, task.holding, goal), _POSES)
     if sheet is None:
-        ends = "the step of least force leads nowhere" if task.method == "local" else "those do not connect"
+        ends = (
+            "the step of least force does not reach the target"
+            if task.method == "local"
+            else "these poses do not connect"
+        )
         if task.method == "slip" and moment_free.connects(task.solve, task.holding, goal):
-            ends = "the sheet jumps on all of them"
+            ends = "the sheet jumps on every path"
         raise ValueError(f"no path to {task.target:g} m over poses that lift less than {task.length:.2f} Lgb: {ends}")
     if not sheet.valid.all():
-        raise ValueError(f"no path to {task.target:g} m: between poses of the grid there are some without equilibrium")
+        raise ValueError(f"no path to {task.target:g} m: some steps between poses of the grid have no equilibrium")
     return _finished(task, task.outer(poses_of(sheet)), sheet)
 
 
@@ -261,7 +265,9 @@ def replan(present: Plan, pose: npt.ArrayLike, slide: float) -> Plan:
     wanted, forces = _on_from(present, inner, task.width) if task.grasp == "free" else _anew_from(task, inner)
     sheet = at_poses(wanted, forces, task.width)
     if not sheet.valid.all():
-        raise ValueError(f"pose must be nearer to those of a plan: no sheet is held on the way from {x:g}, {z:g} m")
+        raise ValueError(
+            f"pose must be nearer to the poses of a plan: the sheet has no equilibrium on the way from {x:g}, {z:g} m"
+        )
     return _finished(task, task.outer(poses_of(sheet)), sheet, offset=slide)
 
 
@@ -296,8 +302,8 @@ def _anew_from(task: _Task, inner: FloatArray) -> tuple[FloatArray, FloatArray]:
     start = task.solve([inner[0]], [inner[1]])
     if not start.valid[0]:
         raise ValueError(
-            "pose must be one of a sheet without moment, or near it: none is lifted with the jaw's inner edge at "
-            f"{inner[0]:.2f}, {inner[1]:.2f} Lgb"
+            f"pose must be near a pose without moment: none exists with the jaw's inner edge at {inner[0]:.2f}, "
+            f"{inner[1]:.2f} Lgb"
         )
     goal = _checked_goal(_goal(task), task)
     if task.method == "slip":
@@ -306,7 +312,7 @@ def _anew_from(task: _Task, inner: FloatArray) -> tuple[FloatArray, FloatArray]:
         nodes = moment_free.uniform_cost(task.solve, task.holding, goal, start)
         sheet = _smoothed(task, nodes, _POSES_OF_REST)
     if sheet is None:
-        raise ValueError(f"no path from there to {task.target:g} m over poses without moment")
+        raise ValueError(f"no path without moment leads from this pose to {task.target:g} m")
     wanted = poses_of(sheet)
     wanted[:, 2] += np.linspace(1.0, 0.0, len(wanted)) * (inner[2] - start.angle[0])
     return wanted, forces_of(sheet)
@@ -339,17 +345,18 @@ def _checked_goal(goal: Elastica | None, task: _Task) -> Elastica:
     where, lgb = task.target, task.paper.gravito_bending_length
     if goal is None:
         raise ValueError(
-            f"target is {where:g} m, {where / lgb:.2f} Lgb: no pose without moment that lifts less than {LONGEST:g} "
-            f"Lgb, and more than {SHORTEST:g}, brings the edge there{_reachable(task)}"
+            f"target must be reachable without moment, got {where:g} m ({where / lgb:.2f} Lgb): no pose that lifts "
+            f"less than {LONGEST:g} Lgb and more than {SHORTEST:g} brings the edge there{_reachable(task)}"
         )
     lifted = float(goal.suspended[0])
     for bound, wrong, what in (
-        (task.length, lifted >= task.length, "less than the sheet has"),
-        (SHORTEST, lifted <= SHORTEST, "more, so as not to be bent too sharply"),
+        (task.length, lifted >= task.length, "less than the length of the sheet"),
+        (SHORTEST, lifted <= SHORTEST, "more than needed to avoid a sharp bend"),
     ):
         if wrong:
             raise ValueError(
-                f"target is {where:g} m: there {lifted:.2f} Lgb are lifted, not {what}: {bound:.2f}{_reachable(task)}"
+                f"target must be reachable, got {where:g} m: the lifted length there is {lifted:.2f} Lgb, but must "
+                f"be {what}, {bound:.2f} Lgb{_reachable(task)}"
             )
     return goal
 
@@ -422,9 +429,9 @@ def _blocked(task: _Task) -> str:
         if len(found.x):
             least = float(found.max_curvature.min())
             if least > task.curvature:
-                return f"{said}: the least with which it can be there is {least:.2f}"
+                return f"{said}: the least possible curvature there is {least:.2f}"
             break
-    return f"{said} and lifting less than {task.length:.2f} Lgb: no pose there connects with the flat sheet"
+    return f"{said} and a lifted length below {task.length:.2f} Lgb: no such pose connects with the flat sheet"
 
 
 def _finished(task: _Task, outer: FloatArray, sheet: Elastica | None, offset: float = 0.0) -> Plan:

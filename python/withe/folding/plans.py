@@ -281,7 +281,7 @@ class Plan:
         elif (slides := np.nanmax(np.abs(self.slide))) > 1e-3:
             way += f", slides {1e3 * slides:.1f} mm"
         if self.blocked is not None:
-            way += ", does not bear its uncertainty"
+            way += ", fails within its uncertainty"
         greatest = f"slip ratio {ratio:.3f}, curvature {curvature:.0f}/m"
         return f"Plan({way}, greatest {greatest}, fingers from the {self.side})"
 

@@ -133,7 +133,7 @@ def plunge(
     if not isinstance(plan, Plan):
         raise ValueError(f"plan must be a Plan, got {plan!r:.80}")
     if plan.plunges_at is not None:
-        raise ValueError(f"plan must come down slowly, it plunges at {plan.plunges_at:.2f} s already")
+        raise ValueError(f"plan must end slowly, but already plunges at {plan.plunges_at:.2f} s")
     press = validation.positive(press, "press")
     bound = validation.positive(within, "within")
     looks = validation.integer(replans, "replans", 0, 1000)
@@ -150,7 +150,7 @@ def plunge(
             tried.append(_Tried(slow, SimulatedSheet(paper, jaw=plan.jaw, **options), looks))
             bar.advance(1)
             if tried[0].snapped:
-                raise ValueError(f"no plunge begins: the sheet snaps on the slow way there; {_needs(plan)}")
+                raise ValueError(f"no plunge is possible: the sheet snaps before the plunge begins; {_needs(plan)}")
 
         best: Part | None = None
         begin = 0.0  # aside, as the last way that folds the sheet
@@ -216,7 +216,7 @@ def _above(plan: Plan) -> Plan:
         if slides[0] <= _NO_SLIDE:
             break
     if best is None:
-        raise ValueError(f"no plunge begins: no way leads to over the target; {_needs(plan)}")
+        raise ValueError(f"no plunge is possible: no path leads above the target; {_needs(plan)}")
     return best[1]
 
 
@@ -246,10 +246,14 @@ def _ended(slow: Plan, way: Part, slide: float) -> Plan:
 def _missed(plan: Plan, worst: float, bound: float) -> str:
     lgb, friction = (100.0 * share for share in plan.uncertainty)
     sheets = f"all sheets with Lgb off by up to {lgb:g} % and friction less by up to {friction:g} %"
-    how = f"the best is off by {1e3 * worst:.1f} mm on one of them" if np.isfinite(worst) else "on each way one snaps"
-    return f"no plunge folds {sheets} within {1e3 * bound:g} mm: {how}; led down slowly, {_needs(plan)}"
+    how = (
+        f"the best misses by {1e3 * worst:.1f} mm for one sheet"
+        if np.isfinite(worst)
+        else "every path snaps for one sheet"
+    )
+    return f"no plunge folds {sheets} within {1e3 * bound:g} mm: {how}; without a plunge, {_needs(plan)}"
 
 
 def _needs(plan: Plan) -> str:
     needed = float(np.nanmax(plan.slip_ratio))
-    return f"it would need friction {needed:.3f}, and the paper has {plan.paper.friction:g}"
+    return f"the fold would need friction {needed:.3f}, and the paper has {plan.paper.friction:g}"

@@ -165,7 +165,7 @@ class SheetNetwork(Surrogate):
         """
         torch = require("torch", "learn")
         if not isinstance(x, torch.Tensor) or not isinstance(z, torch.Tensor):
-            raise ValueError("x and z must be tensors: ask the network itself for arrays")
+            raise ValueError("x and z must be tensors: for arrays, call the network itself")
         x, z = torch.broadcast_tensors(x, z)
         said = self.network(torch.stack(self._form.ask(torch, x, z), dim=-1))
         return self._form.tell(torch, x, z, said.unbind(-1))

@@ -29,8 +29,8 @@ def strip_ends(image: npt.ArrayLike | str | os.PathLike[str]) -> tuple[float, fl
     left, right = mask[:, 0].any(), mask[:, -1].any()
     if left == right:
         raise ValueError(
-            "image must show a strip that comes in level from its left or its right border, where it is clamped, and "
-            f"ends inside: what differs from the background touches {'both' if left else 'neither'} of these"
+            "image must show a strip that enters level from the left or right border, where it is clamped, and "
+            f"ends inside, but the foreground touches {'both' if left else 'neither'} of the two borders"
         )
     if right:
         picture, mask = picture[:, ::-1], mask[:, ::-1]

@@ -151,7 +151,7 @@ def run_trials(
         if not isinstance(each, Trial):
             raise ValueError(f"trials must be Trials, got {each!r:.80}")
     if client is not None and processes is not None:
-        raise ValueError("trials run in processes or on a client, not in both")
+        raise ValueError("processes and client must not be given together")
     if client is not None:
         require_client(client)
     count = validation.integer(os.cpu_count() or 1 if processes is None else processes, "processes", 1, 10_000)

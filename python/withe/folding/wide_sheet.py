@@ -134,14 +134,14 @@ class WideSheet:
         if not isinstance(paper, Paper):
             raise ValueError(f"paper must be a Paper, got {paper!r}")
         if not paper.is_strip:
-            raise ValueError("paper must be as wide everywhere for two strips of one width, its outline is another")
+            raise ValueError("paper must have uniform width for two strips of one width, but has an outline")
         if noise is not None and not isinstance(noise, Noise):
             raise ValueError(f"noise must be a Noise, got {noise!r}")
         seed = validation.integer(seed, "seed", 0, 2**63 - 1)
         edges = validation.integer(edges, "edges", 20, 100_000)
         uneven = validation.non_negative(unevenness, "unevenness")
         if uneven > 0.5:
-            raise ValueError(f"unevenness must be .5 at most, or friction would be negative, got {uneven:g}")
+            raise ValueError(f"unevenness must be at most 0.5, got {uneven:g}: friction would be negative")
         self.paper, self.jaw = paper, Jaw() if jaw is None else jaw
         self._drawn = Drawn.of(Noise.none() if noise is None else noise, seed)
         self.truth = replace(
