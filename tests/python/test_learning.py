@@ -173,13 +173,13 @@ def test_what_is_no_tensor_of_float64_is_refused():
         ({(arm, "youngs_modulus"): 1e6}, "must be a torch.Tensor"),
         ({}, "must map"),
         ({(arm, "colour"): double}, "colour"),
-        ({"colour": double}, "no 'colour'"),
-        ({(sim["wall"], "position"): double}, "a rollout takes no 'position' of a support"),
+        ({"colour": double}, "values must not hold 'colour'"),
+        ({(sim["wall"], "position"): double}, "a rollout does not take 'position' of a support"),
         ({"initial_positions": torch.tensor(sim.positions() + 1.0)}, "a support holds"),
     ):
         with pytest.raises(ValueError, match=message):
             withe.learning.rollout(sim, values, 0.02)
-    with pytest.raises(ValueError, match="supports have a position"):
+    with pytest.raises(ValueError, match="a support has position"):
         withe.learning.equilibrium(sim, {(sim["wall"], "rotation"): double})
     with pytest.raises(ValueError, match="of must be"):
         withe.learning.rollout(sim, {(arm, "youngs_modulus"): double}, 0.02, of="colours")

@@ -50,7 +50,7 @@ def test_pixels_where_the_lens_shows_nothing_are_refused(distortion):
     farthest = 900.0 * (r * (1.0 + distortion[0] * r**2 + distortion[1] * r**4)).max()
     seen = np.array([[320.0, 240.0], [320.0 + farthest - 0.01, 240.0]])
     assert camera.project(camera.to_plane(seen)) == pytest.approx(seen, abs=1e-6)
-    with pytest.raises(ValueError, match="distortion turns back before that"):
+    with pytest.raises(ValueError, match="where the lens distortion is invertible"):
         camera.to_plane([*seen, (320.0 + farthest + 0.01, 240.0)])
 
 

@@ -213,7 +213,7 @@ def field(number, value):
 
 
 def two_layer_network():
-    """ONNX, byte by byte: the mean of the channels by a 1 x 1 convolution, then a sigmoid around .5."""
+    """ONNX, byte by byte: the mean of the channels by a 1 x 1 convolution, then a sigmoid around 0.5."""
     weights = struct.pack("<3f", 10, 10, 10)
     bias = struct.pack("<f", -15)
 
@@ -267,7 +267,7 @@ def test_a_torch_network_makes_the_mask_as_module_and_as_file(tmp_path):
     assert np.array_equal(network_mask(network, size=(80, 120))(image), image[..., 0] > 0)
     with torch.no_grad():
         network[0].bias.fill_(np.nan)
-    with pytest.raises(ValueError, match="model must answer with finite values"):
+    with pytest.raises(ValueError, match="model must return finite values"):
         network_mask(network)(image)
     broken = tmp_path / "broken.pt"
     broken.write_bytes(b"no network")

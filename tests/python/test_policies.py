@@ -147,11 +147,11 @@ def test_a_policy_learns_to_hold_the_arc_that_is_nearest():
     seen, _ = robots.reset(seed=0)
     for _ in range(Calm.steps):
         seen, rewards, *_ = robots.step(policy.predict(seen, deterministic=True)[0])
-    turned = np.linspace(0.01, 1.8, 1000)  # by arcs of .3 m, which the arm at rest is
+    turned = np.linspace(0.01, 1.8, 1000)  # by arcs of 0.3 m, which the arm at rest is
     arcs = 0.3 / turned * np.array([1.0 - np.cos(turned), 0.0 * turned, np.sin(turned)])
     nearest = np.linalg.norm(arcs - Touch.goal[:, None], axis=0).min()
     assert nearest < 0.03
-    assert -rewards[0] < nearest + 0.03  # .08 further away at the start
+    assert -rewards[0] < nearest + 0.03  # 0.08 further away at the start
 
 
 def test_training_refuses_what_is_no_task():

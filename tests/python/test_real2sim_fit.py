@@ -370,7 +370,7 @@ def test_tags_of_which_nothing_tells_whether_they_jump_are_listed():
     points[15, [1, 2, 4]] = np.nan  # no other tag
     found = fit(simulation, Tags(points, places), ARM, progress=False)
     assert found.unchecked == ((15, 3), (29, 0))
-    assert "outliers not looked for at 2 tags in 2 frames" in repr(found)
+    assert "outliers were not checked at 2 tags in 2 frames" in repr(found)
     few = fit(simulation, Tags(points[:3], places), ARM, progress=False)
     assert few.unchecked == tuple((frame, tag) for frame in range(3) for tag in range(5))
 
@@ -441,12 +441,27 @@ def test_exact_tags_beside_the_plane_have_no_error_in_it():
         (Tags([[(1, 0, 0)]], ["arm.end"]), [*ARM, *ARM], {}, "natural_curvature of rod 'arm' twice"),
         (Tags([[(1, 0, 0)]], ["arm.end"]), [(("arm", "arm"), "density")], {}, "'density' of 'arm' is given twice"),
         (Tags([[(1, 0, 0)]], ["arm.end"]), ARM, {"shared": ARM}, "in unknowns or in shared, got both"),
-        (Tags([[(1, 0, 0)]], ["arm.end"]), [*DENSITIES], {}, "density of 'arm' cannot be unknown here"),
-        (Tags([[(1, 0, 0)]], ["arm.end"]), DENSITIES[::-1], {}, "density of 'arm' cannot be unknown here"),
-        (Tags([[(1, 0, 0)]], ["arm.end"]), DENSITIES[:1], {"shared": DENSITIES[1:]}, "as other unknowns set all"),
-        (Tags([[(1, 0, 0)]], ["arm.end"]), [*ARM, ("arm", "points")], {}, "points of 'arm' set its natural_curvature"),
-        (Tags([[(1, 0, 0)]], ["arm.end"]), [("arm", "points"), *ARM], {}, "points of 'arm' set its natural_curvature"),
-        (Tags([[(1, 0, 0)]], ["arm.end"]), [("arm", "viscosity")], {}, "must be positive to begin with"),
+        (Tags([[(1, 0, 0)]], ["arm.end"]), [*DENSITIES], {}, "density of 'arm' cannot be unknown, because"),
+        (Tags([[(1, 0, 0)]], ["arm.end"]), DENSITIES[::-1], {}, "density of 'arm' cannot be unknown, because"),
+        (
+            Tags([[(1, 0, 0)]], ["arm.end"]),
+            DENSITIES[:1],
+            {"shared": DENSITIES[1:]},
+            "because other unknowns determine all",
+        ),
+        (
+            Tags([[(1, 0, 0)]], ["arm.end"]),
+            [*ARM, ("arm", "points")],
+            {},
+            "points of 'arm' determine its natural_curvature",
+        ),
+        (
+            Tags([[(1, 0, 0)]], ["arm.end"]),
+            [("arm", "points"), *ARM],
+            {},
+            "points of 'arm' determine its natural_curvature",
+        ),
+        (Tags([[(1, 0, 0)]], ["arm.end"]), [("arm", "viscosity")], {}, "must have a positive initial value"),
         (Tags([[(1, 0, 0)]], ["arm.end"]), [("arm", "natural_curvature", "cubic")], {}, "'constant' or 'linear' or"),
         (Tags([[(1, 0, 0)]], ["arm.end"]), [("arm", "natural_curvature", np.ones((3, 1)))], {}, r"\(29, n\)"),
         (Tags([[(1, 0, 0)]], ["arm.end"]), ARM, {"method": "newton"}, "method must be"),
@@ -472,7 +487,7 @@ def test_bad_input_is_refused(targets, unknowns, options, message):
         (lambda: Tags([[1, 0, 0]], ["a"]), r"points in metres must have shape \(frames, 1, 3\), got \(1, 3\)"),
         (lambda: Tags([[(1, 0, np.inf)]], ["a"]), "must be finite, or NaN where nothing was seen"),
         (lambda: Tags([[(1, 0, 0)]], ["a"], sigma=0), "sigma must be positive"),
-        (lambda: Tags([[(1, 0, 0)]] * 2, ["a"], times=[1, 1]), "times must grow"),
+        (lambda: Tags([[(1, 0, 0)]] * 2, ["a"], times=[1, 1]), "times must increase"),
         (lambda: Curvatures([[0.1]], ["a", "b"], [(1,)]), "places must be three at least"),
         (lambda: Curvatures([[0.1]], ["a", "b", "c"], [(2,)]), "tags of groups must lie in 1..1, got 2"),
         (lambda: Curvatures([[0.1]], ["a", "b", "c"], [()]), "at least one tag each"),
@@ -602,7 +617,7 @@ def test_a_frame_without_equilibrium_says_so_and_the_others_are_fitted(more):
 
     found = fit(simulation, Tags(tags, names([15, 30])), [*ARM, *more], conditions=conditions, progress=False)
     assert list(found.converged) == [False, True]
-    assert found.reasons == {0: "no equilibrium to begin with"}
+    assert found.reasons == {0: "no equilibrium at the initial guess"}
     assert found.values[1, 0] == pytest.approx(2.0, abs=1e-6)
     assert np.isnan(found.rms[0])
 
@@ -614,7 +629,7 @@ def test_a_fit_prints_what_it_found_in_a_few_lines():
     shown = repr(fit(simulation, Tags(points, names((10, 20, 30)), sigma=1e-4), ARM, progress=False)).split("\n")
     assert shown[0].startswith("Fit(2 of 3 frames converged")
     assert shown[1].startswith("  natural_curvature of 'arm': 2 to 4, sigma 0.01")
-    assert shown[2].startswith("  outliers not looked for at 6 tags in 2 frames")
+    assert shown[2].startswith("  outliers were not checked at 6 tags in 2 frames")
     assert shown[3:] == ["  frame 1: nothing was seen"]
     many = repr(fit(simulation, Tags(points, names((10, 20, 30))), [("arm", "natural_curvature", "segment")]))
     assert len(many.split("\n")) < 40

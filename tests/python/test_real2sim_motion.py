@@ -134,7 +134,7 @@ def test_a_local_minimum_is_named_where_sigma_is_given_and_the_first_swings_lead
     assert local.converged.all()
     assert local.values[0, 0] > 2e6
     assert list(local.reasons) == [0]
-    assert "times sigma, too much for chance: a local minimum" in local.reasons[0]
+    assert "times sigma, more than noise explains. Possible causes: a local minimum" in local.reasons[0]
     assert local.reasons[0] in repr(local)
     found(8, stiff).apply(stiff)
     best = found(None, stiff)
@@ -250,7 +250,7 @@ def test_times_in_milliseconds_are_asked_about_and_long_runs_that_are_seen_often
         asked(np.arange(0.04, 2000.0, 0.04))
         asked(np.arange(40.0, 120.0, 40.0))  # rarely seen, but no long run
     assert not caught
-    with pytest.warns(UserWarning, match=r"40 s apart or more: .* periods of the .* in milliseconds\?") as caught:
+    with pytest.warns(UserWarning, match=r"at least 40 s apart, .* periods of the .* in milliseconds\?") as caught:
         asked(1e3 * np.arange(0.04, 2.0, 0.04))
     assert caught[0].filename == __file__
 

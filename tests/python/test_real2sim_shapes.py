@@ -17,7 +17,7 @@ POINTS = [("arm", "points", "linear")]
 
 
 def line(nodes, turn=0.0, curvature=0.0):
-    """Nodes of an arc of .3 m that begins along x but for a turn upwards."""
+    """Nodes of an arc of 0.3 m that begins along x but for a turn upwards."""
     edge = 0.3 / (nodes - 1)
     angles = turn + curvature * edge * (np.arange(nodes - 1) + 0.5)
     ways = edge * np.stack([np.cos(angles), 0 * angles, np.sin(angles)], axis=1)
@@ -150,7 +150,7 @@ def test_errors_of_the_shape_have_the_size_that_the_covariance_says(points, know
         options = {"unknown": "points", "sigma": 0.5 if known else None}
         found = rest_shape(simulation, "arm", seen, CAMERA, **options)
         scaled.append(np.linalg.solve(np.linalg.cholesky(found.covariance[0]), found.values[0] - coordinates))
-    assert 0.85 < np.sqrt(np.mean(np.square(scaled))) < 1.15  # 100 numbers: .07 of it is chance
+    assert 0.85 < np.sqrt(np.mean(np.square(scaled))) < 1.15  # 100 numbers: 0.07 of it is chance
 
 
 def test_what_has_no_drawn_shape_says_so():
@@ -162,13 +162,13 @@ def test_what_has_no_drawn_shape_says_so():
     target = Tags([[(0.3, 0, 0)]], ["arm.end"])
     with pytest.raises(ValueError, match="in a planar scene only"):
         fit(space, target, POINTS, progress=False)
-    with pytest.raises(ValueError, match="a pin holds no direction"):
+    with pytest.raises(ValueError, match="a pin does not hold directions"):
         fit(space, target, [(wall, "rotation")], progress=False)
-    with pytest.raises(ValueError, match="points of 'arm' move its supports"):
+    with pytest.raises(ValueError, match="points of 'arm' determine its supports"):
         fit(arm(), target, [*POINTS, ("wall", "position")], progress=False)
     b = scene.add_rod(start=(0.3, 0, 0), end=(0.5, 0, 0), nodes=9, radius=4e-3, material=rubber)
     scene.join(a.end, b.start)
-    with pytest.raises(ValueError, match="it is joined or closed: make natural_curvature unknown"):
+    with pytest.raises(ValueError, match="the rod is joined or closed: make natural_curvature unknown"):
         fit(scene.build(integrator="static", planar=True), target, POINTS, progress=False)
     found = fit(arm(), target, [("arm", "natural_curvature")], progress=False)
     with pytest.raises(ValueError, match="points of rod 'arm' was not fitted"):

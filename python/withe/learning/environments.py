@@ -356,6 +356,6 @@ def _refuse(task: Callable[..., Task], others: dict[str, Any], environment: str,
     """Say of options that there are none of these names, and how a task of other numbers is made."""
     for name in others:
         raise TypeError(
-            f"withe/{task.__name__}-v0 has no option {name!r}, only {known}; a task is another by its class: "
-            f"class Other(withe.learning.{task.__name__}): ..., then withe.learning.{environment}(Other())"
+            f"withe/{task.__name__}-v0 has no option {name!r}; its options are {known}. To change the task, derive "
+            f"class Other(withe.learning.{task.__name__}) and use withe.learning.{environment}(Other())"
         )

@@ -164,8 +164,8 @@ class Episodes:
             built = self._built(generator)
             if not self.task.redraw and generator.bit_generator.state != before:
                 warn(
-                    f"{self._name('build')} draws random numbers, but redraw is False: all robots and episodes have "
-                    "the scene of the first draw; with redraw = True each episode builds its own",
+                    f"{self._name('build')} draws random numbers, but redraw is False: all robots and episodes use "
+                    "the scene of the first draw. Set redraw = True to build a scene for each episode",
                     PlausibilityWarning,
                     "redraw",
                 )

@@ -93,8 +93,8 @@ def rollout(
     for unknown in values:
         if not isinstance(unknown, str) and isinstance(unknown[0], Support):
             raise ValueError(
-                f"a rollout takes no {unknown[1]!r} of a support: runs have gradients by calls of move, "
-                "Record.gradient(...).calls, and by where a support is from their start on, Record.gradient"
+                f"a rollout does not take {unknown[1]!r} of a support: use Record.gradient for a pose at the "
+                "start, and Record.gradient(...).calls for calls of move"
             )
     found = _apply(simulation, values, solve)
     return found[0] if isinstance(of, str) else found
@@ -146,15 +146,15 @@ def _apply(simulation: Simulation, values: Values, solve: _Solve) -> tuple[Any, 
     if not isinstance(simulation, Simulation):
         raise ValueError(f"simulation must be a withe.Simulation, got {type(simulation).__name__}")
     if not isinstance(values, Mapping) or not values:
-        raise ValueError('values must map what acts to tensors, such as {(arm, "youngs_modulus"): E}')
+        raise ValueError('values must map parameters to tensors, such as {(arm, "youngs_modulus"): E}')
     for unknown, tensor in values.items():
         name = _name(unknown)
         if not isinstance(tensor, torch.Tensor):
             raise ValueError(f"the value of {name} must be a torch.Tensor, got {type(tensor).__name__}")
         if tensor.dtype != torch.float64:
             raise ValueError(
-                f"the value of {name} must be float64, got {tensor.dtype}: make it with dtype=torch.float64, or "
-                "hand in value.double(), through which gradients go back to it"
+                f"the value of {name} must be float64, got {tensor.dtype}: create the tensor with "
+                "dtype=torch.float64, or pass value.double(), which keeps its gradient"
             )
     return tuple(_function().apply(simulation, list(values), solve, *values.values()))
 
@@ -210,11 +210,11 @@ def _set(simulation: Simulation, unknown: Unknown, value: FloatArray) -> None:
         target, word = unknown
         if isinstance(target, tuple):
             if word != "friction":
-                raise ValueError(f"two bodies have a friction alone, got {word!r}")
+                raise ValueError(f"a pair of bodies has friction only, got {word!r}")
             simulation.set_friction(*target, float(value) if value.ndim == 0 else (float(value[0]), float(value[1])))
         elif isinstance(target, Support):
             if word != "position":
-                raise ValueError(f"of {_name(unknown)} no tensor is taken: supports have a position")
+                raise ValueError(f"{_name(unknown)} cannot be given as a tensor: a support has position")
             simulation.move(target, position=value)
         else:
             simulation.set(target, **{word: value if value.ndim else float(value)})
@@ -225,7 +225,7 @@ def _set(simulation: Simulation, unknown: Unknown, value: FloatArray) -> None:
     elif unknown == "initial_positions":
         _displace(simulation, value)
     else:
-        raise ValueError(f"values have no {unknown!r}: see wrt of Record.gradient")
+        raise ValueError(f"values must not hold {unknown!r}: see wrt of Record.gradient")
 
 
 def _displace(simulation: Simulation, positions: FloatArray) -> None:
@@ -239,5 +239,7 @@ def _displace(simulation: Simulation, positions: FloatArray) -> None:
     displacement = simulation.linearise()._displacement  # orthonormal where nodes move
     by = displacement.T @ way
     if np.abs(displacement @ by - way).max() > 1e-9 * np.abs(way).max():
-        raise ValueError("initial_positions move what a support holds, or leave the plane of a planar scene")
+        raise ValueError(
+            "initial_positions must not move nodes that a support holds, or leave the plane of a planar scene"
+        )
     simulation.displace_state(np.concatenate([by, np.zeros_like(by)]))

@@ -52,7 +52,8 @@ class Screen:
         """Bring the window up to date; warns where there is no screen to open it on."""
         if self._figure is None and str(require("matplotlib", "view").get_backend()).lower() == "agg":
             warn(
-                'render_mode="human" has no screen to open a window on: it shows nothing, take "rgb_array"',
+                'render_mode="human" shows nothing, because matplotlib has no screen to open a window on: use '
+                '"rgb_array"',
                 cause="screen",
             )
         self._paint()

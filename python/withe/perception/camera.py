@@ -116,7 +116,7 @@ class Camera:
             raise ValueError("distortion needs the matrix as well, got None")
         map_ = _direct_linear_transform(camera._normalised(seen), known)
         if not (map_[2] @ np.column_stack([known, np.ones(len(known))]).T > 0.0).all():
-            raise ValueError("pixels must show metres in their order, got points that lie behind the camera as fitted")
+            raise ValueError("pixels and metres must be in the same order, but the fitted camera has points behind it")
         if flat and matrix is None:
             camera._pose = np.column_stack([map_[:, 0], map_[:, 1], np.full(3, np.nan), map_[:, 2]])
             camera._flat = True
@@ -211,10 +211,10 @@ class Camera:
         system[:, :2, 2], system[:, 2, 2] = -seen, -1
         constant = -(self._pose[:, 3] + lift)
         if (np.abs(np.linalg.det(system)) < 1e-12 * np.linalg.norm(self._pose[:, 0]) ** 2).any():
-            raise ValueError("pixels must see the plane, got a line of sight parallel to it")
+            raise ValueError("pixels must see the plane, but a line of sight is parallel to the plane")
         solution = np.linalg.solve(system, constant[..., None])[..., 0]
         if not self._flat and (solution[:, 2] <= 0).any():
-            raise ValueError("pixels must see the plane in front of the camera, got some that look above it")
+            raise ValueError("pixels must see the plane in front of the camera, but some look above the plane")
         return np.column_stack([solution[:, :2], z])
 
     def _normalised(self, pixels: Array) -> Array:
@@ -226,9 +226,7 @@ class Camera:
         lost = _size(self._distort(ideal) - distorted) > _INVERTED * np.maximum(1.0, _size(distorted))
         if lost.any():
             column, row = pixels[lost][0]
-            raise ValueError(
-                f"pixels must be seen by the lens, got ({column:g}, {row:g}): its distortion turns back before that"
-            )
+            raise ValueError(f"pixels must lie where the lens distortion is invertible, got ({column:g}, {row:g})")
         return ideal
 
     def _undistort(self, distorted: Array) -> Array:

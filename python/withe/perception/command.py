@@ -26,7 +26,9 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument("image", type=Path, help="the picture")
     parser.add_argument("--mask", type=Path, help="a picture whose bright pixels are cables")
     parser.add_argument("--out", type=Path, default=Path("."), help="folder to write to (default: here)")
-    parser.add_argument("--method", choices=["withe", "mbest"], default="withe", help="ours, or the published one")
+    parser.add_argument(
+        "--method", choices=["withe", "mbest"], default="withe", help="method: withe, or the published mbest"
+    )
     parser.set_defaults(run=run)
 
 

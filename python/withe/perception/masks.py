@@ -127,9 +127,9 @@ def network_mask(model: Any, threshold: float = 0.5, size: tuple[int, int] | Non
         answer = answer.reshape(answer.shape[-3:]) if answer.ndim > 3 else answer
         score = answer[-1] if answer.ndim == 3 else answer
         if score.shape != image.shape[:2]:
-            raise ValueError(f"model must answer with one value a pixel, {image.shape[:2]}, got {score.shape}")
+            raise ValueError(f"model must return one value per pixel, of shape {image.shape[:2]}, got {score.shape}")
         if not np.isfinite(score).all():
-            raise ValueError("model must answer with finite values, got NaN or infinity")
+            raise ValueError("model must return finite values, got NaN or infinity")
         if score.shape != given:
             score = require("cv2", "vision").resize(score, (given[1], given[0]))
         mask: NDArray[np.bool_] = score > threshold

@@ -232,8 +232,8 @@ def _solve(problem: CameraProblem, frames: list[int], free: BoolArray, bar: Prog
     failed = [frame for frame in frames if frame not in found]
     if failed:
         raise ConvergenceError(
-            f"frame {failed[0]} has no equilibrium for the first guess of the camera: leave it out of frames, or set "
-            "natural curvatures of the simulation that look more like it"
+            f"frame {failed[0]} has no equilibrium for the initial guess of the camera: leave the frame out of "
+            "frames, or set natural curvatures that look more like the frame"
         )
     return {frame: restricted.whole(solution.coordinates) for frame, solution in found.items()}
 

@@ -102,7 +102,7 @@ class Centrelines(ShortRepr, Target):
         given = [self.rods] if isinstance(self.rods, Rod | str) else list(self.rods)
         lines = lines_of(simulation, [rod_part(simulation, rod) for rod in given])
         if len(lines) != 1:
-            raise ValueError(f"rods of Centrelines must go on end to end as one line, got {len(lines)} lines")
+            raise ValueError(f"rods of Centrelines must be joined end to end as one line, got {len(lines)} lines")
         return _LineResidual(self, lines[0].rows, node_count(simulation))
 
 
@@ -317,9 +317,8 @@ def _with_misfit_named(found: Fit, target: Centrelines) -> Fit:
     if 0 in found.reasons or not together or off <= (target.sigma or _FOLLOWED * _extent(target)):
         return found
     reason = (
-        "the basis does not follow the centreline: neighbouring points are missed together (correlation "
-        f"{together:.2f}), by {off:.2g} {'m' if target.camera is None else 'px'} on the root mean square; take more "
-        "functions"
+        f"the basis does not follow the centreline: errors of neighbouring points are correlated ({together:.2f}), "
+        f"with {off:.2g} {'m' if target.camera is None else 'px'} root mean square. Use more functions"
     )
     return replace(found, reasons={**found.reasons, 0: reason})
 

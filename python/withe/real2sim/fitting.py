@@ -144,7 +144,7 @@ def fit(
 def _without(coordinates: FloatArray) -> FrameSolution:
     """A frame that has no equilibrium, or no derivatives there."""
     empty = np.zeros((0, len(coordinates)))
-    return FrameSolution(coordinates, np.zeros(0), empty, 0, False, "no equilibrium to begin with")
+    return FrameSolution(coordinates, np.zeros(0), empty, 0, False, "no equilibrium at the initial guess")
 
 
 def _frame_by_frame(

@@ -164,14 +164,14 @@ def _of_discretisation(
         by_mesh = float(np.sqrt(systematic[frame]))
         if by_time > _OF_SCALE and by_time >= 0.5 * by_mesh:
             found[frame] = (
-                f"time step too long for this motion: half of it moves what is found by up to {100.0 * by_time:.2g} % "
-                "of its scale, which the sigmas count; take a shorter time_step"
+                "time step too long for this motion: half of the time step changes the result by up to "
+                f"{100.0 * by_time:.2g} % of its scale, which the sigmas include. Use a shorter time_step"
             )
         elif by_mesh > _OF_SCALE:
             found[frame] = (
-                "mesh too coarse for this motion, or a model that is not that of the targets: residuals of successive "
-                f"frames are correlated ({each.persistence:.2f}) and may move what is found by {100.0 * by_mesh:.2g} % "
-                "of its scale, which the sigmas count; try more nodes"
+                "mesh too coarse for this motion, or the model differs from the targets: residuals of successive "
+                f"frames are correlated ({each.persistence:.2f}) and may change the result by "
+                f"{100.0 * by_mesh:.2g} % of its scale, which the sigmas include. Try more nodes"
             )
     return found
 
@@ -187,9 +187,9 @@ def _misfits(stills: Coordinates, targets: list[Target], told: dict[int, _Told])
         free = each.numbers - int(stills.per_frame.sum())
         if free > 0 and each.squares > _MISFIT**2 * free and chdtrc(free, each.squares) < _CHANCE:
             found[frame] = (
-                f"residuals are {np.sqrt(each.squares / free):.2g} times sigma, too much for chance: a local minimum "
-                "(try another first guess or method), outliers, a model that is not that of the targets (such as too "
-                "coarse a mesh), or too small a sigma"
+                f"residuals are {np.sqrt(each.squares / free):.2g} times sigma, more than noise explains. Possible "
+                "causes: a local minimum (try another initial guess or method), outliers, a wrong model (such as "
+                "too coarse a mesh), or too small a sigma"
             )
     return found
 
@@ -202,8 +202,9 @@ def _off_plane(targets: list[Target], told: dict[int, _Told]) -> dict[int, str]:
         within = max(float(known), float(np.sqrt(each.squares / max(each.numbers, 1))))
         if each.beside > _BESIDE * within:
             found[frame] = (
-                f"targets lie beside the plane of the scene by {each.beside:.2g} {'times sigma' if known else 'm'}, "
-                "which no fit in it follows: give them in the axes of the scene, or build(planar=False)"
+                f"targets lie outside of the plane of the scene by {each.beside:.2g} "
+                f"{'times sigma' if known else 'm'}, which no planar fit can follow: give the targets in the axes "
+                "of the scene, or use build(planar=False)"
             )
     return found
 

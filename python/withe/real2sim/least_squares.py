@@ -196,7 +196,7 @@ def lone_frame(
     found = problem.residual(start, frame)
     if found is None:
         empty = np.full(0, np.nan)
-        return FrameSolution(start, empty, np.zeros((0, len(scales))), 0, False, "no equilibrium to begin with")
+        return FrameSolution(start, empty, np.zeros((0, len(scales))), 0, False, "no equilibrium at the initial guess")
     coordinates, (residual, state) = start.copy(), found
     size = _size(residual)
     for iteration in range(1, max_iterations + 1):
@@ -213,7 +213,9 @@ def lone_frame(
                 linear = Decomposed(_seen_rows(derivatives[:, which] * scales, residual))
         except ConvergenceError as error:
             empty = np.zeros((len(residual), len(scales)))
-            return FrameSolution(coordinates, residual, empty, iteration, False, f"no derivatives there: {error}")
+            return FrameSolution(
+                coordinates, residual, empty, iteration, False, f"no derivatives at these values: {error}"
+            )
         jacobian, right = linear.matrix, -seen(residual)
         step = linear.bounded(right, 1.0)
         gain = _norm(jacobian @ step)
@@ -237,11 +239,11 @@ def lone_frame(
             step = linear.bounded(right, 0.25 * float(np.abs(step).max()))
         else:
             if not lagged and (secants is None or not secants.renew()):
-                reason = "" if at_kink else "no step lessens the residual"
+                reason = "" if at_kink else "no step reduces the residual"
                 return FrameSolution(coordinates, residual, jacobian, iteration, at_kink, reason)
         if at_kink or (secants is None and not lagged and size <= tolerance):
             return FrameSolution(coordinates, residual, jacobian, iteration, True, linear=linear)
-    return FrameSolution(coordinates, residual, jacobian, max_iterations, False, "max_iterations were not enough")
+    return FrameSolution(coordinates, residual, jacobian, max_iterations, False, "max_iterations were reached")
 
 
 def all_frames(
@@ -277,9 +279,9 @@ def all_frames(
             farthest = max(float(np.abs(step).max()) for step in steps.values())
             steps = _joint_step(solutions, local, 0.25 * farthest)
         else:
-            return _closed(solutions, iteration, False, "no step lessens the residual")
+            return _closed(solutions, iteration, False, "no step reduces the residual")
         solutions = tried
-    return _closed(solutions, max_iterations, False, "max_iterations were not enough")
+    return _closed(solutions, max_iterations, False, "max_iterations were reached")
 
 
 def _linearised(

@@ -97,7 +97,9 @@ def read_log(
         )
     times = _column(names, rows, names[0] if time is None else time, skip)
     if not np.isfinite(times).all() or (np.diff(times) <= 0.0).any():
-        raise ValueError(f"times of {os.fspath(path)!r} must be numbers that grow from row to row: give time= or skip=")
+        raise ValueError(
+            f"times of {os.fspath(path)!r} must be numbers that increase from row to row: give time= or skip="
+        )
     pixels = np.stack(
         [np.stack([_column(names, rows, f"tagid_{axis}_{tag}", skip) for axis in "xy"], axis=1) for tag in numbers],
         axis=1,

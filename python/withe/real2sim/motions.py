@@ -165,8 +165,8 @@ def _check_unit(simulation: Simulation, times: FloatArray) -> None:
     slowest = abs(simulation.linearise().frequencies(1)[0])
     if between * slowest > _MANY_SWINGS:
         warn(
-            f"times of targets are {between:.3g} s apart or more: that is {between * slowest:.3g} periods of the "
-            f"slowest mode, and each run goes on for {steps:,.0f} time steps; are they in milliseconds?",
+            f"times of targets are at least {between:.3g} s apart, which is {between * slowest:.3g} periods of the "
+            f"slowest mode, and each run takes {steps:,.0f} time steps: are the times in milliseconds?",
             cause="times",
         )
 
@@ -174,13 +174,15 @@ def _check_unit(simulation: Simulation, times: FloatArray) -> None:
 def _check_gradients(
     simulation: Simulation, unknowns: list[Unknown], begin: Callable[[Simulation], object] | None
 ) -> None:
-    instead = "take method='gauss_newton'"
+    instead = "use method='gauss_newton'"
     for unknown in unknowns:
         if any(isinstance(word, tuple) and word[1] in POSE_WORDS for word in unknown.words):
-            raise ValueError(f"{unknown.names[0]} cannot be unknown with method='lbfgs', as supports move: {instead}")
+            raise ValueError(
+                f"{unknown.names[0]} cannot be unknown with method='lbfgs', because supports move: {instead}"
+            )
     if begin is not None and not simulation.plan.planar:
         raise ValueError(
-            "begin with method='lbfgs' needs a planar scene, as in space directors turn with what it does: " + instead
+            "begin with method='lbfgs' needs a planar scene, because in space directors turn with begin: " + instead
         )
 
 
@@ -246,9 +248,7 @@ class _Motion(Coordinates):
             step[i] = _DIFFERENCE * scale
             ahead = self.residual(coordinates + step, frame)
             if ahead is None:
-                raise ConvergenceError(
-                    f"a run fails for {self.names[i]} a little off what it is: shorten its time step"
-                )
+                raise ConvergenceError(f"a run with a small change of {self.names[i]} fails: use a shorter time step")
             columns.append((seen(ahead[0]) - now) / step[i])
         return np.stack(columns, axis=1)
 

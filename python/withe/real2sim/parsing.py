@@ -58,11 +58,13 @@ def _check_shapes(unknowns: list[Unknown]) -> None:
         rod = shape.rods[0]
         for other in unknowns:
             if isinstance(other, Pose) and other.rods[0] in shape.supports:
-                raise ValueError(f"points of {rod!r} move its supports: leave out {other.word} of {other.rods[0]!r}")
+                raise ValueError(
+                    f"points of {rod!r} determine its supports: leave out {other.word} of {other.rods[0]!r}"
+                )
             if isinstance(other, NaturalCurvature | NaturalTwist) and other.rods[0] == rod:
                 raise ValueError(
-                    f"points of {rod!r} set its {other.word}: leave one of them out; where its base alone is "
-                    "turned, take (support, 'rotation') instead of points"
+                    f"points of {rod!r} determine its {other.word}: leave one of them out. To turn the base only, "
+                    "use (support, 'rotation') instead of points"
                 )
 
 
@@ -74,5 +76,6 @@ def _check_parameters(simulation: Simulation, unknowns: list[Unknown]) -> None:
         own = [next(kept) for _ in parameter.words]
         if all(isinstance(word, Remaining) and not word.arrays for word in own):
             raise ValueError(
-                f"{parameter.names[0]} cannot be unknown here, as other unknowns set all that it sets: leave it out"
+                f"{parameter.names[0]} cannot be unknown, because other unknowns determine all of its values: "
+                "leave it out"
             )

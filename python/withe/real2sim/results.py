@@ -158,8 +158,8 @@ class Fit:
         if self.unchecked:
             frames = len({frame for frame, _ in self.unchecked})
             yield (
-                f"outliers not looked for at {len(self.unchecked)} tags in {frames} frames: too few frames around, or "
-                "other tags, tell where they should be"
+                f"outliers were not checked at {len(self.unchecked)} tags in {frames} frames: too few neighbouring "
+                "frames or tags predict their positions"
             )
 
     @property
@@ -208,7 +208,7 @@ class Fit:
         """
         coordinates = self._coordinates[frame]
         if not np.isfinite(coordinates).all():
-            raise ValueError(f"frame {frame} was skipped, as nothing was seen in it: give one with values")
+            raise ValueError(f"frame {frame} was skipped, because nothing was seen in it: give a frame with values")
         ends = np.cumsum([len(unknown) for unknown in self._unknowns])
         for index in order_of_writing(simulation, self._unknowns):
             unknown, end = self._unknowns[index], ends[index]

@@ -84,7 +84,7 @@ class NaturalTwist(_NaturalStrain):
     def __init__(self, simulation: Simulation, rod: Rod | str, basis: Any = "constant") -> None:
         part = rod_part(simulation, rod)
         if turning_axis(simulation, part) is not None:
-            raise ValueError(f"natural_twist of {part.owner} cannot be unknown in a plane: build with planar=False")
+            raise ValueError(f"natural_twist of {part.owner} cannot be unknown in a plane: use build(planar=False)")
         super().__init__(part, basis, np.ones((1, 1)), [""])
 
 
@@ -102,12 +102,13 @@ class DrawnShape(Unknown):
         plane = turning_axis(simulation, part)
         if plane is None:
             raise ValueError(
-                f"points of {part.owner} can be unknown in a planar scene only: build with planar=True, or make "
+                f"points of {part.owner} can be unknown in a planar scene only: use build(planar=True), or make "
                 "natural_curvature unknown"
             )
         if part.closed or simulation._session.directory.all(JoinPart):
             raise ValueError(
-                f"points of {part.owner} cannot be unknown, as it is joined or closed: make natural_curvature unknown"
+                f"points of {part.owner} cannot be unknown, because the rod is joined or closed: make "
+                "natural_curvature unknown"
             )
         self._rod, self.rods, self._part = part.name, (part.name,), part
         self._components, self._axis = plane
@@ -195,7 +196,7 @@ class Pose(Unknown):
     ) -> None:
         _, part = find_support(simulation._session, support)
         if word == "rotation" and part.kind == "pin":
-            raise ValueError(f"rotation of {part.name!r} cannot be unknown: a pin holds no direction")
+            raise ValueError(f"rotation of {part.name!r} cannot be unknown, because a pin does not hold directions")
         self.word, self.rods, self._name = word, (part.name,), part.name
         self._position, self._rotation = _pose(simulation, part)
         # A support is moved at once, also where its position is one unknown and its rotation another.
@@ -292,7 +293,7 @@ def _basis(part: RodPart, basis: Any) -> tuple[FloatArray, list[str]]:
     """Functions along a rod at its stencils, shape (stencils, n), and what tells their coordinates apart."""
     stencils = len(part.voronoi)
     if stencils == 0:
-        raise ValueError(f"{part.owner} has no stencil that could bend: it needs three nodes")
+        raise ValueError(f"{part.owner} has no stencil that could bend: a rod needs at least three nodes")
     ends = np.cumsum(part.lengths)
     share = (ends if part.closed else ends[:-1]) / ends[-1]
     return _functions(share, basis, part.owner, "stencil")

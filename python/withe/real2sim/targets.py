@@ -168,7 +168,7 @@ class Curvatures(ShortRepr, Target):
         if axis is None:
             plane = turning_axis(simulation, places.rods[0])
             if plane is None:
-                raise ValueError("normal must be given: the simulation is not planar, and turns need an axis")
+                raise ValueError("normal must be given, because the simulation is not planar and turns need an axis")
             axis = plane[1]
         return _CurvatureResidual(self, places, np.asarray(axis, np.float64))
 
@@ -341,7 +341,9 @@ def frames_of(targets: Target | Sequence[Target]) -> list[Target]:
         counts = ", ".join(str(target.frames) for target in listed)
         raise ValueError(f"targets must have the same number of frames, got {counts}")
     if len(listed) > 1 and any(target.sigma is None for target in listed):
-        raise ValueError("sigma of every target must be given where there are several: it says how they weigh")
+        raise ValueError(
+            "sigma of every target must be given when there are several, because the sigmas weight the targets"
+        )
     return listed
 
 
@@ -385,5 +387,5 @@ def checked_times(times: Any, frames: int) -> FloatArray | None:
         return None
     array = validation.number_array(times, "times", (frames,))
     if (np.diff(array) <= 0.0).any():
-        raise ValueError("times must grow from frame to frame")
+        raise ValueError("times must increase from frame to frame")
     return array

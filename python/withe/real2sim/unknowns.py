@@ -155,12 +155,13 @@ class Parameter(Unknown):
             value = simulation.get(part.name, word)
             if value is None:
                 raise ValueError(
-                    f"{word} of {part.name!r} cannot be unknown: its stiffness was given without a material"
+                    f"{word} of {part.name!r} cannot be unknown, because the stiffness of the rod was given "
+                    "without a material"
                 )
             if not (np.asarray(value) > 0.0).all():
                 raise ValueError(
-                    f"{word} of {part.name!r} must be positive to begin with, as its logarithm is looked for: set a "
-                    f"first guess, simulation.set({part.name!r}, {word}=...)"
+                    f"{word} of {part.name!r} must have a positive initial value, because its logarithm is fitted: "
+                    f"set a guess, simulation.set({part.name!r}, {word}=...)"
                 )
             self._first[part.name] = np.asarray(value, np.float64) if np.ndim(value) else float(value)
         self._mean = float(np.mean([np.mean(value) for value in self._first.values()]))
