@@ -118,10 +118,13 @@ Vec3<ByStart> start_slip(const FrictionSetting& f, const SlippingSurfaces<ByStar
 /// F(S) . J rows, S = J (q1 - q0) and N at the start.
 void add_lagged_friction(const ContactProblem& problem, const Touching& t, const Rows& rows, ContactAdjoint& out) {
   if (problem.description().friction_law == FrictionLaw::semi_explicit)
-    throw std::invalid_argument("no gradient is known through semi-explicit friction: take friction_model='lagged'");
+    throw std::invalid_argument(
+        "no gradient is available with semi-explicit friction: use "
+        "friction_model='lagged'");
   if (dot(problem.turn_of(t.pair), problem.turn_of(t.pair)) > 0.0)
     throw std::invalid_argument(
-        "no gradient is known through lagged friction on an obstacle that turns: take friction_model='implicit'");
+        "no gradient is available with lagged friction on an obstacle that turns: use "
+        "friction_model='implicit'");
   const FrictionSetting f = friction_setting(problem, t, FrictionKind::slipping, 1.0, nullptr);
   const SlipStart<ByStart> start = start_of(f);
   SlippingSurfaces<ByStart> c;
@@ -244,7 +247,8 @@ ContactAdjoint contact_adjoint(const ContactProblem& problem, const Touching& t,
   ContactAdjoint out;
   if (problem.anchored() && t.pair.rubs())
     throw std::invalid_argument(
-        "no gradient is known through anchored friction: take friction_model='implicit' or 'lagged'");
+        "no gradient is available with anchored friction: use "
+        "friction_model='implicit' or 'lagged'");
   if (t.lagged >= 0)
     add_lagged_friction(problem, t, rows, out);
   else

@@ -13,7 +13,7 @@ SheetWidth::SheetWidth(const std::vector<double>& places, const std::vector<doub
     Piece piece{places[i], widths[i], 0.0, weight};
     if (i + 1 < places.size()) {
       const double length = places[i + 1] - places[i];
-      require(length > 0, "places must grow");
+      require(length > 0, "places must increase");
       piece.slope = (widths[i + 1] - widths[i]) / length;
       weight += 0.5 * length * (widths[i] + widths[i + 1]);
     }

@@ -52,7 +52,8 @@ void check_regularization(const Model& model, double regularization) {
   require(regularization > 0.0, "regularization of the fluid must be positive, got " + text(regularization));
   const double shortest = model.edge_length.minCoeff();
   require(shortest >= kFinest * regularization,
-          "regularization of the fluid must not exceed 3 edges, or velocities do not tell forces: got " +
+          "regularization of the fluid must not exceed 3 edge lengths, or velocities "
+          "would not determine forces, got " +
               text(regularization) + " m with edges of " + text(shortest) + " m");
 }
 

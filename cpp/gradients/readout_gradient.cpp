@@ -196,7 +196,8 @@ class Readouts {
 
 void ReadoutAdjoint::check(const Model& model) const {
   const auto fits = [](const auto& table, Eigen::Index rows, const char* what) {
-    require(table.size() == 0 || table.rows() == rows, "derivatives by ", what, " need so many rows: ", rows);
+    require(table.size() == 0 || table.rows() == rows, "derivatives by ", what,
+            " must have this number of rows: ", rows);
   };
   for (const MatrixX3* table : {&positions, &velocities}) fits(*table, model.node_count, "positions or velocities");
   fits(directors, model.edge_count, "directors");
@@ -205,7 +206,7 @@ void ReadoutAdjoint::check(const Model& model) const {
   fits(twists, stencil_count(model), "twists");
   const auto supports = static_cast<Eigen::Index>(model.supports.size());
   for (const MatrixX3* table : {&reactions.forces, &reactions.moments})
-    require(table->rows() <= supports, "derivatives by reactions need so many rows at most: ", supports);
+    require(table->rows() <= supports, "derivatives by reactions must have at most this number of rows: ", supports);
 }
 
 bool leaves_plane(const Model& model, const State& state, const ReadoutAdjoint& by) {

@@ -63,7 +63,8 @@ void displace_state(const Model& model, const VectorX& by, State& state) {
   compute_configuration(model, out, q, configuration);
   require(configuration.length.minCoeff() > 0.0 && configuration.bend_strain.allFinite() &&
               configuration.half_strain.allFinite(),
-          "the displacement of the state folds an edge right back, or leaves it no length");
+          "the displacement of the state must not fold an edge back onto the next or "
+          "give an edge zero length");
   accept_configuration(model, q, configuration, out);
   out.v += basis * by.tail(basis.cols());
   state = std::move(out);

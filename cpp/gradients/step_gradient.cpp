@@ -16,8 +16,8 @@ namespace {
 /// solve may leave of its right-hand side.
 constexpr double kNeutral = 1e-12, kFree = 1e-14, kSolved = 1e-6;
 constexpr const char* kSingular =
-    "the state does not follow from what acts, as the matrix is singular there: something that counts is free to move "
-    "or to spin, or it is a limit point";
+    "the state is not determined by the parameters, because the matrix is "
+    "singular: a rod can move or spin freely, or the state is a limit point";
 
 EquationOptions exact(EquationOptions options) {
   options.exact = true;

@@ -216,7 +216,7 @@ void Tape::check_known() const {
   std::string why = refused_;
   for (const Step& step : steps_)
     if (why.empty() && step.unknown) why = step.unknown;
-  if (!why.empty()) throw std::invalid_argument("no gradient is known of this run: " + why);
+  if (!why.empty()) throw std::invalid_argument("no gradient of this run is available: " + why);
 }
 
 void Tape::walk_back(Player& player, const std::function<void(const Passage&)>& visit) const {
@@ -322,7 +322,8 @@ class Tape::Moments {
   void add_reactions(const MomentAdjoint& moment, bool by_poses) {
     if (moment.steps == 0)
       throw std::invalid_argument(
-          "reactions at the start of a run come from before it, and have no gradient: give zeros for the first frame");
+          "reactions at the start of a run have no gradient, because they come from the "
+          "step before the run: give zeros for the first frame");
     const auto end = static_cast<std::size_t>(moment.steps);
     std::size_t first = end - 1;
     while (first > 0 && !tape_.steps_[first].begins) --first;
@@ -342,8 +343,8 @@ class Tape::Moments {
       if (tape_.model_.supports[static_cast<std::size_t>(s)].is_hand() && !by.moments.row(s).isZero(0.0) &&
           hands[static_cast<std::size_t>(s)].position != then[static_cast<std::size_t>(s)].position)
         throw std::invalid_argument(
-            "no gradient by the way of a hand is known of its moment in a time step that was cut: take a smaller "
-            "time_step, or adaptive=False");
+            "no gradient of the moment of a hand with respect to its path is available in "
+            "a subdivided time step: use a smaller time_step, or adaptive=False");
   }
 
   /// With the natural shape that was there after so many steps.
@@ -418,8 +419,8 @@ RunJacobian Tape::jacobian() const {
   for (const Support& s : model_.supports)
     if (s.active && s.yields() && std::isfinite(s.description.hand.force_limit))
       throw std::invalid_argument(
-          "no Jacobian is known with a hand that slips, for how far it has is no part of a state vector: grasp without "
-          "force_limit=");
+          "no Jacobian is available with a hand that slips, because its slip is not part "
+          "of a state vector: use grasp without force_limit=");
   if (acting_.count() > 1)
     throw std::invalid_argument(
         "no Jacobian is known of a step in which a natural shape is on its way, or of a run in which something was "

@@ -261,10 +261,10 @@ class Builder {
       if (holds_frame(support.kind)) {
         Cluster& cluster = cluster_at(support.pass);
         if (cluster.hinge >= 0)
-          throw std::invalid_argument("a clamp must hold what hinges at its node turn against, not rod '" +
+          throw std::invalid_argument("a clamp at a hinge must hold the rod that the hinge turns against, not rod '" +
                                       rod(support.pass.rod).name + "', which turns: clamp rod '" +
                                       rod(clusters_[at(root_of(cluster))].passes.front().rod).name +
-                                      "' there, or hold=\"edge\"");
+                                      "' there, or use hold=\"edge\"");
         frame_of(cluster);
         if (support.gripped && cluster.passes.size() == 1) gripped_frames_.insert(cluster.frame);
       }
@@ -560,7 +560,7 @@ void check_tendon(const SceneDescription& scene, const TendonDescription& tendon
   for (const TendonGuide& guide : tendon.guides) {
     require(guide.rod >= 0 && guide.rod < static_cast<int>(scene.rods.size()) && guide.edge >= 0 &&
                 guide.edge < scene.rods[static_cast<std::size_t>(guide.rod)].rest_lengths.size(),
-            "guide of a tendon on an edge that is not there");
+            "guide of a tendon must lie on an edge of the scene");
     require(!before || *before != guide, "a tendon must run from each guide to another");
     before = &guide;
   }

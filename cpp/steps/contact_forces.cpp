@@ -104,7 +104,9 @@ void ContactForces::add_adjoint(const StepProblem& problem, const StepData&, con
   if (contact_.count() == 0) return;
   const auto& shares = problem.parameters->surfaces.pair_shares;
   if (std::any_of(shares.begin(), shares.end(), [](const VectorX& s) { return s.size() > 0; }))
-    throw std::invalid_argument("no gradient is known through friction that varies along a rod or over an obstacle");
+    throw std::invalid_argument(
+        "no gradient is available with friction that varies along a rod or over an "
+        "obstacle");
   int dofs[kContactUnknowns];
   double rows[kContactUnknowns];
   ContactLocal local;

@@ -129,7 +129,7 @@ void CustomTerm::add_matrix(const StepProblem& problem, const StepData& data, co
 }
 
 void CustomTerm::add_adjoint(const StepProblem&, const StepData&, const Assembler&, StepAdjoint&) const {
-  throw std::invalid_argument("no gradient is known through custom forces");
+  throw std::invalid_argument("no gradient is available with custom forces");
 }
 
 }  // namespace withe

@@ -58,7 +58,9 @@ void StokesletForces::add(const StepProblem& problem, StepData& data, const Asse
 }
 
 void StokesletForces::add_adjoint(const StepProblem&, const StepData&, const Assembler&, StepAdjoint&) const {
-  throw std::invalid_argument("no gradient is known through a fluid of Stokeslets: take model='resistive' or drag");
+  throw std::invalid_argument(
+      "no gradient is available with a fluid of Stokeslets: use model='resistive' or "
+      "drag");
 }
 
 double StokesletForces::dissipated(const StepProblem&, const StepData& data, const Assembler&,

@@ -129,7 +129,7 @@ Vector3 HandForces::add_turn_adjoint(const StepProblem& problem, const StepData&
 
 void HandForces::add_adjoint(const StepProblem& problem, const StepData& data, const Assembler&,
                              StepAdjoint& adjoint) const {
-  require(rings_.count() == 0, "no gradient is known of a rod that slides through a ring");
+  require(rings_.count() == 0, "no gradient is available with a rod that slides through a ring");
   std::optional<DiscreteAdjoint> discrete;
   if (problem.conserves_energy()) discrete.emplace(problem, data, adjoint.rows, adjoint);
   double rows[kMaxLocal];

@@ -35,11 +35,12 @@ void check_differentiable(const StepProblem& problem, const TendonSegment& segme
   const auto& [first, second] = segment.seat;
   const std::vector<FrameStencil>& half = problem.model.half;
   require(first.half < 0 || second.half < 0 || half[at(first.half)].frame != half[at(second.half)].frame,
-          "no gradient is known of a tendon with two guides in a row on one joint");
+          "no gradient is available with a tendon that has two consecutive guides on one "
+          "joint");
   for (const GuideSeat& seat : segment.seat)
     require(!problem.conserves_energy() || seat.half < 0 || half[at(seat.half)].hinge < 0,
-            "no gradient is known of energy-momentum steps with a guide of a tendon beside a revolute joint: put it in "
-            "the middle of an edge");
+            "no gradient of energy-momentum steps is available with a tendon guide beside "
+            "a revolute joint: put the guide in the middle of an edge");
 }
 
 }  // namespace

@@ -57,7 +57,7 @@ void Batch::check_distinct() const {
   std::vector<World*> sorted = lanes_;
   std::sort(sorted.begin(), sorted.end());
   require(std::adjacent_find(sorted.begin(), sorted.end()) == sorted.end(),
-          "simulations of a batch must differ: one is there twice, take a copy()");
+          "simulations of a batch must be different objects, got one twice: use a copy()");
 }
 
 /// Two threads must not step one lane.

@@ -237,7 +237,7 @@ void World::Implementation::carry_over(const Model& old, Rebuild why) {
 /// Builds the model for the present supports and plane; a running state is carried over.
 void World::Implementation::rebuild(Rebuild why) {
   account_for_settings();
-  if (tape) tape->refuse("supports came or went while it ran, or something left its plane");
+  if (tape) tape->refuse("supports were added or removed during the run, or the scene left its plane");
   const double stored = why == Rebuild::running ? elastic_energy() : 0.0;
   Model fresh = model_of_active(why);
   drop_scratch();
@@ -481,7 +481,7 @@ void World::Implementation::relax_together(const std::vector<int>& frames, const
 }
 
 void World::Implementation::leave_plane(const std::string& why) {
-  require(!options.planar.value_or(false), why + " leaves the plane of the scene: build it with planar=False");
+  require(!options.planar.value_or(false), why + " leaves the plane of the scene: build the scene with planar=False");
   spatial = true;
   plane_left_by = why;
   rebuild(Rebuild::running);
@@ -505,8 +505,9 @@ void World::Implementation::add_contact_notes() {
   if (!equations->contact()->frictional()) plan.notes.emplace_back("no friction: contact stays symmetric");
   if (options.integrator == Integrator::verlet && equations->contact()->regularises())
     plan.notes.emplace_back(
-        "friction that sticks allows explicit steps of at most about slip_tolerance / (7.5 mu) times a node's "
-        "mass over the force that presses it, which the drawing does not know");
+        "static friction limits explicit steps to about slip_tolerance / (7.5 mu) "
+        "times the mass of a node over its contact force, which is unknown before the "
+        "run");
 }
 
 /// Warns of rods whose edges are longer than they are thick: to contact they are chains of straight pieces.
@@ -518,17 +519,20 @@ void World::Implementation::add_coarse_notes() {
     const double ratio = (model.edge_length.segment(first, radius.size()).array() / (2.0 * radius.array())).maxCoeff();
     if (ratio <= 1.0 + 1e-9) continue;
     plan.notes.push_back("warning: edges of rod '" + description.rods[r].name + "' are " + text(ratio) +
-                         " times as long as it is thick, and touch as straight pieces: more nodes make contact smooth");
+                         " times as long as the rod is thick, and touch as straight pieces: more nodes "
+                         "make contact smooth");
   }
 }
 
 std::string World::Implementation::fluid_note() const {
   switch (description.fluid.model) {
     case FluidModel::resistive:
-      return "fluid: resistive-force theory, implicit; rods do not feel each other through it";
+      return "fluid: resistive-force theory, implicit; rods do not interact through the "
+             "fluid";
     case FluidModel::stokeslets:
       return "fluid: regularized Stokeslet segments couple all " + std::to_string(model.node_count) +
-             " nodes, once a step by conjugate gradients; the matrix of the steps stays as it is";
+             " nodes, once a step by conjugate gradients; the matrix of the steps does not "
+             "change";
     case FluidModel::none:
       break;
   }
@@ -547,8 +551,8 @@ void World::Implementation::make_plan() {
   if (model.planar()) {
     plan.plane_normal = model.plane->normal;
     notes.push_back(
-        "planar: 2 unknowns a node, no twist; a scene that could buckle out of its plane stays in it "
-        "(build(planar=False) to force 3D)");
+        "planar: 2 unknowns a node, no twist; a scene that could buckle out of its "
+        "plane stays in its plane (build(planar=False) to force 3D)");
   } else {
     notes.push_back("3D: " + (options.planar.has_value() && !*options.planar ? std::string("planar=False")
                               : spatial                                      ? std::string("the scene left its plane")

@@ -88,7 +88,8 @@ void World::Implementation::check_overlap() const {
                 (model.planar() && deepest->key.b >= 0 ? " within their plane: build with planar=False, " : ": ") +
                 "draw them apart, or leave the pair out with ignore_contact"
           : std::string(" m at the start: ") + (meet ? "join the nodes that meet there, " : "") +
-                "draw them apart, leave the pair out with ignore_contact, or take enable_contact(overlap='separate')";
+                "draw them apart, leave the pair out with ignore_contact, or use "
+                "enable_contact(overlap='separate')";
   require(false, name(deepest->key.a) + " and " + other + " overlap by " + text(0.0 + overlap) + advice);
 }
 

@@ -136,8 +136,8 @@ void World::Implementation::check_crossings() {
   const auto edge = [&](int e) { return std::to_string(e - model.rod_first_edge[at(model.edge_rod[at(e)])]); };
   crossing_warning = "Rods " + rod(a) + " and " + rod(b) + " pass through each other, with edge " + edge(a) +
                      " and edge " + edge(b) + " (time " + text(state.time, 6) +
-                     " s). Call scene.enable_contact() before scene.build(), or scene.enable_contact(rods=False) if "
-                     "they may do so.";
+                     " s). Call scene.enable_contact() before scene.build(), or "
+                     "scene.enable_contact(rods=False) if rods may pass through each other.";
   crossing_watch.reset();
 }
 

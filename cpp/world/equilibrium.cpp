@@ -17,14 +17,15 @@ constexpr int kMostStiffenings = 8;
 constexpr double kRelieved = 0.9;
 
 constexpr const char* kSideways =
-    "the equilibrium is not stable against motions out of its plane: in space the scene buckles or tips over sideways; "
-    "build(planar=False) lets it, build(planar=True) says that something keeps it in its plane";
+    "the equilibrium is not stable against motions out of its plane: in space the "
+    "scene would buckle or tip over sideways. Use build(planar=False) to allow "
+    "this, or build(planar=True) if a guide keeps the scene in its plane";
 
 constexpr const char* kNotInSpace =
-    "the equilibrium was found stable in its plane alone: it was not looked at in space, where a clamp cannot hold "
-    "what "
-    "turns about one of several hinges; clamp what they turn against, or build(planar=True) says that something keeps "
-    "it in its plane";
+    "the stability of the equilibrium was tested in its plane only: in space, a "
+    "clamp cannot hold a rod that turns about one of several hinges. Clamp the rod "
+    "that the hinges turn against, or use build(planar=True) if a guide keeps the "
+    "scene in its plane";
 
 }  // namespace
 
@@ -271,11 +272,11 @@ void World::Implementation::static_step(double end, double dt) {
   work.newton.poll();
   if (callback) callback(end, end);
   if (!equilibrium(dt).branch_changed || branch_warning) return;
-  branch_warning =
-      "the static step to time " + text(end, 6) +
-      " s left its branch of equilibria: the scene jumps within it, or was at a saddle, and which of other "
-      "equilibria it goes to depends on how. Time steps show that; equilibrium(path=\"arc_length\") goes "
-      "on through limit points";
+  branch_warning = "the static step to time " + text(end, 6) +
+                   " s left its branch of equilibria: the scene jumps within the step, or was at "
+                   "a saddle, and the equilibrium after a jump depends on the motion. Time steps "
+                   "resolve the motion; equilibrium(path=\"arc_length\") follows a branch through "
+                   "limit points";
 }
 
 /// Says that none was found.
@@ -285,15 +286,17 @@ void World::Implementation::fail_equilibrium(const StaticResult& result, double 
   const bool lies = !description.contact.obstacles.empty(), pulled = description.custom_implicit;
   fail(result.newton, dt,
        std::string("no static equilibrium was found") +
-           (!held && lies     ? ", and nothing but contact holds the scene, where friction may not be enough: clamp or "
-                                "pin a node"
-            : !held && pulled ? ", and nothing but custom forces holds the scene: clamp or pin a node if they are not "
-                                "to hold it"
+           (!held && lies     ? ", and only contact holds the scene, with friction that may be too low: clamp "
+                                "or pin a node"
+            : !held && pulled ? ", and only custom forces hold the scene: clamp or pin a node, unless the "
+                                "custom forces are meant to hold the scene"
             : !held           ? ", and no support holds the scene: clamp or pin a node"
-            : result.restless ? ": the scene does not come to rest; loads without a potential, as moments and follower "
-                                "forces, may drive it round for ever"
+            : result.restless ? ": the scene does not come to rest; loads without a potential, such as moments "
+                                "and follower forces, may drive the scene for ever"
                               : ""),
-       dt > 0.0 ? "" : "Try to get there in parts: small changes of loads and supports, or time steps with viscosity");
+       dt > 0.0 ? ""
+                : "Try smaller changes of loads and supports, one after the other, or time steps "
+                  "with viscosity");
 }
 
 /// The scene is in the equilibrium that was found, at a time.
@@ -320,7 +323,7 @@ void check_path(const PathOptions& wanted, const SceneDescription& scene) {
   for (int load : wanted.loads)
     require(load >= 0 && load < static_cast<int>(scene.loads.size()), "no such load: ", load);
   require(std::isfinite(wanted.start) && std::isfinite(wanted.end) && wanted.start != wanted.end,
-          "a path needs two factors to lead from and to");
+          "a path needs two different load factors");
   require(wanted.most_points > 0 && wanted.turn > 0.0, "a path needs points and turns that are positive");
 }
 
@@ -420,7 +423,7 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
   out.finished = r.finished;
   out.iterations += r.newton.iterations;
   self.release_left_rings();
-  if (out.points.size() < 2 && !r.finished) self.fail(r.newton, 0.0, "no path of equilibria leads from here");
+  if (out.points.size() < 2 && !r.finished) self.fail(r.newton, 0.0, "no path of equilibria begins at this state");
   return out;
 }
 

@@ -65,7 +65,8 @@ std::string World::Implementation::crushed() const {
   if (shortest < 0) return "";
   return "; an edge is crushed to " + text(least, 2) + " of its length" +
          place_of_node(model.edge_tail[at(shortest)]).words +
-         ", as by a force above E A / 2 or a blow faster than sound in the rod, sqrt(E / density)";
+         ", for example by a force above E A / 2 or an impact faster than sound in the "
+         "rod, sqrt(E / density)";
 }
 
 /// Says so where an edge turns or twists too much against the next; nothing elsewhere.
@@ -104,7 +105,7 @@ std::string World::Implementation::unresolved() const {
     if (model.planar()) continue;
     see_twist(state.bend_tau(row), c.bend_strain.row(row), parameters.bend_natural(row, 2), s.node[1]);
     if (winds(b) && b > 0 && winds(b - 1) && model.bend_owner[b].first == model.bend_owner[b - 1].first)
-      see(parameters.bend_natural(row, 2), s.node[1], "is twisted by nature");
+      see(parameters.bend_natural(row, 2), s.node[1], "is naturally twisted");
   }
   for (std::size_t h = 0; h < (model.planar() ? 0 : model.half.size()); ++h) {
     const FrameStencil& s = model.half[h];
@@ -115,7 +116,8 @@ std::string World::Implementation::unresolved() const {
   if (node < 0) return "";
   return std::string("an edge ") + how + " by " + text(greatest * 180.0 / std::numbers::pi, 3) +
          " degrees against the next," + place_of_node(node).words + " (time " + text(state.time, 6) +
-         " s): a mesh this coarse does not resolve the motion, and bends and twists wrongly; use more nodes";
+         " s): the mesh is too coarse for the motion, so that bending and twisting are "
+         "not accurate. Use more nodes";
 }
 
 /// Warns once.
@@ -148,23 +150,21 @@ std::string World::Implementation::what_to_try() const {
   Eigen::Index soft = 0, stiff = 0;
   const double least = stretch.minCoeff(&soft), greatest = stretch.maxCoeff(&stiff);
   if (greatest > kMismatch * least)
-    return "Try stiffnesses that differ less: those against stretching of rods '" +
+    return "Try more similar stiffnesses: the stretching stiffnesses of rods '" +
            description.rods[at(model.edge_rod[at(static_cast<int>(soft))])].name + "' and '" +
            description.rods[at(model.edge_rod[at(static_cast<int>(stiff))])].name + "' differ by " +
            text(greatest / least, 2) + " times";
   if (options.integrator == Integrator::statics)
-    return "Try smaller parts of the load or motion a step, or integrator='backward_euler' with viscosity, which comes "
-           "to rest beyond a jump";
+    return "Try a smaller change of load or motion per step, or "
+           "integrator='backward_euler' with viscosity, which comes to rest after a jump";
   if (equations->contact() && equations->contact()->frictional())
     return "Try a smaller time_step, or a greater slip_tolerance of enable_contact";
   if (options.integrator == Integrator::implicit_midpoint)
-    return "Try integrator='energy_momentum', which conserves energy at any time_step, or 'backward_euler', which "
-           "damps "
-           "what is too fast for the step";
+    return "Try integrator='energy_momentum', which conserves energy at any time_step, or "
+           "'backward_euler', which damps motion that is too fast for the step";
   if (!parameters.viscous && options.integrator != Integrator::backward_euler)
-    return "Try a smaller time_step, viscosity of the material, or integrator='backward_euler', which damps what is "
-           "too "
-           "fast for the step";
+    return "Try a smaller time_step, viscosity of the material, or "
+           "integrator='backward_euler', which damps motion that is too fast for the step";
   return "Try a smaller time_step, or more max_halvings";
 }
 
@@ -173,7 +173,7 @@ void World::Implementation::fail(const NewtonResult& r, double dt, const std::st
   const Place place = place_of(r.worst_row);
   throw ConvergenceFailure(what + " (time " + text(state.time, 6) + " s" +
                                (dt > 0.0 ? ", step " + text(dt) + " s" : "") + ", residual " + text(r.residual) + " N" +
-                               place.words + ")" + crushed() + "; the world is left in its last accepted state. " +
+                               place.words + ")" + crushed() + "; the simulation keeps its last accepted state. " +
                                (hint.empty() ? what_to_try() : hint),
                            state.time, dt, place.rod, place.node, r.residual);
 }

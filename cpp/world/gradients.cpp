@@ -18,19 +18,24 @@ constexpr double kBalanced = 1e-6;
 /// A rod that was drawn straight, but for rounding, hardly prefers a side: times what is rounded in its stiffness.
 constexpr double kAsDrawn = 1e4;
 constexpr const char* kAtLimit =
-    "no gradient is known of an equilibrium in which a hand holds with all its force, for it goes with the way there: "
-    "give a greater force_limit, or run with differentiable=True";
+    "no gradient is available for an equilibrium in which a hand is at its "
+    "force_limit, because the equilibrium depends on the path: give a greater "
+    "force_limit, or run with differentiable=True";
 constexpr const char* kFriction =
-    "anchored or semi-explicit friction takes part in it; take friction_model='implicit' or 'lagged', or friction=0";
+    "anchored or semi-explicit friction acts; use friction_model='implicit' or "
+    "'lagged', or friction=0";
 constexpr const char* kHeldByFriction =
-    "no gradient is known of an equilibrium that friction holds, for it goes with the way there: take friction=0, or "
-    "run with differentiable=True";
+    "no gradient is available for an equilibrium with friction, because the "
+    "equilibrium depends on the path: use friction=0, or run with "
+    "differentiable=True";
 constexpr const char* kStiffness =
-    "its contacts took a stiffness of their own; give enable_contact(stiffness=), great enough";
+    "the contact stiffness was chosen automatically; use "
+    "enable_contact(stiffness=) with a value that is high enough";
 constexpr const char* kFrictionChanged =
-    "friction came or went while it ran, or what two bodies have of their own; begin another run there";
-constexpr const char* kRing = "a rod slides through a ring in it; take a hand without slides=True";
-constexpr const char* kRestitution = "impacts lose energy by their restitution; take restitution=1";
+    "friction, or a coefficient of a pair of bodies, was added or removed during "
+    "the run; begin a new run at the change";
+constexpr const char* kRing = "a rod slides through a ring; use a hand without slides=True";
+constexpr const char* kRestitution = "impacts lose energy by their restitution; use restitution=1";
 
 bool known_friction(FrictionLaw law) { return law == FrictionLaw::implicit || law == FrictionLaw::lagged; }
 
@@ -58,7 +63,7 @@ StepGradient& World::Implementation::begin_gradient(AtEquilibrium& at) const {
     statics.integrator = Integrator::statics;
     static_gradient = std::make_unique<StepGradient>(model, equation_options(statics));
   }
-  require(!has_rings(), std::string("no gradient is known of this equilibrium: ") + kRing);
+  require(!has_rings(), std::string("no gradient of this equilibrium is available: ") + kRing);
   StepGradient& gradient = *static_gradient;
   at.frames = state;
   at.prescribed.supports = support_poses();
@@ -75,7 +80,7 @@ StepGradient& World::Implementation::begin_gradient(AtEquilibrium& at) const {
   if (contact && contact->count() > 0) {
     require(!contact->frictional(), kHeldByFriction);
     require(contact->has_given_stiffness(state),
-            std::string("no gradient is known of this equilibrium: ") + kStiffness);
+            std::string("no gradient of this equilibrium is available: ") + kStiffness);
   }
   return gradient;
 }
@@ -88,19 +93,20 @@ EquilibriumGradients World::equilibrium_gradients(const std::vector<ReadoutAdjoi
   // Nothing leads out of the plane of a scene that is to stay in it.
   if (!self.options.planar.value_or(false) && std::any_of(by.begin(), by.end(), leaves)) {
     World spatial(*this);
-    spatial.implementation_->leave_plane("what the gradient is of");
+    spatial.implementation_->leave_plane("read-outs of the gradient");
     try {
       return spatial.equilibrium_gradients(by);
     } catch (const std::invalid_argument& error) {
-      throw std::invalid_argument(std::string("what the gradient is of leaves the plane of the scene, and taken out of "
-                                              "it: ") +
-                                  error.what() + "; build it with planar=False");
+      throw std::invalid_argument(
+          std::string("read-outs of the gradient leave the plane of the scene, and in space: ") + error.what() +
+          "; build the scene with planar=False");
     }
   }
   Implementation::AtEquilibrium at;
   StepGradient& gradient = self.begin_gradient(at);
   require(gradient.imbalance() < kBalanced,
-          "the simulation is in no equilibrium, so that there is no gradient of one: call equilibrium() again");
+          "the simulation is not in equilibrium: call equilibrium() again before its "
+          "gradient");
   EquilibriumGradients out;
   for (const ReadoutAdjoint& scalar : by) {
     StateAdjoint adjoint{VectorX::Zero(model.dof_count), VectorX::Zero(model.dof_count)};
@@ -130,7 +136,7 @@ VectorX World::equilibrium_residual() const {
   StepGradient& gradient = self.begin_gradient(at);
   const Contact* contact = gradient.equations().contact();
   require(!self.description.has_custom_force && (!contact || contact->count() == 0),
-          "forward derivatives are not known with custom forces, nor where rods touch");
+          "forward derivatives are not available with custom forces or contact");
   return gradient.residual();
 }
 
@@ -138,7 +144,7 @@ MatrixX World::support_directions(int support) const {
   const Implementation& self = *implementation_;
   const Model& model = self.model;
   require(support >= 0 && at(support) < model.supports.size() && !model.supports[at(support)].yields(),
-          "forward derivatives are not known by the place of a hand that yields");
+          "forward derivatives are not available with respect to the pose of a hand that yields");
   const std::vector<SupportPose> hands = self.support_poses();
   MatrixX out = MatrixX::Zero(model.dof_count, 6);
   VectorX held = VectorX::Zero(model.dof_count);
@@ -205,7 +211,7 @@ std::shared_ptr<Tape> World::start_tape() {
   if (self.options.integrator == Integrator::verlet || self.options.integrator == Integrator::statics)
     self.tape->refuse("integrator '" +
                       std::string(self.options.integrator == Integrator::verlet ? "verlet" : "static") +
-                      "' has none; take any other");
+                      "' has no gradients; use another integrator");
   if (self.has_rings()) self.tape->refuse(kRing);
   if (contact) {
     if (contact->frictional() && !known_friction(self.description.contact.friction_law))
@@ -247,8 +253,9 @@ void World::displace_state(const VectorX& by) {
 
 /// Before a step.
 void World::Implementation::check_tape() {
-  if (!tape->continues(state)) tape->refuse("the state was changed while it ran; begin another run there");
-  if (!tape->has_loads(parameters)) tape->refuse("loads came or went while it ran; begin another run there");
+  if (!tape->continues(state)) tape->refuse("the state was changed during the run; begin a new run at the change");
+  if (!tape->has_loads(parameters))
+    tape->refuse("loads were added or removed during the run; begin a new run at the change");
 }
 
 void World::Implementation::record_step(StepRule rule, double dt, bool begins) {

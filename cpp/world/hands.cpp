@@ -184,7 +184,7 @@ void World::set_ring_friction(int support, double friction) {
           "no such ring, or it is released: " + std::to_string(support));
   Implementation& self = accounted();
   HandDescription& hand = self.model.supports[at(support)].description.hand;
-  require(!hand.feeds, "a ring with a drive has no friction, but a force_limit");
+  require(!hand.feeds, "a ring with a drive has no friction: use force_limit instead");
   require(std::isfinite(friction) && friction >= 0.0, "friction of a ring must be finite and not negative");
   const double before = self.hand_energy_of(support);
   const bool held = hand.friction > 0.0, holds = friction > 0.0;

@@ -197,7 +197,8 @@ CustomForces World::Implementation::custom_forces(double time, const VectorX& q,
     const Vector3& n = model.plane->normal;
     const double off = description.custom_moments ? (now.moments - now.moments * n * n.transpose()).norm() : 0.0;
     require((now.forces * n).norm() <= 1e-8 * now.forces.norm() && off <= 1e-8 * now.moments.norm(),
-            "a custom force leaves the plane of the scene: build it with planar=False");
+            "a custom force leaves the plane of the scene: build the scene with "
+            "planar=False");
   }
   const Eigen::Index columns = 3 * model.node_count, rows = (description.custom_moments ? 2 : 1) * columns;
   for (const SparseMatrix* m : {&now.by_position, &now.by_velocity})

@@ -139,8 +139,10 @@ VectorX World::Implementation::placed(const std::vector<RodState>& rods) {
         if (c.first != model.node_dof[at(node)]) continue;
         const Vector3 moved = c.held_change(arrived ? there.q : state.q, q);
         require(moved.norm() <= kHeld * model.length_scale,
-                "positions move what a support holds, by " + text(moved.norm()) + " m" + place_of_node(node).words +
-                    (moves ? ": the support is still on its way (over=), so move it there without over=, or release it"
+                "positions must not move a node that a support holds, but do by " + text(moved.norm()) + " m" +
+                    place_of_node(node).words +
+                    (moves ? ": the support is on a ramp (over=), so move the support without over=, or "
+                             "release it"
                            : ": move the support there first, or release it"));
         q.segment(c.first, c.size) -= moved.head(c.size);
       }
@@ -150,7 +152,7 @@ VectorX World::Implementation::placed(const std::vector<RodState>& rods) {
     const double length =
         (q.segment(model.head_dof[at(e)], model.dimension) - q.segment(model.tail_dof[at(e)], model.dimension)).norm();
     require(length > 1e-6 * model.edge_length(e),
-            "positions leave an edge without length" + place_of_node(model.edge_tail[at(e)]).words);
+            "positions must not give an edge zero length" + place_of_node(model.edge_tail[at(e)]).words);
   }
   return q;
 }
@@ -172,9 +174,10 @@ void World::Implementation::place_directors(const RodState& rod, const VectorX& 
           support.active && std::find(support.edges.begin(), support.edges.end(), edge) != support.edges.end();
       const bool turns = state.time <= motions[s].turn.end && motions[s].rotation != motions[s].to_rotation;
       require(!holds || (d1 - now).norm() < kAligned,
-              "directors turn an edge that a support holds" + place_of_node(support.node).words +
-                  (turns ? ": the support turns in the steps to come, so step() first, or release it"
-                         : ": turn the support there first, and step(), or release it"));
+              "directors must not turn an edge that a support holds" + place_of_node(support.node).words +
+                  (turns ? ": the support is on a ramp (over=), so call step() first, or release the "
+                           "support"
+                         : ": turn the support first, and call step(), or release the support"));
     }
     state.tangent[at(edge)] = to_vec3(t);
     state.director[at(edge)] = to_vec3(d1);
@@ -204,7 +207,8 @@ void World::Implementation::place_rods(const std::vector<RodState>& rods) {
   if (!model.planar()) {
     for (int e = 0; e < model.edge_count; ++e)
       require(is_told[at(e)] || dot(before.edge[at(e)].tangent, c.edge[at(e)].tangent) > -1.0 + 1e-6,
-              "positions turn an edge of another rod right round" + place_of_node(model.edge_tail[at(e)]).words);
+              "positions must not turn an edge of another rod by half a turn" +
+                  place_of_node(model.edge_tail[at(e)]).words);
     const VectorX bend_tau = state.bend_tau, half_tau = state.half_tau;
     accept_configuration(model, q, c, state);
     // Frames of edges that are told are theirs; which turn a twist is in follows from what is told too.
@@ -220,7 +224,7 @@ void World::Implementation::place_rods(const std::vector<RodState>& rods) {
   }
   relax_joints(is_told);
   compute_configuration(model, state, state.q, c);
-  require(c.bend_strain.allFinite() && c.half_strain.allFinite(), "positions fold an edge right back onto the next");
+  require(c.bend_strain.allFinite() && c.half_strain.allFinite(), "positions must not fold an edge back onto the next");
   accept_configuration(model, VectorX(state.q), c, state);
   pass_rings_anew(model, state);
   meet_anew(moved_rods(start, state.q));

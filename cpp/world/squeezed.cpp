@@ -35,11 +35,11 @@ void World::Implementation::check_squeeze() {
   const double modulus = parameters.edge_stretch(edge) / (std::numbers::pi * radius * radius);
   squeeze_warning = "Rod '" + description.rods[at(model.edge_rod[at(edge)])].name + "' is squeezed between " +
                     other(a) + " and " + other(b) + " (time " + text(state.time, 6) +
-                    " s): neither of them yields, so that their force follows from the stiffness of contact, and none "
-                    "is given. Take stiffness= in scene.enable_contact: half of Young's modulus times the length of an "
-                    "edge is " +
+                    " s). Both are rigid, so the force depends on the contact stiffness, which was "
+                    "not given. Use stiffness= of scene.enable_contact: half of Young's modulus "
+                    "times the edge length is " +
                     text(0.5 * modulus * model.edge_arc(edge), 2) +
-                    " N/m here. Or press with what yields, such as a hand with stiffness=.";
+                    " N/m here. Or press with a part that yields, such as a hand with stiffness=.";
 }
 
 void World::Implementation::fail_squeezed(const Equations& system, const Squeezed& squeezed, double dt) const {
@@ -58,17 +58,19 @@ void World::Implementation::fail_squeezed(const Equations& system, const Squeeze
   if (squeezed.against < 0) {
     what += " is pressed " + text(depth) + " m into " + other(t.pair.key) + ", " + share(depth) +
             " % of its contact radius," + when +
-            ", by what does not yield: neither does what holds it, nor that, and no force between them is right; the "
-            "world is left in its last accepted state. Move the support less far, hold the rod by what yields, such as "
-            "a spring, or where it does not touch, or take a smaller contact_radius";
+            ": support and obstacle are both rigid, so the force between them is not "
+            "defined; the simulation keeps its last accepted state. Move the support less "
+            "far, hold the rod by a spring or away from the contact, or use a smaller "
+            "contact_radius";
   } else {
     const Touching& a = set[squeezed.against];
     const double both = depth + a.pair.radii() - a.proximity.distance;
-    what += " is squeezed between " + other(t.pair.key) + " and " + other(a.pair.key) + ", which leave it " +
-            text(both) + " m less than it is thick, " + share(both) + " % of its contact radius," + when +
-            ": neither of them yields, and no force between them is right; the world is left in its last accepted "
-            "state. Move them less near to each other, press with what yields, such as a hand with stiffness= or a rod "
-            "on springs, or take a smaller contact_radius";
+    what += " is squeezed between " + other(t.pair.key) + " and " + other(a.pair.key) + ", which leave a gap " +
+            text(both) + " m smaller than the rod is thick, " + share(both) + " % of its contact radius," + when +
+            ": both are rigid, so the force between them is not defined; the simulation "
+            "keeps its last accepted state. Move them less near to each other, press with "
+            "a part that yields, such as a hand with stiffness= or a rod on springs, or "
+            "use a smaller contact_radius";
   }
   throw ConvergenceFailure(what, state.time, dt, place.rod, place.node, 0.0);
 }

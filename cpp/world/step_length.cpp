@@ -112,12 +112,14 @@ std::string World::Implementation::unresolved_in_time(double dt, int component) 
   const double frequency = std::sqrt(square) / dt;
   const double speed = std::sqrt((euler ? change + motion : 0.25 * motion) / (kLooked * mass));
   if (speed / frequency < kSeen * length) return "";
-  const std::string decay =
-      euler ? "backward Euler damps it to half within " + text(dt * 2.0 * std::numbers::ln2 / std::log1p(square)) + " s"
-            : std::string("frequencies and phases of that mean nothing");
-  return "steps of " + text(dt) + " s are too long for what moves, by about " + text(speed / frequency, 2) + " m at " +
-         text(frequency / (2.0 * std::numbers::pi), 3) + " Hz (time " + text(state.time, 6) + " s): " + decay +
-         "; a time_step of " + text(kEnough / frequency, 2) + " s would do";
+  const std::string motion_words = "motion of about " + text(speed / frequency, 2) + " m at " +
+                                   text(frequency / (2.0 * std::numbers::pi), 3) + " Hz (time " + text(state.time, 6) +
+                                   " s)";
+  return "time_step of " + text(dt) + " s is too long: " +
+         (euler ? "backward Euler damps a " + motion_words + " to half within " +
+                      text(dt * 2.0 * std::numbers::ln2 / std::log1p(square)) + " s"
+                : "frequency and phase of a " + motion_words + " are not accurate") +
+         ". Use time_step <= " + text(kEnough / frequency, 2) + " s";
 }
 
 /// Says so where an impact takes up much of a component's motion, and a step of dt is longer than bending takes to go
@@ -154,12 +156,10 @@ std::string World::Implementation::unresolved_impact(double dt, const Equations&
   if (!much(kinetic)) return "";
   find_component_energies(state, energy_scratch.components);
   if (!much(kinetic + energy_scratch.components.elastic)) return "";
-  return "an impact is over within a step of " + text(dt) + " s," + place_of_node(model.edge_tail[at(edge)]).words +
-         " (time " + text(state.time, 6) +
-         " s): nodes that strike one after the other are sent off together, as if the rod were rigid, and how high it "
-         "bounces means nothing; a time_step of " +
-         text(kMargin * longest, 2) +
-         " s would do, restitution= says what impacts lose, and integrator='backward_euler' damps them";
+  return "impact" + place_of_node(model.edge_tail[at(edge)]).words + " (time " + text(state.time, 6) +
+         " s): the time_step of " + text(dt) +
+         " s is longer than the impact, so the rebound height is not reliable. Use time_step <= " +
+         text(kMargin * longest, 2) + " s, set restitution=, or use integrator='backward_euler' to damp impacts";
 }
 
 /// In which bending spreads over the length of an edge, h^2 sqrt(m / B) [s].
@@ -191,12 +191,13 @@ void World::Implementation::add_step_notes() {
   const int resolved =
       angle > 1.0 ? 0 : std::max(1, static_cast<int>(std::lround(std::sqrt(1.0 / (slowest * dt)) / std::numbers::pi)));
   const double per_period = 1.0 - std::pow(1.0 + angle * angle, -std::numbers::pi / std::atan(angle));
-  plan.notes.push_back("steps of " + text(dt) + " s resolve less than " + text(0.5 / (std::numbers::pi * dt)) +
+  plan.notes.push_back("time_step of " + text(dt) + " s resolves less than " + text(0.5 / (std::numbers::pi * dt)) +
                        " Hz: of rod '" + description.rods[which].name + "' alone, clamped and unstressed, " +
                        std::to_string(resolved) + " mode(s) of bending, from " +
                        text(first / (2.0 * std::numbers::pi)) + " Hz on");
   if (euler)
-    plan.notes.push_back("backward Euler damps the first of these by " + text(100.0 * per_period, 2) + " % a period");
+    plan.notes.push_back("backward Euler damps the first of these modes by " + text(100.0 * per_period, 2) +
+                         " % a period");
 }
 
 }  // namespace withe

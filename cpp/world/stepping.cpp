@@ -87,14 +87,14 @@ void World::Implementation::fail_error_control(long tries, double duration, doub
   fail(NewtonResult{}, duration * share_of_part,
        "error control has taken " + std::to_string(tries) + " inner steps for " + text(100.0 * share_taken, 3) +
            " % of one time_step of " + text(duration) + " s",
-       "Undamped motion of high frequency needs steps as short as its period: use a larger tolerance, viscosity of the "
+       "Undamped motion of high frequency needs steps as short as its period. Use a larger tolerance, viscosity of the "
        "material, integrator='backward_euler', or a greater max_steps");
 }
 
 void World::Implementation::fail_step(Verdict why, double dt) const {
   fail(last_newton, dt,
        options.integrator == Integrator::verlet ? "the explicit step broke down"
-       : why == Verdict::gained_energy          ? "the step gains energy from nowhere"
+       : why == Verdict::gained_energy          ? "the step gains energy that no load supplies"
        : why == Verdict::inaccurate             ? "the smallest step misses the tolerance"
                                                 : "the step did not converge",
        why == Verdict::inaccurate      ? "Try a larger tolerance, or more max_halvings"
@@ -295,7 +295,8 @@ void World::Implementation::check_impacts(const ContactDescription& contact) con
   require(options.integrator != Integrator::verlet ||
               ((!contact.rods || contact.restitution == 1.0) && (contact.obstacle_restitution.array() == 1.0).all() &&
                std::all_of(contact.pairs.begin(), contact.pairs.end(), elastic)),
-          "integrator 'verlet' knows elastic impacts only: take restitution=1, or an implicit integrator");
+          "integrator 'verlet' supports elastic impacts only: use restitution=1, or an "
+          "implicit integrator");
 }
 
 /// A scheme that steps back in time asks for forces that can be run backwards.
@@ -304,32 +305,30 @@ void World::Implementation::check_reversible(const Parameters& p) const {
   require(
       options.integrator != Integrator::verlet || std::none_of(model.supports.begin(), model.supports.end(),
                                                                [](const Support& s) { return s.active && s.yields(); }),
-      "integrator 'verlet' knows rigid hands only: take an implicit integrator for one that yields");
+      "integrator 'verlet' supports rigid hands only: use an implicit integrator for "
+      "a hand that yields");
   if (options.integrator != Integrator::fourth_order) return;
   require(!description.contact.any(),
-          "integrator 'fourth_order' goes back in time within each step, which contact does not allow: take integrator "
-          "'implicit_midpoint' or 'energy_momentum'");
-  const std::string instead = ": take integrator 'implicit_midpoint' or 'energy_momentum'";
-  require(!p.viscous,
-          "integrator 'fourth_order' goes back in time within each step, which viscosity does not allow" + instead);
-  require(description.fluid.model == FluidModel::none,
-          "integrator 'fourth_order' goes back in time within each step, which a fluid does not allow" + instead);
+          "integrator 'fourth_order' does not support contact, because its inner steps "
+          "go back in time: use integrator 'implicit_midpoint' or 'energy_momentum'");
+  const std::string instead =
+      ", because its inner steps go back in time: use integrator 'implicit_midpoint' "
+      "or 'energy_momentum'";
+  require(!p.viscous, "integrator 'fourth_order' does not support viscosity" + instead);
+  require(description.fluid.model == FluidModel::none, "integrator 'fourth_order' does not support a fluid" + instead);
   for (const Support& s : model.supports)
-    require(
-        !s.active || !s.yields() ||
-            (!std::isfinite(s.description.hand.force_limit) && s.description.hand.friction == 0.0),
-        "integrator 'fourth_order' goes back in time within each step, which hands that slip do not allow" + instead);
+    require(!s.active || !s.yields() ||
+                (!std::isfinite(s.description.hand.force_limit) && s.description.hand.friction == 0.0),
+            "integrator 'fourth_order' does not support hands that slip" + instead);
   require((p.spring_damping.array() == 0.0).all(),
-          "integrator 'fourth_order' goes back in time within each step, which damping of springs does not allow" +
-              instead);
-  require(
-      (p.joint_damping.array() == 0.0).all(),
-      "integrator 'fourth_order' goes back in time within each step, which damping of joints does not allow" + instead);
+          "integrator 'fourth_order' does not support damping of springs" + instead);
+  require((p.joint_damping.array() == 0.0).all(),
+          "integrator 'fourth_order' does not support damping of joints" + instead);
   if (!p.dragged) return;
   for (int i = 0; i < model.node_count; ++i)
     require(p.node_drag(i) * options.time_step <= p.node_mass(i),
-            "integrator 'fourth_order' goes back in time within each step, which drag allows for time_step up to mass "
-            "over drag only, " +
+            "integrator 'fourth_order' supports drag for a time_step up to mass over drag "
+            "only, " +
                 std::to_string(p.node_mass(i) / p.node_drag(i)) + " s at node " + std::to_string(i) + instead);
 }
 

@@ -100,7 +100,7 @@ void World::move_support(int support, const std::optional<Vector3>& position, co
   require(std::isfinite(over) && over >= 0.0, "over must be finite and not negative");
   const bool rolls = roll != Vector3::Zero();
   require(roll.allFinite() && (!rolls || (rotation && over == 0.0 && self.options.integrator == Integrator::statics)),
-          "full turns of a support need a rotation, at once, and integrator='static'");
+          "full turns of a support need integrator='static' and a rotation without over=");
   prescribe_support(support, position, rotation);
   SupportMotion& m = self.motions[at(support)];
   const Span way{self.state.time, self.state.time + over};
@@ -128,7 +128,7 @@ void World::Implementation::check_pose(int support, const std::optional<Vector3>
   const SupportMotion& now = motions[at(support)];
   if (rotation && held.description.kind == SupportKind::spinning_clamp)
     require((*rotation * held.tangent - now.rotation * held.tangent).norm() < 1e-9,
-            "a clamp that may spin keeps its tangent: take hold='edge' to turn it");
+            "a clamp that may spin keeps its tangent: use hold='edge' to turn the tangent");
   if (!model.planar()) return;
   const Plane& plane = *model.plane;
   const Vector3& from = held.is_hand() ? now.position : plane.origin;  // which may be beside it

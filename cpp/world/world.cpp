@@ -172,7 +172,7 @@ int World::add_load(const LoadDescription& load) {
 void World::remove_load(int load) {
   Implementation& self = *implementation_;
   const auto [first, rows] = self.load_rows(load);
-  require(self.description.loads[at(load)].added, "a load of the drawing stays: set it to zero");
+  require(self.description.loads[at(load)].added, "a load of the scene cannot be removed: set the load to zero");
   MatrixX3& loads = self.parameters.loads;
   const MatrixX3 after = loads.bottomRows(loads.rows() - first - rows);
   loads.conservativeResize(loads.rows() - rows, 3);
@@ -244,7 +244,7 @@ void World::set_contact(const ContactDescription& contact) {
     const Eigen::Index known = std::min(of_pairs.size(), before_of_pairs.size());
     before_of_pairs.head(known) = of_pairs.head(known);
     if (self.tape && (now.contact_stiffness != stiffness || now.pair_contact_stiffness != before_of_pairs))
-      self.tape->refuse("the stiffness of contact was set while it ran; begin another run there");
+      self.tape->refuse("the contact stiffness was set during the run; begin a new run at the change");
   }
   // What surfaces and anchors hold changes with the numbers that they are made of.
   self.actuation_work += energy() - before;

@@ -306,7 +306,7 @@ def test_what_a_path_cannot_be_asked_for_is_refused():
         simulation.equilibrium(path="riks")
     with pytest.raises(ValueError, match="start must be 0"):
         simulation.equilibrium(path="arc_length", start=0.5)
-    with pytest.raises(ValueError, match="another load factor"):
+    with pytest.raises(ValueError, match="to must differ from start"):
         simulation.equilibrium(path="arc_length", to=0.0)
     scene, node = lee(10)
     load = scene.add_force(node, lambda t: (0, 0, -t))

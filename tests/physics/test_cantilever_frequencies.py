@@ -92,7 +92,7 @@ def supported(edges, ends):
 @pytest.mark.parametrize(("ends", "lumped"), [("free", 4.11), ("pinned", 0.822)])
 def test_frequencies_of_free_and_pinned_beams_converge_faster_than_with_lumped_masses(ends, lumped):
     """Mass that edges carry along them, to a pin too, leaves the edge length to the fourth power; lumped masses -4.11
-    and -.822 times its square over that of the beam."""
+    and -0.822 times its square over that of the beam."""
     edges = np.array((8, 16, 32))
     errors = np.array([supported(n, ends) for n in edges])
     assert_order(errors, order=4.0, slack=0.3)

@@ -192,7 +192,7 @@ def test_spaghetti_flies_as_a_beam_of_smooth_elements(spaghetti):
 
 
 def test_a_flexible_pendulum_falls_as_a_beam_of_smooth_elements():
-    """Let go level from a pin; EI = .02, w L^3 / EI = 490."""
+    """Let go level from a pin; EI = 0.02, w L^3 / EI = 490."""
     times = np.array((0.2, 0.4))
     exact = fly(1.0, 16, 1e3, 0.02, direction=(1.0, 0.0), gravity=(0.0, -GRAVITY), pinned=True, times=times)[:, 1]
 
@@ -219,7 +219,7 @@ def test_a_flexible_pendulum_falls_as_a_beam_of_smooth_elements():
 def test_a_rod_on_a_turning_hub_stretches_and_stores_as_in_theory_and_goes_on_so(integrator):
     """EA u'' + m w^2 (x + u) = 0, u(0) = u'(1) = 0: x + u = sin(k x) / (k cos k), k^2 = m w^2 / EA.
 
-    So T = (m w^2 / 2) (1/2 - sin(2 k) / 4 k) / (k cos k)^2. Silicone at twice a turn a second, .294 for k; its slowest
+    So T = (m w^2 / 2) (1/2 - sin(2 k) / 4 k) / (k cos k)^2. Silicone at twice a turn a second, 0.294 for k; its slowest
     mode of bending would swing a sixteenth as fast were it not for the tension.
     """
     rate, stretch = 12.0, 2e6 * np.pi * 1e-4

@@ -148,7 +148,7 @@ def test_a_rope_wound_about_a_post_multiplies_its_tension(turns, bound):
     )
     scene.add_capsule((0, -1, 0), (0, 1, 0), POST, friction=friction)
     # Hard surfaces: those that begin a tenth of the radius before they touch, and press a hundredth of it deep, lead
-    # to an error of .0012 at one turn, however many nodes there are; with corners its error is of the other sign.
+    # to an error of 0.0012 at one turn, however many nodes there are; with corners its error is of the other sign.
     scene.enable_contact(
         slip_tolerance=1e-4,
         centreline_friction=True,

@@ -439,7 +439,7 @@ def test_explicit_steps_let_a_rod_slide_as_a_block_does(friction_model: Any) -> 
 @pytest.mark.parametrize("angle", [90.0, 60.0])
 @pytest.mark.parametrize("time_step", [2e-3, 5e-4])
 def test_rods_that_slide_over_rods_without_friction_are_not_braked(integrator: Any, angle: float, time_step: float):
-    """By the weight times v dt / 2 D they were, .075 of it in the longer steps: forces leaned against the motion."""
+    """By the weight times v dt / 2 D they were, 0.075 of it in the longer steps: forces leaned against the motion."""
     radius, speed, duration, nodes = 2e-3, 0.3, 0.05, 12
     stiff = withe.Material(youngs_modulus=1e8, poisson_ratio=0.5, density=1100.0, viscosity=1e4)
     scene = withe.Scene()

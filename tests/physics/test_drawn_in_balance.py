@@ -11,7 +11,7 @@ STIFF = withe.Material(youngs_modulus=1e9, poisson_ratio=0.4, density=1200.0)
 
 
 def drawn(seed: int, nodes: int, both_ends: bool = False, plane: bool = False) -> tuple[withe.Simulation, np.ndarray]:
-    """A drawn curve .3 m long, clamped, with a load on its last node if that is free."""
+    """A drawn curve 0.3 m long, clamped, with a load on its last node if that is free."""
     random = np.random.default_rng([61, seed])
     s = np.linspace(0.0, 1.0, nodes)
     waves = random.uniform(-0.03, 0.03, (3, 3)) * ((1, 0, 1) if plane else (1, 1, 1))

@@ -44,7 +44,7 @@ def heights(simulation, rods):
 @pytest.mark.parametrize("gap", GAPS)
 @pytest.mark.parametrize("turn", [0.0, 0.3, 1.5])
 def test_a_pile_that_is_drawn_touching_is_not_pressed_apart(modulus, gap, turn):
-    """It was by 27 N, for a weight of .28."""
+    """It was by 27 N, for a weight of 0.28."""
     scene, rods = pile(modulus, gap, turn)
     simulation = scene.build(integrator="backward_euler", time_step=1e-3)
     assert simulation.contacts()["normal_force"].sum() <= 3.0 * WEIGHT

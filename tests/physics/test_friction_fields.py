@@ -131,8 +131,8 @@ def test_a_field_moves_with_its_floor_and_lives_in_copies_and_snapshots():
     [
         (lambda points: -points[:, 0] - 1.0, "friction of 'floor' must be finite and not negative, got -1"),
         (lambda points: np.full(len(points), np.nan), "friction of 'floor' must be finite and not negative, got nan"),
-        (lambda points: np.zeros(3), r"friction of 'floor' must give one number a point"),
-        (lambda points: "much", r"friction of 'floor' must give numbers, got 'much'"),
+        (lambda points: np.zeros(3), r"friction of 'floor' must return one number per point"),
+        (lambda points: "much", r"friction of 'floor' must return numbers, got 'much'"),
     ],
 )
 def test_a_field_that_is_negative_or_not_finite_is_refused(friction, message):

@@ -107,16 +107,16 @@ def test_soft_helix_held_by_its_first_edge_comes_to_rest_where_published_code_ha
 
 
 def test_soft_helix_converges_with_the_mesh_to_the_same_rest_from_an_edge_and_from_a_wall():
-    """The published mesh is .5 mm off its limit, and the default clamp .3 mm away from holding the first edge on it.
+    """The published mesh is 0.5 mm off its limit, and the default clamp 0.3 mm away from holding the first edge on it.
 
     Tips [mm] with every edge cut in 1, 2, 4 and 8, and their limit; corners of the lead-in make that first order:
 
     held by its first edge            clamped, the default
-    (-16.27, -.59, -198.76)           (-16.53, -.67, -198.78)
-    (-16.49, -.54, -199.00)           (-16.65, -.63, -199.01)
-    (-16.59, -.53, -199.07)           (-16.67, -.57, -199.08)
-    (-16.65, -.52, -199.10)           (-16.68, -.54, -199.10)
-    (-16.70, -.51, -199.13)           (-16.70, -.51, -199.13)
+    (-16.27, -0.59, -198.76)           (-16.53, -0.67, -198.78)
+    (-16.49, -0.54, -199.00)           (-16.65, -0.63, -199.01)
+    (-16.59, -0.53, -199.07)           (-16.67, -0.57, -199.08)
+    (-16.65, -0.52, -199.10)           (-16.68, -0.54, -199.10)
+    (-16.70, -0.51, -199.13)           (-16.70, -0.51, -199.13)
     """
     limits = []
     for hold in ("edge", "frame"):

@@ -53,7 +53,7 @@ def test_elastic_impacts_of_rods_in_midpoint_steps_lose_no_more_than_bending_doe
 
 @pytest.mark.parametrize("integrator", CONSERVING)
 def test_a_rod_that_drops_from_within_the_tolerance_of_contact_rises_as_high_as_it_fell(integrator: Any) -> None:
-    """From .5 and 1 mm, with a tolerance of 2 mm: it once rested from the start, and rose to nothing."""
+    """From 0.5 and 1 mm, with a tolerance of 2 mm: it once rested from the start, and rose to nothing."""
     length, radius = 0.5, 0.02
     weight = 1200.0 * np.pi * radius**2 * length * 9.81
     for height in (5e-4, 1e-3):
@@ -128,7 +128,7 @@ def test_what_grazes_within_a_step_meets(kind, offset, integrator):
 def test_rods_that_meet_off_centre_part_along_the_line_of_their_centres(
     off: float, speed: float, integrator: Any
 ) -> None:
-    """Smooth and alike, in default steps of .3 to 10 radii: the one that is hit takes what lies along that line.
+    """Smooth and alike, in default steps of 0.3 to 10 radii: the one that is hit takes what lies along that line.
 
     It went up to 30 degrees beside it.
     """

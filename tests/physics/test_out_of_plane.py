@@ -119,11 +119,13 @@ def test_a_scene_that_can_be_built_in_its_plane_only_is_not_looked_at_in_space()
         scene.join(post.end, arm.start, "revolute", axis=(0, 1, 0))
     scene.clamp(arms[0].start)
     scene.pin(post.start)
-    with pytest.raises(ValueError, match=r"what hinges at its node turn against, not rod .*, which turns: clamp rod"):
+    with pytest.raises(
+        ValueError, match=r"must hold the rod that the hinge turns against, not rod .*, which turns: clamp rod"
+    ):
         scene.build(planar=False)
     simulation = rods.sharp(scene, planar=None)
     assert simulation.plan.planar
-    with pytest.warns(withe.OutOfPlaneWarning, match="was not looked at in space, where a clamp cannot hold"):
+    with pytest.warns(withe.OutOfPlaneWarning, match="tested in its plane only: in space, a clamp cannot hold"):
         assert simulation.equilibrium().stable
 
 

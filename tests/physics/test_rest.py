@@ -7,7 +7,7 @@ import withe
 
 
 def dropped(friction=0.4, model="imcv2", friction_model="anchored", restitution=1.0, **build):
-    """.5 m long, 5 mm thick, 5 cm up, yawed by 10 degrees against the axes; and the energy that it will fall by."""
+    """0.5 m long, 5 mm thick, 5 cm up, yawed by 10 degrees against the axes; and the energy that it will fall by."""
     rubber = withe.Material(youngs_modulus=1e6, poisson_ratio=0.5, density=1200.0)
     yaw, middle = np.radians(10.0), np.array([0.0, 0.0, 0.05])
     half = 0.25 * np.array([np.cos(yaw), np.sin(yaw), 0.0])

@@ -25,7 +25,7 @@ def catenary(span, length, weight):
 
 
 def cable(edges=200, **build):
-    """A cable of unit length and weight, pinned at both ends, in a ring at .4 of it."""
+    """A cable of unit length and weight, pinned at both ends, in a ring at 0.4 of it."""
     scene = withe.Scene(gravity=(0.0, 0.0, -1.0))
     rod = rods.straight(scene, edges, stiffness=rods.stiffness(bend=1e-4, twist=1e-4, stretch=1e4))
     scene.pin(rod.start)

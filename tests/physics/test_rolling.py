@@ -51,7 +51,7 @@ def out_of_round(edges: int) -> float:
 
 
 def unevenness(degrees: float) -> float:
-    """What a metre of height changes of the speed gained between .5 s and 1.5 s, over that: G = (1 + k) v dv."""
+    """What a metre of height changes of the speed gained between 0.5 s and 1.5 s, over that: G = (1 + k) v dv."""
     gain = 0.5 * G * np.sin(np.radians(degrees))
     return float(0.5 * G * (1.0 / (0.5 * gain) + 1.0 / (1.5 * gain)) / gain)
 
@@ -214,7 +214,7 @@ def test_a_snapshot_of_a_ring_that_rolls_is_restored_to_the_bit() -> None:
 
 
 def cylinder(degrees: float = 0.0, friction_model: Any = "anchored", **options: Any) -> tuple[Any, Any]:
-    """A straight rod of 1 cm radius and .2 m on a rough plane, across the fall of a slope along x."""
+    """A straight rod of 1 cm radius and 0.2 m on a rough plane, across the fall of a slope along x."""
     slope = np.radians(degrees)
     scene = withe.Scene(gravity=(G * np.sin(slope), 0, -G * np.cos(slope)))
     rubber = withe.Material(youngs_modulus=1e7, density=1000.0)

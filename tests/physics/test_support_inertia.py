@@ -214,7 +214,7 @@ def test_a_shaft_that_its_clamp_spins_fast_turns_as_fast(integrator, hold, nodes
     wall = scene.clamp(rod.start, hold=hold)
     simulation = scene.build(integrator=integrator, time_step=5e-3)
 
-    def turned(t):  # from rest to 300 rad/s within .2 s
+    def turned(t):  # from rest to 300 rad/s within 0.2 s
         angle = 300.0 * (t - 0.1 if t > 0.2 else 2.5 * t * t)
         c, s = np.cos(angle), np.sin(angle)
         return (0.0, 0.0, 0.0), ((1, 0, 0), (0, c, -s), (0, s, c))

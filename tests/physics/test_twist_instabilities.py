@@ -155,7 +155,7 @@ def test_critical_moment_of_a_clamped_rod_without_tension_is_8_987():
 
 
 def test_critical_moment_of_a_long_rod_under_tension_is_twice_the_root_of_tension_by_stiffness():
-    """M^2 = 4 B T for an endless rod; at T L^2 / B = 2500 clamped ends add .2 % to M, and more tension less."""
+    """M^2 = 4 B T for an endless rod; at T L^2 / B = 2500 clamped ends add 0.2 % to M, and more tension less."""
     assert theory.critical_twisting_moment(2500.0) ** 2 == pytest.approx(4.0 * 2500.0, rel=5e-3)
     for share, straight in ((0.99, True), (1.01, False)):
         simulation, rod, result = twisted(400, 2500.0, share * theory.critical_twisting_moment(2500.0), 0.0)

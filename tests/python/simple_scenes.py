@@ -10,7 +10,7 @@ RUBBER = withe.Material(youngs_modulus=1e6, density=1000.0)
 
 
 def cantilever(nodes: int = 11, **build):
-    """A clamped rod of .2 m, level at the start: scene, rod, simulation."""
+    """A clamped rod of 0.2 m, level at the start: scene, rod, simulation."""
     scene = withe.Scene()
     arm = scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=nodes, radius=5e-3, material=RUBBER, name="arm")
     scene.clamp(arm.start, name="wall")

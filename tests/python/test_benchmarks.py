@@ -129,7 +129,7 @@ def test_a_rod_that_is_pushed_sticks_or_slides_as_a_block_does(method, request):
     pushed = pusher(Point("friction", method, 2, 0.015))
     errors = {force: abs(pushed(force)[0] / block(force) - 1.0) for force in SLIDING}
     # A force a fourth of a thousandth above the limit gathers speed up to the slip tolerance, 1 mm/s, before all of
-    # friction acts; the block ends at about .5 m/s.
+    # friction acts; the block ends at about 0.5 m/s.
     slowest = min(errors)
     assert errors.pop(slowest) < 4e-3
     assert max(errors.values()) < 1e-6
