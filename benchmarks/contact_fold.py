@@ -2,7 +2,7 @@
 
     python benchmarks/contact_fold.py [--quick]
 
-The sheet is planar: 150 edges over .297 m, Lgb = (B / 2w)^(1/3) = 48 mm, .1 mm thick, with anchored friction on the
+The sheet is planar: 150 edges over 0.297 m, Lgb = (B / 2w)^(1/3) = 48 mm, 0.1 mm thick, with anchored friction on the
 floor and on its own layer. A jaw holds the last edge and leads it over along half a circle within 10 s. Processor time
 of one thread, best of three.
 """

@@ -60,7 +60,7 @@ def compare(report: Report, quick: bool) -> None:
 
 
 def _new(count: int) -> tuple[np.ndarray, ...]:
-    """Questions that no network was trained on, .5 Lgb and more."""
+    """Questions that no network was trained on, 0.5 Lgb and more."""
     random = np.random.default_rng(11)
     length = np.exp(random.uniform(np.log(0.5), np.log(LENGTHS[1]), count))
     return length, random.uniform(-CURVATURES[1], CURVATURES[1], count), random.uniform(*STIFFNESSES, count)

@@ -51,7 +51,7 @@ PUBLISHED = {
 }
 NOISY_WAYS = ("exact", "intuitive", "network")
 NOISY_SPEED = 0.025  # [m/s]
-IN_TIME = 0.02  # [s], steps of what is laid in time: errors are within .1 mm of those at .0025
+IN_TIME = 0.02  # [s], steps of what is laid in time: errors are within 0.1 mm of those at 0.0025
 SLIPPED = 1.0  # [mm]: what counts as a slip that should have been foreseen
 LARGE = 5.0  # [mm]: mean error above which a cell is explained
 NEAR = 2.0  # [Lgb] beside a stretch that friction does not hold, which moves with it

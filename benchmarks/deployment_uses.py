@@ -4,7 +4,7 @@ python benchmarks/deployment_uses.py [--quick] [--trials 1] [--uses S U trefoil 
 
 Each use without noise, through equilibria where it is placement, and in noisy trials, in time: those of `deploy`, in
 Lgb, friction, natural curvature and what the gripper is off by. For placement the planner has measured the cable: its
-loop with a ruler that is off by .5 mm, and, for the way "optimised", how it bends by itself, from pictures of it as it
+loop with a ruler that is off by 0.5 mm, and, for the way "optimised", how it bends by itself, from pictures of it as it
 hangs. For knots it has not. A placement succeeds if the cable passes every post on its right side; a knot if it is
 there when its ends were pulled 20 mm apart. While a cable is placed its free end is held. Knots are tied without
 looking: grippers reach where a rehearsal with exact grasps found the cable. The cases are those of

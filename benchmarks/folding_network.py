@@ -18,7 +18,7 @@ GOALS = {  # median, 95 %, most
     "suspended": (1e-3, 8e-3, 5e-2),
     "force_ratio": (5e-4, 2e-3, 2e-2),
 }
-# The dissertation's own weights against a table of exact equilibria .25 Lgb apart: median and 95 %.
+# The dissertation's own weights against a table of exact equilibria 0.25 Lgb apart: median and 95 %.
 PUBLISHED = {"angle": (0.0015, 0.0054), "suspended": (0.012, 0.025), "force_ratio": (0.0033, 0.029)}
 
 

@@ -2,7 +2,7 @@
 
 python benchmarks/folding_replay.py [--quick]
 
-The plan is without moment at the jaw ("ucs"), on a table with friction .12, on which it slides some millimetres. The
+The plan is without moment at the jaw ("ucs"), on a table with friction 0.12, on which it slides some millimetres. The
 third answer is that of the continuum: a row of equilibria, what lies sliding as a rigid body by Coulomb's law.
 """
 
@@ -54,7 +54,7 @@ def draw(curves: dict[str, np.ndarray]) -> None:
     figure, axes = plt.subplots(figsize=(6.4, 3.6), layout="constrained")
     for (name, rows), style in zip(curves.items(), ("-", "--", ":"), strict=False):
         axes.plot(rows[:, 0], 1e3 * rows[:, 1], style, label=name, linewidth=1.8)
-    axes.set(xlabel="time [s]", ylabel="slide [mm]", title="A4 folded in half by the same file of poses, friction .12")
+    axes.set(xlabel="time [s]", ylabel="slide [mm]", title="A4 folded in half by the same file of poses, friction 0.12")
     axes.grid(True, color="#e3e7ea")
     axes.legend(frameon=False)
     OUT.mkdir(parents=True, exist_ok=True)
@@ -89,7 +89,7 @@ def main() -> None:
             if not options.quick:
                 off = abs(found[-1, 1] - folded.slide)
                 report.goal(f"slide, off from PyElastica with {elements} elements [m]", off, TOLERANCE, at_least=False)
-    report.table("A4 in half, friction .12, open loop", ("", "slide [mm]", "processor s"), rows)
+    report.table("A4 in half, friction 0.12, open loop", ("", "slide [mm]", "processor s"), rows)
     if not options.quick:
         draw(curves)
     report.write()

@@ -31,7 +31,7 @@ WAYS = {
 }
 REPLANS = {"ucs closed": 5}
 CURVATURES = {"cardboard": 4.0}  # [1/Lgb]
-PUBLISHED = {  # friction .12, by paper and width [deg]
+PUBLISHED = {  # friction 0.12, by paper and width [deg]
     ("A4", 0.21): {"intuitive": "6.56 1.29", "local": "1.68 .97", "ucs": ".27 .44", "ucs closed": ".35 .38"},
     ("A4", 0.025): {"intuitive": ".36 1.65", "local": ".02 .65", "ucs": ".48 .47", "ucs closed": "-.23 .48"},
     ("cardboard", 0.21): {"intuitive": "1.25 1.43", "local": "none", "ucs": "1.38 1.06", "ucs closed": "1.45 1.48"},

@@ -10,9 +10,9 @@ Both sides choose nodes and steps freely, up to a tenth of the push, and have th
 1 mm/s. Ours acts where surfaces touch, and so bends the rod; "on centrelines" it is the source's and PyElastica's.
 Time is processor time of one push of 1.5 s on one thread, without build and recording; runs are interleaved and
 medians taken. PyElastica runs without damping and callbacks, numba warmed up, at its largest step that stays within
-half of (6.2), and at .9, .8 and .5 of it. Speed grows evenly, so that whatever is stable gets it right: PyElastica,
+half of (6.2), and at 0.9, 0.8 and 0.5 of it. Speed grows evenly, so that whatever is stable gets it right: PyElastica,
 whose rod does not deform here, to rounding. This compares the largest steps, and what they cost. The source reports
-.036 s a push, and .169 s for PyElastica: 4.7 times as long.
+0.036 s a push, and 0.169 s for PyElastica: 4.7 times as long.
 """
 
 from __future__ import annotations

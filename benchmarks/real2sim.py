@@ -123,7 +123,7 @@ def _errors(report: Report, seeds: int) -> None:
 
 
 def _drawn(nodes: int, turn: float, curvature: float) -> withe.Simulation:
-    """An arm drawn as an arc of .3 m that begins along x but for a turn upwards."""
+    """An arm drawn as an arc of 0.3 m that begins along x but for a turn upwards."""
     scene = withe.Scene()
     rubber = withe.Material(youngs_modulus=5e6, density=1000.0)
     edge = 0.3 / (nodes - 1)
@@ -203,7 +203,7 @@ def _cable(report: Report, seeds: int) -> None:
             shown.advance(1)
     rows.append(("others report", *(f"{cable.PUBLISHED[name]:g}" for name in names), "", "", ""))
     header = ("seed", "mean pose off [mm]", "EI off [%]", "damping off [%]", "most [mm]", "next second [mm]", "runs")
-    report.table("A dropped cable, seen by a camera of .5 px noise", header, rows)
+    report.table("A dropped cable, seen by a camera of 0.5 px noise", header, rows)
     for name, value, target in zip(names, np.sqrt(np.mean(np.square(errors), axis=0)), (3.0, 1.0, 5.0), strict=True):
         report.goal(f"dropped cable: {name}, RMS", value, target, at_least=False)
 

@@ -36,7 +36,7 @@ class FreeArm(withe.learning.Follow):
 
 
 class PlanarArm(withe.learning.Obstacles2D):
-    """The planar arm in steps of .1 s, with nothing in its way."""
+    """The planar arm in steps of 0.1 s, with nothing in its way."""
 
     control_step = 0.1
     time_step = 0.05

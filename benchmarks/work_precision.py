@@ -85,7 +85,7 @@ def _our_points(case: Case, quick: bool) -> list[Point]:
 
 
 def _their_points(case: Case, quick: bool) -> list[Point]:
-    """Each mesh at its largest stable step (given as 1) and half of it (.5, where that is quick), with both clamps."""
+    """Each mesh at its largest stable step (given as 1) and half of it (0.5, where that is quick), with both clamps."""
     points = []
     for wall in ("own clamp", "moved wall"):
         for elements in (25,) if quick else (25, 50, 100, 200, 400):

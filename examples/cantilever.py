@@ -1,7 +1,7 @@
 """A soft cantilever sags under its own weight, as far as theory says.
 
 The one dimensionless number is G = w L^3 / B, with w the weight per length, L the length and B the bending
-stiffness. At G = 10 the tip of an inextensible rod comes down by .70020 L and in by .34365 L.
+stiffness. At G = 10 the tip of an inextensible rod comes down by 0.70020 L and in by 0.34365 L.
 
 Run it with `make demo`, or `python examples/cantilever.py`. It fails when the tip is more than 1e-4 L off.
 """

@@ -1,10 +1,10 @@
 """A4 is folded in half on a slippery table, in simulation: on half a circle, and as planned in two ways.
 
-The sheet is a rod of 150 edges with inertia, contact and friction of .12, and none of it is in the planner, which knows
-the continuum's equilibria. On half a circle the sheet is pushed away until it snaps over (7.18 of Choi's dissertation);
-where the accumulated ratio of forces is least it slides by some millimetres. A jaw that may bend the sheet at its edge
-can keep the table's force upright all along ("slip", "free"): then nothing slides.
-Fails when a planned fold slides by .2 mm more or less than is predicted, and when half a circle does not snap.
+The sheet is a rod of 150 edges with inertia, contact and friction of 0.12, and none of it is in the planner, which
+knows the continuum's equilibria. On half a circle the sheet is pushed away until it snaps over (7.18 of Choi's
+dissertation); where the accumulated ratio of forces is least it slides by some millimetres. A jaw that may
+bend the sheet at its edge can keep the table's force upright all along ("slip", "free"): then nothing slides.
+Fails when a planned fold slides by 0.2 mm more or less than is predicted, and when half a circle does not snap.
 
 Writes out/fold_sheet.png.
 """

@@ -4,7 +4,7 @@ A block of mass m that a force F pushes for a time t over a floor with friction 
 (F - mu m g)^2 t^2 / (2 m), and none up to F = mu m g = 3.92 N. The rod is that of section 6.3.3 of Choi's dissertation.
 Friction is regularised, as there. Anchors, the default, give by a twentieth of the distance tolerance before they slip:
 a block that is pushed all at once gathers some 8 mm/s on the way, 4 % of the energy of the slowest one here.
-Fails when one that should stick has more than .0001 J, or one that slides is more than 1 % off.
+Fails when one that should stick has more than 0.0001 J, or one that slides is more than 1 % off.
 
 Writes out/friction.png.
 """

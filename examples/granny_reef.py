@@ -162,7 +162,7 @@ def draw(pulls: dict[tuple[str, float], Pull], means: dict[str, dict[str, dict[f
 
     figure, (left, middle, right) = plt.subplots(1, 3, figsize=(11.0, 3.6), layout="constrained")
     for (knot, friction), one in pulls.items():
-        width = len(one.force) // 100  # .13 s
+        width = len(one.force) // 100  # 0.13 s
         smooth = np.convolve(one.force, np.full(width, 1.0 / width), "valid")
         times = np.linspace(0.5, 99.5, len(smooth)) / 100.0 * DURATION
         style = "-" if friction == min(pulls, key=lambda key: key[1])[1] else "--"

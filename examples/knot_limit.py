@@ -2,9 +2,9 @@
 
 A knot without friction in a rope of radius h and bending stiffness B, its ends pulled. With e the shortening (length
 minus distance of the ends) and epsilon = sqrt(2 pi h / e), the limit of small epsilon has a pull F of
-F h^2 / B = epsilon^4 / 2 and normal forces that sum to .492 epsilon^3 B / h^2 (2007). Knots of epsilon from .13 to .07
-come to rest here, their pulls and forces over those of the limit are fitted by a parabola, and that is read off at
-epsilon = 0. Fails when either is more than .03 off.
+F h^2 / B = epsilon^4 / 2 and normal forces that sum to 0.492 epsilon^3 B / h^2 (2007). Knots of epsilon from 0.13 to
+0.07 come to rest here, their pulls and forces over those of the limit are fitted by a parabola, and that is read off at
+epsilon = 0. Fails when either is more than 0.03 off.
 
 The strands rest on each other's corners, so that the force in the grips scatters by some percent from knot to knot.
 Their energies U do not: the mean pull between two knots is their difference over that of the shortenings, -dU/de, and
@@ -25,7 +25,7 @@ import withe
 RADIUS, MODULUS, DENSITY = 1e-3, 1e6, 1000.0  # [m], [Pa], [kg/m^3]
 BENDING = MODULUS * np.pi * RADIUS**4 / 4.0  # [N m^2]
 LINE_DENSITY = DENSITY * np.pi * RADIUS**2  # [kg/m]
-TAIL = 1.3  # length over e: what bends there decays within .22 e
+TAIL = 1.3  # length over e: what bends there decays within 0.22 e
 NORMAL_FORCES = 0.492
 TOLERANCE = 0.03
 

@@ -1,6 +1,6 @@
 """An arm learns to follow a target: soft actor-critic, its learning curve, and the learned arm as a film.
 
-An action adds to the bends, so that noise of actions adds up: with deviations of 1 the tip is 12 cm off after .3 s and
+An action adds to the bends, so that noise of actions adds up: with deviations of 1 the tip is 12 cm off after 0.3 s and
 27 cm after 1 s, where rewards begin within 10 cm. Soft actor-critic learns how much noise each state bears, and learns
 from all that it remembers, not from the last steps only.
 
@@ -27,7 +27,7 @@ BETWEEN = 50_000  # control steps from one look to the next
 
 
 class Aimed(withe.learning.Follow):
-    """Follow, where the learner is told besides how its target lies from the tip, as through a lens within .1 m."""
+    """Follow, where the learner is told besides how its target lies from the tip, as through a lens within 0.1 m."""
 
     def observe(self, robots: withe.Batch) -> np.ndarray:
         """Of each robot, shape (n, 79)."""

@@ -1,6 +1,6 @@
 """A flexible arm on a servo swings through a right angle and stands still: input shaping by its own frequency.
 
-The servo is a revolute joint with a stiffness k, whose rest angle is led from 0 to 90 degrees within .2 s. The arm, a
+The servo is a revolute joint with a stiffness k, whose rest angle is led from 0 to 90 degrees within 0.2 s. The arm, a
 rod of nylon, goes on swinging about that. Shaped, the same command comes in three parts, 1/4, 1/2 and 1/4 of
 it, half a period of the arm's first mode apart (zero vibration and derivative [Singer and Seering 1990, J. Dyn. Syst.
 Meas. Control 112]), and what they set in motion cancels. The period is that of `linearise()`. In theory a beam with a

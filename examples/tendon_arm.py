@@ -1,6 +1,6 @@
 """A continuum robot on tendons: one that winds about its backbone against theory, and three that lead the tip.
 
-The robot is that of Rucker and Webster 2011 (IEEE Trans. Robot. 27, 1033): a backbone of spring steel, .8 mm thick and
+The robot is that of Rucker and Webster 2011 (IEEE Trans. Robot. 27, 1033): a backbone of spring steel, 0.8 mm thick and
 242 mm long, with tendons 8 mm beside it. A tendon that winds once round the backbone bends and twists it. Without
 weight each section has the strains that minimise
 
@@ -8,8 +8,8 @@ weight each section has the strains that minimise
 
 with no regard to its neighbours; the shape follows by integration of the frame. Then the robot hangs from its base with
 three straight tendons, and tensions are sought that lead its tip through points under its weight and that of a tool,
-by least squares with `equilibrium().gradient`. Fails when the tip of the first is off theory by more than .1 mm, or
-that of the second off its points by more than .1 mm.
+by least squares with `equilibrium().gradient`. Fails when the tip of the first is off theory by more than 0.1 mm, or
+that of the second off its points by more than 0.1 mm.
 
 Writes out/tendon_arm.png.
 """
