@@ -17,113 +17,113 @@ __all__ = [
 
 
 class BranchChangedWarning(UserWarning):
-    """A step of the static integrator has left its branch of equilibria: the scene jumps within it.
+    """Warn that a step of the static integrator left its branch of equilibria: the scene jumps within the step.
 
-    Which of other equilibria it goes to depends on the motion, that such a step does not follow. Given once a
-    simulation; `statistics.branch_changes` counts them. Of `equilibrium` it is the result that says so.
+    The equilibrium after a jump depends on the motion, which a static step does not resolve. The warning is given once
+    per simulation; `statistics.branch_changes` counts all changes. `equilibrium` sets `branch_changed` of its result
+    instead.
     """
 
 
 class CoarseMeshWarning(UserWarning):
-    """Somewhere an edge turns by more than 120 degrees against the next, or twists so: the rod needs more nodes there.
+    """Warn that an edge turns or twists by more than 120 degrees against the next: the rod needs more nodes there.
 
-    What folds over is far too stiff. Twist counts beyond the natural twist, so that a rod whose natural twist grows
-    may turn as a motor does; natural twist itself where it winds natural curvature, or an uneven section, about a rod.
-    Given once a simulation, at an equilibrium or within 64 steps.
+    Folded edges are much too stiff. Twist counts relative to the natural twist, so that a growing natural twist may
+    turn a rod like a motor. Natural twist itself counts if it winds natural curvature, or an uneven section, about the
+    rod. The warning is given once per simulation, at an equilibrium or within 64 steps.
     """
 
 
 class CoarseStepWarning(UserWarning):
-    """Time steps are too long for what moves: much of its energy swings with w dt > 1, w the angular frequency.
+    """Warn that the time step is too long for a motion or an impact, and name a time step that is short enough.
 
-    Such vibrations are not resolved: midpoint steps give them other frequencies, and backward Euler damps them within a
-    step or two. Says which step would do. Resistance that stops motion within a step counts too under the midpoint
-    rules, whose velocities then turn round from step to step. Stiff vibrations that carry no energy do not count, nor
-    what touches. Given once a simulation, within 24 steps.
+    Motion: much of the energy vibrates at angular frequencies w with w dt > 1. Midpoint steps change the frequency of
+    such vibrations, and backward Euler damps them within one or two steps. With the midpoint rules, resistance that
+    stops a motion within a step counts too. Vibrations without energy and contacts do not count. The warning is given
+    once per simulation, within 24 steps.
 
-    Or an impact is over within a step. Nodes that strike one after the other send waves to each other meanwhile, which
-    take up most of their motion and damp out; in a step in which a rod comes down by more than the distance tolerance
-    of contact, and bending goes farther than from a node to the next, all of it is sent off again, as if it were rigid.
-    Given once a simulation too; not under backward Euler, nor where obstacles have a restitution below 1.
+    Impact: in a real impact the nodes of a rod strike one after the other, and bending waves take up most of the
+    motion. In a step that is longer than the impact, the whole rod rebounds as if it were rigid. The warning is given
+    once per simulation, but not with backward Euler or a restitution below 1.
     """
 
 
 class EnergyDriftWarning(UserWarning):
-    """The energy of implicit midpoint steps has changed by more than 1 % of the greatest kinetic energy.
+    """Warn that implicit midpoint steps changed the energy by more than 1 % of the greatest kinetic energy.
 
-    The midpoint rule conserves energy to second order in the time step, and not where edges turn by more than about
-    0.1 rad in a step. The engine compares ``energy().total - energy().work + energy().dissipated`` with its first value
-    every 16 steps, and warns once a simulation. `integrator="energy_momentum"` conserves energy at any time step.
+    The midpoint rule conserves energy to second order in the time step, while edges turn by less than about 0.1 rad in
+    a step. The engine compares ``energy().total - energy().work + energy().dissipated`` with its first value
+    every 16 steps, and warns once per simulation. `integrator="energy_momentum"` conserves energy at any time step.
     """
 
 
 class OutOfPlaneWarning(UserWarning):
-    """An equilibrium of a scene that is solved in its plane is not stable against motions out of it.
+    """Warn that the equilibrium of a planar scene is not stable against motions out of its plane.
 
-    In space the scene would buckle or tip over sideways, as a deep beam does, or a truss that nothing holds there.
-    ``build(planar=False)`` lets it; ``build(planar=True)`` says that something keeps it in its plane. Given once a
-    simulation.
+    In space the scene would buckle or tip over sideways, as a deep beam or an unsupported truss does. Use
+    ``build(planar=False)`` to allow this motion, or ``build(planar=True)`` if a guide keeps the scene in its plane. The
+    warning is given once per simulation.
     """
 
 
 class PlausibilityWarning(UserWarning):
-    """A number is possible, and beyond anything that is usual: mostly of another unit than SI.
+    """Warn that a number is far outside of the usual range, mostly because its unit is not SI.
 
-    Names the number and the likely slip. Given of
+    The message names the number and the likely mistake. The warning is given for
 
     - a rod of more than 100 m with a radius below 10 mm,
     - a density below 10 or above 30,000 kg/m^3 under gravity,
-    - a Young's modulus below 100 Pa, of a rod that it cannot hold against its weight,
-    - a tendon whose offset is more than 50 radii of its rod, or one that pulls along a centreline,
-    - a rest angle or a roll of more than a full turn that is a multiple of 15, as angles in degrees are,
+    - a Young's modulus below 100 Pa, if the rod cannot carry its weight,
+    - a tendon whose offset is zero or more than 50 radii of its rod,
+    - a rest angle or roll above a full turn that is a multiple of 15, as angles in degrees are,
     - a time step above ten of the slowest periods of the scene, without a fluid or drag,
-    - `withe.learning.Task.build` that draws random numbers without `redraw`, so that all robots are equal.
+    - a `withe.learning.Task.build` that draws random numbers without `redraw`, so that all robots are equal.
 
-    ``warnings.simplefilter("ignore", withe.PlausibilityWarning)`` leaves them out.
+    ``warnings.simplefilter("ignore", withe.PlausibilityWarning)`` disables the warning.
     """
 
 
 class RingLeftWarning(UserWarning):
-    """An end of a rod has passed out of a ring that let it slide: the ring is released."""
+    """Warn that the end of a rod passed through a ring, and that the ring was released."""
 
 
 class RodCrossingWarning(UserWarning):
-    """Two rods pass through each other, as nothing said whether rods touch.
+    """Warn that two rods pass through each other because contact between rods was not enabled.
 
-    ``scene.enable_contact()`` lets rods touch each other, ``scene.enable_contact(rods=False)`` lets them pass. The
-    engine compares rods after each time step, and warns once a simulation when centrelines are nearer than half the sum
-    of the contact radii. It leaves out rods that share a node, that overlap at the start, or that are in
-    `Scene.ignore_contact`.
+    ``scene.enable_contact()`` enables contact between rods; ``scene.enable_contact(rods=False)`` allows rods to pass
+    through each other. The engine checks rods after each time step, and warns once per simulation when the distance of
+    centrelines is below half the sum of the contact radii. Rods that share a node, that overlap at the start, or that
+    are named in `Scene.ignore_contact` are not checked.
     """
 
 
 class SqueezedRodWarning(UserWarning):
-    """Two obstacles squeeze a rod by a stiffness of contact that is not given.
+    """Warn that two obstacles squeeze a rod, but no contact stiffness was given.
 
-    Obstacles do not yield, and a rod has no stiffness across its section, so that only the stiffness of contact says
-    how hard they press. A round section resists with about Young's modulus times the length in contact times the
-    depth: half of Young's modulus times the length of an edge is that as `stiffness` of `Scene.enable_contact`. Given
-    once a simulation, within 16 steps, where obstacles leave less room than the rod is thick.
+    Obstacles are rigid, and rods have no stiffness across their section, so the contact stiffness alone determines the
+    force. A round section resists with about Young's modulus times the length in contact times the penetration. This
+    corresponds to ``Scene.enable_contact(stiffness=)`` with half of Young's modulus times the length of an edge. The
+    warning is given once per simulation, within 16 steps, if the gap of the obstacles is smaller than the rod.
     """
 
 
 class ConvergenceError(RuntimeError):
-    """No solution was found, not even with the smallest step. The message ends with what to try.
+    """Report that no solution was found, even with the smallest step. The message ends with a remedy.
 
-    The simulation is left in its last accepted state, so it can be looked at, changed and continued.
+    The simulation keeps its last accepted state, so it can be read, changed and continued.
 
     Attributes
     ----------
     time : float [s]
-        Time of that state.
+        Time of the last accepted state.
     step : float [s]
-        The step that was too long; 0 in an equilibrium.
+        Size of the step that did not converge; 0 for an equilibrium.
     rod : str or None
-        Name of the rod where the residual is greatest, if that is known.
+        Name of the rod with the greatest residual, if known.
     node : int or None
-        Node of that rod.
+        Node with the greatest residual, if known.
     residual : float [N]
-        Greatest force out of balance.
+        Greatest residual force.
     """
 
     def __init__(

@@ -62,7 +62,7 @@ def overhand_knot(
     radius : float [m]
         Of its section.
     shortening : float [m]
-        Length minus the distance of its ends. By default .6 of the length, or more where the knot needs it.
+        Length minus the distance of its ends. By default 0.6 of the length, or more where the knot needs it.
     nodes : int
         By default 301, or more where edges would be longer than 9 radii: these cut through the knot's bends.
 

@@ -37,24 +37,25 @@ _MAX_STEPS = 2**31 - 1
 @keyword_hints
 @known_attributes("use set, such as set(gravity=[(0, 0, -1.6)])")
 class Batch(Setting, Reading):
-    """Many simulations of one shape, stepped in one call over threads, and read out into one array.
+    """Step many simulations of one shape in one call over threads, and read them into one array.
 
-    Each goes on to the bit as it would alone, for any number of workers. `batch[i]` is one of them, a `Simulation` that
-    may be set, read, moved and clamped by itself between steps. One whose step cannot be solved has failed: it stays in
-    its last accepted state and is passed over, until it is restored, reset or replaced, and the others go on.
+    Each simulation gives the same bits as alone, for any number of workers. ``batch[i]`` is a `Simulation`, which may
+    be set, read, moved and clamped between steps. A simulation whose step does not converge has failed: it keeps its
+    last accepted state and does not step until it is restored, reset or replaced. The other simulations continue.
 
     Parameters
     ----------
     simulations : iterable of Simulation
-        All different, with the same rods and nodes, as many obstacles, and the same time_step. Numbers may differ:
-        materials, radii, places of obstacles, options of the solver. `Scene.build_batch` makes them of one scene.
+        Different simulations with equal rods, nodes, number of obstacles and time_step. Materials, radii, places of
+        obstacles and solver options may differ. `Scene.build_batch` makes a batch of one scene.
     workers : int, optional
-        Number of threads; by default one a processor.
+        Number of threads. By default one per processor.
 
     Raises
     ------
     ValueError
-        None, something that is not a simulation, one that is there twice or has another shape, or workers below 1.
+        No simulation, an object that is not a simulation, a simulation given twice or of another shape, or workers
+        below 1.
 
     Examples
     --------
@@ -84,13 +85,13 @@ class Batch(Setting, Reading):
     def __getitem__(self, index: str) -> Any: ...
 
     def __getitem__(self, index: int | str) -> Any:
-        """One simulation, by its number; or the handle of the part, node or edge of a name."""
+        """Return a simulation by its number, or the handle of a part, node or edge by its name."""
         if isinstance(index, str):
             return self._lanes.first[index]
         return self._lanes.simulations[index]
 
     def __setitem__(self, index: int, simulation: Simulation) -> None:
-        """Put another simulation of the same shape in the place of one."""
+        """Replace a simulation by another one of the same shape."""
         size = len(self)
         number = validation.integer(index, "index", -size, size - 1) % size
         if not isinstance(simulation, Simulation):
@@ -99,17 +100,17 @@ class Batch(Setting, Reading):
 
     @property
     def lanes(self) -> npt.NDArray[np.intc]:
-        """Numbers of all simulations, shape (n,)."""
+        """Return the numbers of all simulations, shape (n,)."""
         return self._lanes.numbers
 
     @property
     def workers(self) -> int:
-        """Number of threads."""
+        """Return the number of threads."""
         return int(self._lanes.engine.workers)
 
     @property
     def time_step(self) -> float:
-        """As it was given to `Scene.build` [s]."""
+        """Return the time step that was given to `Scene.build` [s]."""
         return self._lanes.first.time_step
 
     def __repr__(self) -> str:
@@ -119,21 +120,22 @@ class Batch(Setting, Reading):
     # Stepping
 
     def step(self, count: int = 1, lanes: npt.ArrayLike | None = None) -> None:
-        """Advance by exactly `count` time steps, all simulations or some, those that have failed excepted.
+        """Advance all or some simulations by `count` time steps. Failed simulations do not step.
 
-        Custom forces and functions of time are called one at a time, with the lock of the interpreter.
+        Custom forces and functions of time are called one at a time, because they hold the interpreter lock.
 
         Parameters
         ----------
         count : int
+            Number of time steps.
         lanes : array_like of shape (n,), bool, or of numbers, optional
-            Which simulations; all by default.
+            Simulations to step. By default all.
 
         Raises
         ------
         ValueError
-            A count that is not a whole number, or negative; lanes that there are not.
-        KeyboardInterrupt, or what a callback raised
+            `count` is negative or not a whole number, or a lane does not exist.
+        KeyboardInterrupt, or the exception of a callback
             Every simulation is in its last accepted state; times may differ.
         RuntimeError
             Called by a callback, or while another thread runs one of them.
@@ -179,41 +181,41 @@ class Batch(Setting, Reading):
         record: Mapping[str, Callable[[Batch], npt.ArrayLike]] | None = None,
         lanes: npt.ArrayLike | None = None,
     ) -> BatchRecord:
-        """Advance all simulations by a duration, side by side, and record what happens.
+        """Advance all simulations by a duration and record frames.
 
-        As `Simulation.run`, with callbacks that are given the batch, and frames at whole time steps.
+        This works as `Simulation.run`, except that callbacks get the batch, and frames lie at whole time steps.
 
         Parameters
         ----------
         duration : float [s]
-            A whole number of time steps.
+            Duration of the run, a whole number of time steps.
         record_every : float [s]
-            A whole number of time steps; by default a hundredth of the duration, rounded up to one.
+            Interval of frames, a whole number of time steps. By default a hundredth of the duration, rounded up.
         progress : bool or "always"
-            Whether to show a progress bar; True shows one on a terminal and in a notebook.
+            True to show a progress bar on a terminal and in a notebook.
         before_step : callable
             Called with the batch once before every time step.
         until : callable
-            Called with the batch after every time step; the simulations for which it returns true, shape (n,), have
-            ended, with a last frame. One truth value is for all.
+            Called with the batch after every time step. Returns one truth value for all, or shape (n,): the runs of
+            these simulations end with a last frame.
         record : mapping of str to callable
-            What else to record: each is called with the batch at every frame and returns an array of a row for each
+            Further quantities to record. Each function is called with the batch at every frame and returns one row per
             simulation.
         lanes : array_like of shape (n,), bool, or of numbers, optional
-            Which simulations; all by default.
+            Simulations to run. By default all.
 
         Returns
         -------
         BatchRecord
-            A `Record` of each, in the order of `lanes`; that of a simulation is also its `record`. One that fails
-            keeps the frames until then: see `failed`.
+            One `Record` per simulation, in the order of `lanes`, also available as `record` of the simulation. The
+            record of a failed simulation ends with its last frame; see `failed`.
 
         Raises
         ------
         ValueError
-            Times that are no whole number of steps, or a callback that returns another shape.
-        KeyboardInterrupt, or what a callback raised
-            What was recorded until then is the `record` of each simulation.
+            A time that is not a whole number of steps, or a callback that returns a wrong shape.
+        KeyboardInterrupt, or the exception of a callback
+            The run ended early. `record` of each simulation holds the frames until then.
 
         Examples
         --------
@@ -231,20 +233,20 @@ class Batch(Setting, Reading):
         return loop.record
 
     def equilibrium(self, lanes: npt.ArrayLike | None = None, *, stable: bool = True) -> Equilibria:
-        """Find the static equilibria that the present states lead to, and go there; see `Simulation.equilibrium`.
+        """Move every simulation to its static equilibrium. See `Simulation.equilibrium`.
 
         Parameters
         ----------
         lanes : array_like of shape (n,), bool, or of numbers, optional
-            Which simulations; all by default.
+            Simulations to change. By default all.
         stable : bool
-            If False, equilibria that are not stable are returned where paths lead to them.
+            False to allow unstable equilibria.
 
         Returns
         -------
         Equilibria
-            Arrays with an entry for each simulation, and the `Equilibrium` of each. One for which none was found stays
-            where it was, and `failures` says why.
+            Arrays with one entry per simulation, and the `Equilibrium` of each. A simulation without an equilibrium
+            keeps its state; `failures` of the result holds the errors.
 
         Examples
         --------
@@ -287,13 +289,13 @@ class Batch(Setting, Reading):
 
     @property
     def failed(self) -> npt.NDArray[np.bool_]:
-        """Which simulations have failed, shape (n,)."""
+        """Return True for each simulation that has failed, shape (n,)."""
         self._lanes.forgive_restored()
         return self._lanes.engine.failed()
 
     @property
     def failures(self) -> tuple[ConvergenceError | None, ...]:
-        """What went wrong in each, or None."""
+        """Return the error of each failed simulation, and None for the others."""
         found = (self._lanes.engine.failure(i) if failed else None for i, failed in enumerate(self.failed))
         return tuple(
             None if numbers is None else convergence_error(simulation._session, numbers)
@@ -303,29 +305,30 @@ class Batch(Setting, Reading):
     # State
 
     def snapshot(self, lanes: npt.ArrayLike | None = None) -> tuple[Snapshot, ...]:
-        """The whole state of each, to go back to with `restore`, bit by bit.
+        """Return the whole state of each simulation. `restore` continues from it bit for bit.
 
         Parameters
         ----------
         lanes : array_like of shape (n,), bool, or of numbers, optional
-            Which simulations; all by default.
+            Simulations to read. By default all.
         """
         return tuple(simulation.snapshot() for _, simulation in self._lanes.each(self._lanes.chosen(lanes)))
 
     def restore(self, snapshots: Snapshot | Sequence[Snapshot], lanes: npt.ArrayLike | None = None) -> None:
-        """Go back to snapshots; a simulation that had failed goes on from there.
+        """Restore the states of snapshots. Failed simulations can step again.
 
         Parameters
         ----------
-        snapshots : Snapshot, or a sequence of one for each simulation
-            One alone is for all.
+        snapshots : Snapshot or sequence of Snapshot
+            One snapshot per simulation, or one for all.
         lanes : array_like of shape (n,), bool, or of numbers, optional
-            Which simulations; all by default.
+            Simulations to restore. By default all.
 
         Raises
         ------
         ValueError
-            Not as many snapshots as simulations, or see `Simulation.restore`; then no simulation is changed.
+            The number of snapshots differs from the number of simulations, or see `Simulation.restore`. Then no
+            simulation is changed.
         RuntimeError
             Called by a callback of a run.
 
@@ -354,12 +357,12 @@ class Batch(Setting, Reading):
             simulation._stepping.frame_time = None
 
     def reset(self, mask: npt.ArrayLike | None = None) -> None:
-        """Go back to the scenes as they were drawn, and undo everything that was set since.
+        """Restore the states after `Scene.build`, and undo every later change.
 
         Parameters
         ----------
         mask : array_like of shape (n,), bool, or of numbers, optional
-            Which simulations; all by default.
+            Simulations to reset. By default all.
 
         Raises
         ------
@@ -380,7 +383,7 @@ class Batch(Setting, Reading):
         self.restore([simulation._initial for _, simulation in self._lanes.each(numbers)], numbers)
 
     def copy(self) -> Batch:
-        """Another batch in the same state, which goes its own way from here. Those that have failed are tried again."""
+        """Return an independent batch in the same state, in which failed simulations can step again."""
         return Batch([simulation.copy() for simulation in self], self.workers)
 
     def __copy__(self) -> Batch:

@@ -23,22 +23,22 @@ class Reading:
 
     @property
     def rods(self) -> tuple[Rod, ...]:
-        """Handles of all rods, in the order of the scene."""
+        """Return the handles of all rods, in the order of the scene."""
         return self._lanes.first.rods
 
     @property
     def time(self) -> FloatArray:
-        """Time of every simulation since its start, shape (n,) [s]."""
+        """Return the time of every simulation since its start, shape (n,) [s]."""
         return _read(self._lanes, "time", -1, (), None)
 
     def positions(self, rod: Rod | str | None = None, out: FloatArray | None = None) -> FloatArray:
-        """Positions of the nodes of a rod, or of every node of the scene once.
+        """Return the positions of the nodes of a rod, or of all nodes of the scene.
 
         Parameters
         ----------
         rod : Rod or str, optional
         out : ndarray of shape (n, nodes, 3), float64, optional
-            Is filled and returned.
+            Array that is filled and returned.
 
         Returns
         -------
@@ -58,94 +58,94 @@ class Reading:
         return _of_nodes(self._lanes, "positions", rod, out)
 
     def velocities(self, rod: Rod | str | None = None, out: FloatArray | None = None) -> FloatArray:
-        """Velocities of the nodes of a rod, or of every node once, shape (n, nodes, 3) [m/s]."""
+        """Return the velocities of the nodes of a rod, or of all nodes, shape (n, nodes, 3) [m/s]."""
         return _of_nodes(self._lanes, "velocities", rod, out)
 
     def directors(self, rod: Rod | str, out: FloatArray | None = None) -> FloatArray:
-        """Material frames of the edges, shape (n, edges, 3, 3), rows d1, d2, tangent."""
+        """Return the material frames of the edges, shape (n, edges, 3, 3), with rows d1, d2, tangent."""
         part = self._lanes.rod(rod)
         return _read(self._lanes, "directors", part.index, (len(part.lengths), 3, 3), out)
 
     def curvatures(self, rod: Rod | str, out: FloatArray | None = None) -> FloatArray:
-        """Curvatures towards d1 and d2, shape (n, stencils, 2) [1/m]."""
+        """Return the curvatures towards d1 and d2, shape (n, stencils, 2) [1/m]."""
         part = self._lanes.rod(rod)
         return _read(self._lanes, "curvatures", part.index, (len(part.voronoi), 2), out)
 
     def twists(self, rod: Rod | str, out: FloatArray | None = None) -> FloatArray:
-        """Twists, shape (n, stencils) [rad/m]."""
+        """Return the twists per length, shape (n, stencils) [rad/m]."""
         part = self._lanes.rod(rod)
         return _read(self._lanes, "twists", part.index, (len(part.voronoi),), out)
 
     def tensions(self, rod: Rod | str, out: FloatArray | None = None) -> FloatArray:
-        """Axial forces of the edges, pulling is positive, as `Simulation.tensions`, shape (n, edges) [N]."""
+        """Return the tension of each edge, as `Simulation.tensions`, shape (n, edges) [N]."""
         part = self._lanes.rod(rod)
         return _read(self._lanes, "tensions", part.index, (len(part.lengths),), out)
 
     def spins(self, rod: Rod | str, out: FloatArray | None = None) -> FloatArray:
-        """Angular velocities of the edges about their tangents, shape (n, edges) [rad/s]."""
+        """Return the angular velocities of the edges about their tangents, shape (n, edges) [rad/s]."""
         part = self._lanes.rod(rod)
         return _read(self._lanes, "spins", part.index, (len(part.lengths),), out)
 
     def energy(self, rod: Rod | str | None = None) -> Energy | RodEnergy:
-        """Energies of every simulation, or of one rod in each: every field is an array of shape (n,) [J]."""
+        """Return the energies of every simulation, or of one rod in each; each field has shape (n,) [J]."""
         return self._lanes.gathered(lambda s: s.energy() if rod is None else s.energy(rod))  # type: ignore[no-any-return]
 
     def momentum(self) -> Momentum:
-        """Momenta of every simulation, linear and angular, each of shape (n, 3)."""
+        """Return the linear and angular momentum of every simulation, each of shape (n, 3)."""
         return self._lanes.gathered(lambda s: s.momentum())  # type: ignore[no-any-return]
 
     def reaction(self, support: Support | NodeHandle | str) -> Reaction:
-        """Force and moment of a support on the rod in every simulation, each of shape (n, 3) [N], [N m]."""
+        """Return the force and moment of a support on its rod, each of shape (n, 3) [N], [N m]."""
         return self._lanes.gathered(lambda s: s.reaction(support))  # type: ignore[no-any-return]
 
     def wrench(self, hand: Hand | str) -> Reaction:
-        """Force and moment of a hand on the rod about where it is, each of shape (n, 3) [N], [N m]."""
+        """Return the force and moment of a hand on its rod, about the hand, each of shape (n, 3) [N], [N m]."""
         return self._lanes.gathered(lambda s: s.wrench(hand))  # type: ignore[no-any-return]
 
     def spring_tension(self, spring: Spring | str) -> FloatArray:
-        """Axial force of a spring and its damper, pulling is positive, shape (n,) [N]."""
+        """Return the tension of a spring and its damper, shape (n,) [N]."""
         return self._lanes.gathered(lambda s: s.spring_tension(spring))  # type: ignore[no-any-return]
 
     def tendon_length(self, tendon: Tendon | str) -> FloatArray:
-        """From its first guide to its last, along a tendon, shape (n,) [m]."""
+        """Return the length of a tendon from its first guide to its last, shape (n,) [m]."""
         return self._lanes.gathered(lambda s: s.tendon_length(tendon))  # type: ignore[no-any-return]
 
     def tendon_points(self, tendon: Tendon | str) -> FloatArray:
-        """Where the guides of a tendon are, shape (n, guides, 3) [m]."""
+        """Return the positions of the guides of a tendon, shape (n, guides, 3) [m]."""
         return self._lanes.gathered(lambda s: s.tendon_points(tendon))  # type: ignore[no-any-return]
 
     def joint_angle(self, joint: Joint | str) -> FloatArray:
-        """By how much the second rod of a revolute joint has turned since it was drawn, shape (n,) [rad]."""
+        """Return the angle of a revolute joint since the drawing, shape (n,) [rad]."""
         return self._lanes.gathered(lambda s: s.joint_angle(joint))  # type: ignore[no-any-return]
 
     def joint_rate(self, joint: Joint | str) -> FloatArray:
-        """The rate of `joint_angle`, shape (n,) [rad/s]."""
+        """Return the rate of `joint_angle`, shape (n,) [rad/s]."""
         return self._lanes.gathered(lambda s: s.joint_rate(joint))  # type: ignore[no-any-return]
 
     def joint_torque(self, joint: Joint | str) -> FloatArray:
-        """By what a revolute joint turns its second rod, shape (n,) [N m]."""
+        """Return the torque of a revolute joint on its second rod, shape (n,) [N m]."""
         return self._lanes.gathered(lambda s: s.joint_torque(joint))  # type: ignore[no-any-return]
 
     def obstacle_position(self, obstacle: Obstacle | str) -> FloatArray:
-        """Where an obstacle is, shape (n, 3) [m]."""
+        """Return the position of an obstacle, shape (n, 3) [m]."""
         return self._lanes.gathered(lambda s: s.obstacle_position(obstacle))  # type: ignore[no-any-return]
 
     def contacts(self) -> list[npt.NDArray[np.void]]:
-        """What touches in every simulation: a table for each, as `Simulation.contacts` has it."""
+        """Return the contacts of every simulation, each a table as in `Simulation.contacts`."""
         return [simulation.contacts() for simulation in self._lanes.simulations]
 
     @property
     def statistics(self) -> Statistics:
-        """What the work so far took; every field is an array of shape (n,)."""
+        """Return counts and times of the work so far; each field has shape (n,)."""
         return self._lanes.gathered(lambda s: s.statistics)  # type: ignore[no-any-return]
 
     def get(self, target: Any, word: str | None = None) -> Any:
-        """The present value of what `set` sets, in every simulation.
+        """Return the present value of a parameter of `set` in every simulation.
 
         Returns
         -------
         ndarray of shape (n, ...)
-            Or a tuple of values that are no numbers.
+            Or a tuple, if the values are not numbers.
         """
         return self._lanes.gathered(lambda s: s.get(target, word))
 

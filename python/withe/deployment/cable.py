@@ -17,7 +17,7 @@ __all__ = ["JAW", "Cable", "MeasuredCable", "measure"]
 
 JAW = 0.010  # [m] of a cable that a jaw holds
 _HIGHEST_LOOP, _THICKEST = 10.0, 0.5  # [m]
-LOOP_HEIGHT = 1.142240  # of a loop that hangs on a floor, touching it tangentially [Lgb]: .90660 (EI / w)^(1/3)
+LOOP_HEIGHT = 1.142240  # of a loop that hangs on a floor, touching it tangentially [Lgb]: 0.90660 (EI / w)^(1/3)
 _TABLE = {  # Lgb, radius, length [m] [Choi, dissertation, table 9.1]
     1: (0.018, 1.6e-3, 0.875),
     2: (0.032, 1.6e-3, 0.885),
@@ -126,7 +126,7 @@ def measure(
     scale : float [m]
         Of one pixel of the image.
     error : float [m]
-        Standard deviation of the height; by default .5 mm, or half a pixel of an image.
+        Standard deviation of the height; by default 0.5 mm, or half a pixel of an image.
 
     Returns
     -------

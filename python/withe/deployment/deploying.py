@@ -82,8 +82,8 @@ def deploy(
 
     Nothing of the plan but the jaw's motion is known there: the cable has thickness, weight, torsion and inertia,
     touches the floor where it comes to, and sticks to it by anchored friction at its surface, on which it rolls.
-    Backward Euler steps; density 1180 kg/m^3, Kelvin-Voigt viscosity of .02 s. The jaw holds 10 mm of the cable; its
-    pads yield by .5 mm/N and 20 rad/(N m), and less under heavy and stiff cables, by 1e-4 Lgb^3 / EI and
+    Backward Euler steps; density 1180 kg/m^3, Kelvin-Voigt viscosity of 0.02 s. The jaw holds 10 mm of the cable; its
+    pads yield by 0.5 mm/N and 20 rad/(N m), and less under heavy and stiff cables, by 1e-4 Lgb^3 / EI and
     Lgb / (300 EI); so a jaw too low rests on the floor.
 
     Parameters
@@ -100,11 +100,11 @@ def deploy(
         Of the trial's noise.
     noise : float
         Scale of what a planner does not know, drawn once a trial: 1 stands for standard deviations of 5 % in Lgb, 20 %
-        in friction, a natural curvature of .5 / m, and a jaw that is off by .5 mm and .5 degrees on each axis.
+        in friction, a natural curvature of 0.5 / m, and a jaw that is off by 0.5 mm and 0.5 degrees on each axis.
     nodes : int
         Of the rod, 20 to 2000.
     time_step : float [s]
-        By default .01, or .1 where the motion is quasi-static.
+        By default 0.01, or 0.1 where the motion is quasi-static.
     quasi_static : bool
         Whether the cable passes through equilibria, as if everything went infinitely slowly: some four times as fast
         to compute, and free of swing.

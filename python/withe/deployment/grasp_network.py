@@ -115,7 +115,7 @@ class GraspNetwork(Surrogate):
         Parameters
         ----------
         suspended : array_like [Lgb]
-            Length that hangs, .1 to 50.
+            Length that hangs, 0.1 to 50.
         curvature : array_like [1/Lgb]
             At lift-off, -4 to 4; see `grasp` for its sign.
         stretch_stiffness : array_like

@@ -93,7 +93,7 @@ def grasp(
     Parameters
     ----------
     suspended : array_like [Lgb]
-        Length that hangs, .1 to 100. Beyond 7 the forces no longer depend on it.
+        Length that hangs, 0.1 to 100. Beyond 7 the forces no longer depend on it.
     curvature : array_like [1/Lgb]
         At lift-off, -6 to 6. **A positive one bends the rod towards -y**, to the right of its way, as in the tables of
         the dissertation's public code; (9.1) has it the other way round.
@@ -101,9 +101,9 @@ def grasp(
         EA Lgb^2 / EI, 4 (Lgb / radius)^2 of a round rod (9.10); at least 100, and 4 times the suspended length.
     axial_force : array_like [w Lgb]
         Of the floor on the suspended part along x. Friction at the lift-off point alone is least with a push of some
-        .82 curvature^2.
+        0.82 curvature^2.
     radius : array_like [Lgb]
-        How far below the centreline the floor's force acts: at most .25; 0 in the dissertation. GJ is that of a round
+        How far below the centreline the floor's force acts: at most 0.25; 0 in the dissertation. GJ is that of a round
         rod of incompressible material.
 
     Returns
@@ -256,7 +256,7 @@ def thickened(
 
     That force_y acts behind the lift-off point makes the curvature there less, and twisted is the rod as `grasp` says.
     Couples at lift-off and of the jaw balance about the upright axis: force_y x = m(0)_z - radius force_y t_z. By how
-    much its twist bends a rod, some .3 radius where the jaw is at a curvature of .5 / Lgb, is left out.
+    much its twist bends a rod, some 0.3 radius where the jaw is at a curvature of 0.5 / Lgb, is left out.
     """
     from scipy.spatial.transform import Rotation
 

@@ -72,10 +72,10 @@ def measure_curvature(
     scale : float [m]
         Of one pixel of the image.
     depth : float [m]
-        How far the free end is aside along the line of sight, if it is: of a cable that bends by more than .3 / Lgb
+        How far the free end is aside along the line of sight, if it is: of a cable that bends by more than 0.3 / Lgb
         both measurements need what the other one read.
     error : float [m]
-        Standard deviation of what is read, aside and depth; by default .5 mm, or of an image half a pixel
+        Standard deviation of what is read, aside and depth; by default 0.5 mm, or of an image half a pixel
         and what is not known of the shape of the cable's end.
 
     Returns

@@ -31,7 +31,7 @@ def train(
     time_limit: float | None = None,
     progress: bool = True,
 ) -> GraspNetwork:
-    """Train a network on exact grasps: .1 to 50 Lgb, curvatures to 4 / Lgb, stretch stiffnesses 300 to 8000.
+    """Train a network on exact grasps: 0.1 to 50 Lgb, curvatures to 4 / Lgb, stretch stiffnesses 300 to 8000.
 
     Parameters
     ----------

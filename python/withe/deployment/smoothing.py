@@ -170,7 +170,7 @@ def fourth_differences(count: int) -> Any:
 
 
 def _quadratic(both: Any, raw: FloatArray, deviation: FloatArray) -> FloatArray:
-    """Least squares of what the floor gives, weighed against those of the distance so that the greatest is .9."""
+    """Least squares of what the floor gives, weighed against those of the distance so that the greatest is 0.9."""
     from scipy import sparse
 
     near = np.tile((deviation.min() / deviation) ** 2, 2)

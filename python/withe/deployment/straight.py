@@ -59,7 +59,7 @@ class StraightLine:
     Parameters
     ----------
     suspended : float [Lgb]
-        .3 to 50.
+        0.3 to 50.
     stretch_stiffness : float
         EA Lgb^2 / EI, as in `grasp`.
 

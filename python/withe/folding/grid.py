@@ -1,6 +1,6 @@
 """The manifold of sheets held without moment on a grid of positions, made once; and searches over it.
 
-All in Lgb. The grid is that of the dissertation, 7.8.5: blocks of .0548, a pose at the middle of each. Beside it
+All in Lgb. The grid is that of the dissertation, 7.8.5: blocks of 0.0548, a pose at the middle of each. Beside it
 stands the lift: sheets raised from the table without tangential force, the smooth way from flat into the grid, whose
 positions say little where so short a part is lifted.
 """

@@ -83,7 +83,7 @@ def droop(length: float) -> float:
     Parameters
     ----------
     length : float [Lgb]
-        .05 to 20.
+        0.05 to 20.
 
     Returns
     -------
@@ -115,7 +115,7 @@ def measure(
     Clamp a strip level, at the edge of a table under a book, so that `length` of it is free: its tip then hangs `drop`
     below the clamp. The strip's equilibrium is that of an elastica under its own weight, exactly, however far it bends.
 
-    Paper curls, and a strip that curls by .5 / m seems stiffer or limper by 1.5 to 4 %. Clamp it a second time, turned
+    Paper curls, and a strip that curls by 0.5 / m seems stiffer or limper by 1.5 to 4 %. Clamp it a second time, turned
     over: from both readings follow Lgb and the curl.
 
     Parameters
@@ -129,7 +129,7 @@ def measure(
     scale : float [px/m]
         Of the pictures, where the strip is.
     error : float [m]
-        Standard deviation of either length; by default .5 mm, and .3 pixels of a picture.
+        Standard deviation of either length; by default 0.5 mm, and 0.3 pixels of a picture.
 
     Returns
     -------

@@ -73,7 +73,7 @@ def elastica(
     x, z : array_like, broadcast together [Lgb]
         The tip's way back and up from where it lay in the flat sheet.
     length, angle : array_like, broadcast together [Lgb], [rad]
-        Instead of x and z: lifted length, .05 to 6.84, and the angle at the tip. Poses depend smoothly on these;
+        Instead of x and z: lifted length, 0.05 to 6.84, and the angle at the tip. Poses depend smoothly on these;
         on x and z they depend steeply near x = 0.
     tip_moment : float [w Lgb^2]
         Of the jaw on the sheet: twice the curvature at the tip, in 1/Lgb, that it makes there.
@@ -84,10 +84,10 @@ def elastica(
     Returns
     -------
     Elastica
-        Refused (`valid` False) are positions that need a lifted length outside .958 to 6.84 Lgb, where x and z do not
+        Refused (`valid` False) are positions that need a lifted length outside 0.958 to 6.84 Lgb, where x and z do not
         name one pose, tips below the table, sheets that touch the table elsewhere or bend below it, and taut
         sheets, pulled back by more than 40 w Lgb. By length and angle also what has the direction of such taut
-        sheets: strips shorter than .9 Lgb that are lifted by only a few hundredths of a radian.
+        sheets: strips shorter than 0.9 Lgb that are lifted by only a few hundredths of a radian.
 
     Raises
     ------

@@ -41,7 +41,7 @@ class Noise:
     angle : float [rad]
         By which the jaw is turned too far.
     jitter : float [m]
-        Of the jaw's place about its mean, in x and in z, at .5 to 4 Hz.
+        Of the jaw's place about its mean, in x and in z, at 0.5 to 4 Hz.
 
     Raises
     ------

@@ -107,12 +107,12 @@ class Paper:
 
         It is held by a corner: its width grows from there to the middle, and falls again. Of the default size, corner
         on corner (the target "half") would lift more of it than can be led without a moment; the dissertation's target
-        is .30 m.
+        is 0.30 m.
 
         Parameters
         ----------
         side : float [m]
-            The dissertation does not say it; for its C = .30 m at least .213 m. Of smaller sheets little lies that
+            The dissertation does not say it; for its C = 0.30 m at least 0.213 m. Of smaller sheets little lies that
             could hold them where they are.
         """
         diagonal = np.sqrt(2.0) * validation.positive(side, "side")

@@ -33,7 +33,7 @@ _ENOUGH = 5e-5  # [m]
 _CREASE = 0.5  # by which it moves with the edge
 _HOLDING = 0.3  # in the end [s]
 _BESIDE = (0.0, -5e-4, 5e-4, 5e-4, -5e-4)  # of where a jaw should be, that holds sheets at the bounds [m]
-_COARSE = {"edges": 75, "time_step": 0.02}  # of sheets at the bounds, whose creases are known to some .02 mm
+_COARSE = {"edges": 75, "time_step": 0.02}  # of sheets at the bounds, whose creases are known to some 0.02 mm
 
 
 class _Tried:
@@ -92,7 +92,7 @@ def plunge(
     to the side it goes, within what time, and whether the edge ends level or as the plan has it, is tried on simulated
     sheets without noise, those of `Plan.papers`: aimed so that the paper as it is thought to be is folded right, it is
     the way on which the worst of them is best, by how far its crease is off and by half of how far it slides, of those
-    that fold all of them. Jaws that hold sheets at the bounds are off by .5 mm to either side: an edge that comes down
+    that fold all of them. Jaws that hold sheets at the bounds are off by 0.5 mm to either side: an edge that comes down
     on the last of a sheet must not miss it.
 
     Parameters

@@ -81,7 +81,7 @@ class SheetNetwork(Surrogate):
     """What a network has learned of sheets that hang from a jaw without moment. `train` makes one, `load` reads one.
 
     Its answers are those of `elastica(x, z)`, about right. It cannot say that a sheet touches the table elsewhere,
-    so it also answers at x > 9.1, z < .8, where `elastica` refuses most positions for that.
+    so it also answers at x > 9.1, z < 0.8, where `elastica` refuses most positions for that.
 
     Attributes
     ----------

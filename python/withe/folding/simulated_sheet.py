@@ -106,7 +106,7 @@ class SimulatedSheet:
     edges : int
         Of the rod.
     time_step : float [s]
-        Of backward Euler; shorter where the jaw would move by more than 2 mm in a step, and for .1 s after that.
+        Of backward Euler; shorter where the jaw would move by more than 2 mm in a step, and for 0.1 s after that.
     own_friction : float
         Coefficient of the sheet on itself.
     record_every : float [s]

@@ -51,7 +51,7 @@ class Arm(Task):
     longest_meant : float [s]
         Steps up to this bring the tip to within 1 cm RMS of a run with short steps, by `benchmarks/rl_throughput.py`;
         that they do not resolve how the arm swings is meant, and no `CoarseStepWarning` is given. In `Follow`
-        velocities of nodes are off by .2 to .4 m/s RMS then, of .5 to .8: fast modes are not in phase.
+        velocities of nodes are off by 0.2 to 0.4 m/s RMS then, of 0.5 to 0.8: fast modes are not in phase.
     """
 
     control_step = 0.1
@@ -89,7 +89,7 @@ class Arm(Task):
             integrator="energy_momentum",
             time_step=self.time_step,
             planar=self.planar,
-            step_tolerance=1e-4,  # .1 mm: 1 % of what the steps' length costs, for a fifth of the work less
+            step_tolerance=1e-4,  # 0.1 mm: 1 % of what the steps' length costs, for a fifth of the work less
             force_tolerance=1e-3,
         )
         built._session.longest_meant = self.longest_meant
@@ -164,11 +164,11 @@ class Arm(Task):
 
 
 class Follow(Arm):
-    """The tip is to follow a target that goes about at .5 m/s and turns now and then.
+    """The tip is to follow a target that goes about at 0.5 m/s and turns now and then.
 
     Actions: for each segment what is added to its curvature towards x, then towards y, (10,). Observed: positions and
     velocities of nodes 2, 4 .. 20, bends of the segments, position and velocity of the target, (76,). Reward -d^2, and
-    .5 within .1 m, 2 within .05 m. 500 steps of .1 s.
+    0.5 within 0.1 m, 2 within 0.05 m. 500 steps of 0.1 s.
 
     Examples
     --------
@@ -224,8 +224,8 @@ class Reach(Arm):
 
     Actions: for each segment curvatures and twist, (15,). Observed besides the arm: twists, quaternion of the tip,
     position and quaternion of the target, scalar last, (86,). With o = 1 - (q . q*)^2 the reward is -d^2 - o^2 / 2, and
-    besides 1 - o / 2 (1.5 if o < .1) within .1 m, or 4 - 2 o (4.5 if o < .1, 6 if o < .05) within .05 m. 100 steps of
-    .1 s.
+    besides 1 - o / 2 (1.5 if o < 0.1) within 0.1 m, or 4 - 2 o (4.5 if o < 0.1, 6 if o < 0.05) within 0.05 m. 100 steps
+    of 0.1 s.
 
     Examples
     --------
@@ -268,12 +268,12 @@ class Reach(Arm):
 
 
 class _Obstructed(Arm):
-    """The tip is to come to a goal behind obstacles; steps of .5 s."""
+    """The tip is to come to a goal behind obstacles; steps of 0.5 s."""
 
     control_step = 0.5
     steps = 50
     bend_step = 0.25
-    time_step = longest_meant = 1.0 / 30.0  # led over .5 s an arm swings less
+    time_step = longest_meant = 1.0 / 30.0  # led over 0.5 s an arm swings less
     aimed_at = (0.8, 0.0, 0.15)  # [m]
 
     def aim(self, lane: int, generator: np.random.Generator) -> None:
@@ -282,10 +282,10 @@ class _Obstructed(Arm):
 
 
 class Obstacles2D(_Obstructed):
-    """The tip is to come to (.8, .15) m in the plane of x and z, past six round obstacles of radius .1 m.
+    """The tip is to come to (0.8, 0.15) m in the plane of x and z, past six round obstacles of radius 0.1 m.
 
     Actions: for each segment what is added to its curvature, (5,). Observed: positions and velocities of nodes
-    2, 4 .. 20, bends, the goal, (47,). Reward as in `Follow`. 50 steps of .5 s.
+    2, 4 .. 20, bends, the goal, (47,). Reward as in `Follow`. 50 steps of 0.5 s.
 
     Examples
     --------
@@ -305,10 +305,10 @@ class Obstacles2D(_Obstructed):
 
 
 class Obstacles3D(_Obstructed):
-    """The tip is to come to (.8, 0, .35) m through eight capsules of radius .03 m, which every episode draws anew.
+    """The tip is to come to (0.8, 0, 0.35) m through eight capsules of radius 0.03 m, which every episode draws anew.
 
     Actions: as in `Follow`, (10,). Observed: positions and velocities of nodes 2, 4 .. 20, bends, the goal, ends of the
-    capsules, (121,). Reward as in `Follow`. 50 steps of .5 s.
+    capsules, (121,). Reward as in `Follow`. 50 steps of 0.5 s.
 
     Examples
     --------

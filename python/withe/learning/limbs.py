@@ -51,8 +51,8 @@ class Crawl(_Limbs):
 
     Actions: for each leg how much of their most its hip bends sideways, its hip bends up, its knee bends, (18,).
     Observed: height and velocity of the body; where feet and knees are from it, and their velocities; the last action,
-    (94,). Reward: way of the body along x in centimetres, less .5 of that aside, less 1 % of the squared action. 100
-    steps of .1 s.
+    (94,). Reward: way of the body along x in centimetres, less 0.5 of that aside, less 1 % of the squared action. 100
+    steps of 0.1 s.
 
     Examples
     --------
@@ -128,7 +128,7 @@ class Wrap(_Limbs):
 
     Actions: for each limb how much of their most its upper and its lower half bend towards d1 and d2, (20,). Observed:
     positions of five nodes of each limb, where the ball is, the last action, (98,). Reward: the mean over nodes in the
-    lower halves of exp(-gap / 1 cm), from 0 (far) to 1 (all touch). 60 steps of .1 s.
+    lower halves of exp(-gap / 1 cm), from 0 (far) to 1 (all touch). 60 steps of 0.1 s.
 
     Examples
     --------

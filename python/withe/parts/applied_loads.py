@@ -53,10 +53,13 @@ class AppliedLoads(ABC):
         Parameters
         ----------
         node : NodeHandle or str
+            Node on which the force acts.
         force : array_like of shape (3,) [N], or a function of time [s] that returns it
+            Force in world axes, as drawn.
         follower : bool
-            Whether it turns with the rod: half of it with either edge at the node.
+            True if the force turns with the rod, half of it with each edge at the node.
         name : str
+            Name of the load. By default "force 1", ...
 
         Returns
         -------
@@ -72,13 +75,14 @@ class AppliedLoads(ABC):
         Parameters
         ----------
         node : NodeHandle or str
+            Node on which the moment acts.
         moment : array_like of shape (3,) [N m], or a function of time [s] that returns it
-            In world axes, as the scene is drawn. Put on a simulation, the function may read it (its spins, say), once
-            before every step: a torque that depends on the state, explicitly.
+            Moment in world axes, as drawn. The function is called once before every step; if it is added to a
+            simulation, it may read the state of the simulation for an explicit feedback torque.
         follower : bool
-            Whether it turns with what it acts on: the joint or the clamp at the node, or else half of it with
-            either edge there.
+            True if the moment turns with the joint or clamp at the node, or else half of it with each edge there.
         name : str
+            Name of the load. By default "moment 1", ...
 
         Returns
         -------
@@ -87,16 +91,18 @@ class AppliedLoads(ABC):
         return _put_at_node(self._bearer, "moment", node, moment, follower, name)
 
     def add_load(self, rod: Rod | str, load: Value, *, follower: bool = False, name: str | None = None) -> Load:
-        """Add a force spread along a rod, evenly or edge by edge.
+        """Add a distributed force along a rod, constant or per edge.
 
         Parameters
         ----------
         rod : Rod or str
+            Rod on which the load acts.
         load : array_like of shape (3,) or (edges, 3) [N/m], or a function of time [s] that returns it
-            Per length of the drawn rod, in world axes. One row an edge spreads each of them over its edge.
+            Force per length of the drawn rod, in world axes: one for all edges, or one per edge.
         follower : bool
-            Whether it turns with the edges.
+            True if the load turns with the edges.
         name : str
+            Name of the load. By default "load 1", ...
 
         Returns
         -------
@@ -114,20 +120,23 @@ class AppliedLoads(ABC):
         normal: npt.ArrayLike | None = None,
         name: str | None = None,
     ) -> Load:
-        """Add a pressure on the side of a rod: a force per present length, normal x tangent, that follows the rod.
+        """Add a pressure on the side of a rod.
 
-        What a ring in a plane feels of a fluid around it: it buckles at 3 EI / R^3 [Levy 1884]. Along a closed rod
-        its work is the pressure times the area that is lost, as seen along the normal.
+        The force per present length is the pressure times normal x tangent, and follows the rod, as fluid pressure on a
+        ring does, which buckles at 3 EI / R^3 [Levy 1884]. For a closed rod, the work is the pressure times the
+        decrease of the area, seen along the normal.
 
         Parameters
         ----------
         rod : Rod or str
+            Rod on which the pressure acts.
         pressure : float or array_like of shape (edges,) [N/m], or a function of time [s] that returns it
-            Force per length, of all edges or of each. Positive pushes into a closed rod.
+            Force per length on all edges, or on each edge. Positive values push into a closed rod.
         normal : array_like of shape (3,)
-            Normal of the plane in which it pushes, which stays; the push is to the left along the rod as seen
-            from its tip. By default that about which a closed rod goes round counter-clockwise, as drawn.
+            Fixed normal of the plane in which the pressure acts; seen from its tip, the force is to the left along the
+            rod. By default the normal about which a closed rod runs counter-clockwise, as drawn.
         name : str
+            Name of the load. By default "pressure 1", ...
 
         Returns
         -------
@@ -136,7 +145,7 @@ class AppliedLoads(ABC):
         Raises
         ------
         ValueError
-            An open rod, or one that goes round no area, without a normal.
+            No normal is given for an open rod, or for a closed rod that encloses no area.
         """
         part = self._bearer.directory.rod(rod, "rod of the pressure")
         if normal is None:

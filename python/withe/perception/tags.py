@@ -123,7 +123,7 @@ def detect_tags(
 def _quads(picture: NDArray[np.uint8], family: str) -> tuple[list[int], Array]:
     """Numbers and corners of the black squares.
 
-    OpenCV finds them. Of its refinements, that for AprilTags is half a pixel off in x and y, and the others .2 px
+    OpenCV finds them. Of its refinements, that for AprilTags is half a pixel off in x and y, and the others 0.2 px
     on the mean: ours follows the sides.
     """
     cv2: Any = require("cv2", "vision")

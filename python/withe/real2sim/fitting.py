@@ -69,7 +69,7 @@ def fit(
     method : {"gauss_newton", "lbfgs", "source"}
         "source" is gradient descent by forward differences on the sum of absolute residuals [Choi, doctoral
         dissertation, University of California, Los Angeles, Algorithm 6], for constant natural curvature in a plane;
-        its unknown is a limb's whole turn in radians, its first step .1.
+        its unknown is a limb's whole turn in radians, its first step 0.1.
     shared : sequence of tuples
         Further unknowns that all frames share: natural curvature of one rod under several loads.
     conditions : callable, optional

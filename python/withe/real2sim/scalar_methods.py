@@ -59,7 +59,7 @@ def minimise_by(
 def descend(stills: Stills, frame: int, start: FloatArray, tolerance: float, max_iterations: int) -> FrameSolution:
     """Gradient descent on the sum of absolute residuals, by forward differences [Algorithm 6].
 
-    The unknowns are whole turns, natural curvature times a limb's length [rad]. The step begins at .1 in every frame,
+    The unknowns are whole turns, natural curvature times a limb's length [rad]. The step begins at 0.1 in every frame,
     and is halved whenever the loss grew.
     """
     turns = start / stills.scales

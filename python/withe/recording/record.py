@@ -51,9 +51,9 @@ class RunGradient(Protocol):
 
 
 class Record:
-    """The frames of a run. Made by `Simulation.run`, or read with `Record.load`.
+    """Frames of a run, made by `Simulation.run` or read with `Record.load`.
 
-    Every read-out is a copy, and its first axis is the frame. A rod is named by its handle or its name.
+    Arrays that methods return are copies, with the frame as first axis. Rods are given by handle or by name.
 
     Examples
     --------
@@ -86,50 +86,54 @@ class Record:
         return self.__dict__ | {"_derivatives": None}
 
     def gradient(self, by: Mapping[str, Any], wrt: Sequence[Any]) -> list[Any]:
-        """Derivatives of a scalar L of this run, by the adjoint method: one way back through its steps.
+        """Return derivatives of a scalar L of this run, by the adjoint method.
+
+        The cost is one pass backwards through the steps, for any number of parameters.
 
         Parameters
         ----------
         by : mapping
-            Words of read-outs and derivatives of L by what they say: "positions", of shape (frames, nodes, 3) [1/m],
-            "velocities", likewise [s/m], or both by rods; of rods "directors", "curvatures", "twists", "tensions",
-            "spins"; of supports and hands "reaction_forces" [1/N] and "reaction_moments" [1/(N m)], of shape
-            (frames, 3), by what `Simulation.reaction` and `Simulation.wrench` would answer at each frame after the
-            first. Such as
-            ``{"positions": dL_dx, "curvatures": {arm: dL_dk}}``, each shaped like the read-out of the record.
+            Derivatives of L by read-outs, each shaped like the read-out of the record:
+
+            * "positions" [1/m] and "velocities" [s/m], of shape (frames, nodes, 3), or by rods
+            * "directors", "curvatures", "twists", "tensions", "spins" of rods
+            * "reaction_forces" [1/N] and "reaction_moments" [1/(N m)] of supports and hands, of shape (frames, 3), for
+              `Simulation.reaction` and `Simulation.wrench` at each frame after the first
+
+            For example ``{"positions": dL_dx, "curvatures": {arm: dL_dk}}``.
         wrt : sequence
-            What to differentiate by: see `Equilibrium.gradient`; also "initial_positions" and "initial_velocities", of
-            shape (nodes, 3), where directors turn along with their edges; the "viscosity" of a resistive fluid; the
-            "friction" of an obstacle or, ``((arm, floor), "friction")``, of two bodies with one of their own, that of
-            rods with each other, "friction", and "slip_tolerance". By "position" and "rotation" of a support, and by
-            "position" of an obstacle: as if it were elsewhere by the same all the while, from the start of the run on,
-            where all that is free begins as it does. By "points" of a rod, and with them the ends of others that are
-            joined there: as if the scene were built anew and run; it must begin as it was drawn. May be empty where
-            ``calls`` are what is wanted.
+            Parameters, as in `Equilibrium.gradient`. Runs also have
+
+            * "initial_positions" and "initial_velocities", of shape (nodes, 3); directors turn with their edges
+            * "viscosity" of a resistive fluid
+            * "friction" of an obstacle, or of a pair: ``((arm, floor), "friction")``
+            * "friction" between rods, and "slip_tolerance"
+
+            "position" and "rotation" of a support and "position" of an obstacle displace it during the whole run, with
+            the same initial state of all free nodes. "points" of a rod needs a run that begins in the drawn state. The
+            sequence may be empty if only ``calls`` are of interest.
 
         Returns
         -------
         list
-            For each of `wrt`, dL over it, shaped like `Simulation.get`: over the value that it had at the start of the
-            run, as long as that acted. Its attribute ``calls`` has what was set later: one entry a call of `set`,
-            `set_natural_curvature`, `set_natural_twist`, `set_natural_stretch`, `set_friction` and `move` (of
-            supports, hands, and positions of obstacles), in their order, with ``time`` [s], ``call``, ``target``,
-            ``over`` and ``gradients``, a dict of dL over the value that each word was given, shaped like that value
-            (of a ramp: its end; of a rotation: by a rotation vector that turns it; of curvatures with
-            ``discrete=True``: by smooth ones). Under
-            the midpoint rules calls of `move` have none where L goes by reaction moments.
+            Derivative of L by the initial value of each item of `wrt`, shaped like `Simulation.get`. The attribute
+            ``calls`` has the derivatives by values that were set during the run: one entry per call of `set`,
+            `set_natural_curvature`, `set_natural_twist`, `set_natural_stretch`, `set_friction` and `move`, in order.
+            An entry has ``time`` [s], ``call``, ``target``, ``over`` and ``gradients``, a dict from parameters to
+            derivatives, shaped like the value that was set. For a ramp, the value is its end; for a rotation, a
+            rotation vector; for ``discrete=True``, the smooth curvature.
 
         Raises
         ------
         ValueError
-            The run was without ``differentiable=True``, or has no gradient and says why (contact whose stiffness was
-            not given, anchored friction, restitution below 1, Stokeslets, integrator "verlet"); a wrong shape; a
-            derivative out of the plane of a planar scene; a friction of 0.
+            A run without ``differentiable=True``; a run without a gradient, with the reason (contact without a given
+            stiffness, anchored friction, restitution below 1, Stokeslets, integrator "verlet"); a wrong shape; a
+            derivative out of the plane of a planar scene; or a friction of 0.
 
         Notes
         -----
-        Steps are taken as they ran, whatever was cut: the derivative is that of the numbers computed. Records from
-        files, and unpickled ones, have none.
+        The gradient is the exact derivative of the computed steps, subdivision included. With the midpoint rules, calls
+        of `move` have no gradient of reaction moments. Records from files, and unpickled ones, have no gradient.
         """
         if self._derivatives is None:
             raise ValueError(
@@ -162,7 +166,7 @@ class Record:
             self._array(f"rod_{index}_curvatures", (frames, rod.stencils, 2))
             self._array(f"rod_{index}_twists", (frames, rod.stencils))
             self._array(f"rod_{index}_tensions", (frames, rod.edges))
-            if f"rod_{index}_spins" in self._arrays:  # which files had none of at first
+            if f"rod_{index}_spins" in self._arrays:  # missing in old files
                 self._array(f"rod_{index}_spins", (frames, rod.edges))
         for index, obstacle in enumerate(self._obstacles):
             self._array(f"obstacle_{index}_place", (frames, 3))
@@ -201,12 +205,12 @@ class Record:
 
     @property
     def times(self) -> FloatArray:
-        """Times of the frames, shape (frames,) [s]."""
+        """Return the times of the frames, shape (frames,) [s]."""
         return self._arrays["times"].copy()
 
     @property
     def rods(self) -> tuple[RodOutline, ...]:
-        """The rods, in the order of the scene."""
+        """Return the rods, in the order of the scene."""
         return self._rods
 
     @property
@@ -234,7 +238,7 @@ class Record:
         return len(self._arrays["times"])
 
     def positions(self, rod: Named | None = None) -> FloatArray:
-        """Positions of the nodes of a rod, or of every node of the scene once.
+        """Return the positions of the nodes of a rod, or of all nodes of the scene.
 
         Returns
         -------
@@ -248,7 +252,9 @@ class Record:
         return self._nodal("positions", rod)
 
     def obstacle_position(self, obstacle: Named) -> FloatArray:
-        """Positions of an obstacle: of the point of a plane, a sphere's centre, a capsule's start, (frames, 3) [m].
+        """Return the positions of an obstacle, shape (frames, 3) [m].
+
+        This is the point of a plane, the centre of a sphere, or the start of a capsule.
 
         Raises
         ------
@@ -259,27 +265,27 @@ class Record:
         return self._arrays[f"obstacle_{index}_place"].copy()
 
     def velocities(self, rod: Named | None = None) -> FloatArray:
-        """Velocities of the nodes of a rod, or of every node once, (frames, nodes, 3) [m/s]."""
+        """Return the velocities of the nodes of a rod, or of all nodes, shape (frames, nodes, 3) [m/s]."""
         return self._nodal("velocities", rod)
 
     def directors(self, rod: Named) -> FloatArray:
-        """Material frames of the edges, (frames, edges, 3, 3), rows d1, d2, tangent."""
+        """Return the material frames of the edges, shape (frames, edges, 3, 3), with rows d1, d2, tangent."""
         return self._of_rod("directors", rod)
 
     def curvatures(self, rod: Named) -> FloatArray:
-        """Curvatures towards d1 and d2, shape (frames, stencils, 2) [1/m]."""
+        """Return the curvatures towards d1 and d2, shape (frames, stencils, 2) [1/m]."""
         return self._of_rod("curvatures", rod)
 
     def twists(self, rod: Named) -> FloatArray:
-        """Twists, shape (frames, stencils) [rad/m]."""
+        """Return the twists per length, shape (frames, stencils) [rad/m]."""
         return self._of_rod("twists", rod)
 
     def tensions(self, rod: Named) -> FloatArray:
-        """Axial forces of the edges, as `Simulation.tensions`, shape (frames, edges) [N]."""
+        """Return the tension of each edge, as `Simulation.tensions`, shape (frames, edges) [N]."""
         return self._of_rod("tensions", rod)
 
     def spins(self, rod: Named) -> FloatArray:
-        """Angular velocities of the edges about their tangents, shape (frames, edges) [rad/s].
+        """Return the angular velocities of the edges about their tangents, shape (frames, edges) [rad/s].
 
         Raises
         ------
@@ -291,11 +297,11 @@ class Record:
         return self._of_rod("spins", rod)
 
     def energy(self) -> EnergyHistory:
-        """Energies, every one an array of shape (frames,) [J]."""
+        """Return the energies, each an array of shape (frames,) [J]."""
         return EnergyHistory(*(self._arrays[f"energy_{name}"].copy() for name in ENERGIES))
 
     def keys(self) -> tuple[str, ...]:
-        """Names of what was recorded besides the read-outs."""
+        """Return the names of the quantities that ``run(record=)`` added."""
         return self._extras
 
     def __iter__(self) -> Iterator[str]:
@@ -305,12 +311,12 @@ class Record:
         return name in self._extras
 
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
-        """What `run(record={name: ...})` returned, one row a frame.
+        """Return a quantity of ``run(record={name: ...})``, one row per frame.
 
         Raises
         ------
         KeyError
-            Nothing was recorded under that name.
+            The record has no quantity of this name.
         """
         if name not in self._extras:
             known = ", ".join(map(repr, self._extras)) or "nothing"
@@ -337,9 +343,9 @@ class Record:
     # Files
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write the record to one .npz file that NumPy alone can read.
+        """Write the record to one .npz file, which NumPy can read.
 
-        For ParaView there is `to_vtk`; a table is what its columns are to be:
+        Use `to_vtk` for ParaView. To write a table, choose its columns, for example
         ``numpy.savetxt("tip.csv", numpy.column_stack([record.times, record.positions("arm")[:, -1]]), delimiter=",")``.
 
         Raises
@@ -397,11 +403,11 @@ class Record:
             ]
             obstacles = [
                 ObstacleOutline(str(o["name"]), str(o["kind"]), np.array(o["axis"], float), float(o["radius"]))
-                for o in header.get("obstacles", [])  # which files had none of at first
+                for o in header.get("obstacles", [])  # missing in old files
             ]
             springs = [
                 SpringOutline(str(each["name"]), (int(each["rows"][0]), int(each["rows"][1])))
-                for each in header.get("springs", [])  # likewise
+                for each in header.get("springs", [])
             ]
             tendons = [
                 TendonOutline(
@@ -409,7 +415,7 @@ class Record:
                     tuple((int(rod), int(edge), float(share)) for rod, edge, share in each["guides"]),
                     np.array(each["offsets"], float),
                 )
-                for each in header.get("tendons", [])  # likewise
+                for each in header.get("tendons", [])
             ]
             if "energy_spring" not in arrays:  # as in files from before there were springs
                 arrays["energy_spring"] = np.zeros(len(arrays["times"]))

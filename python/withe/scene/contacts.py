@@ -44,20 +44,24 @@ class Contacts:
         Parameters
         ----------
         height : float [m]
+            Height of the floor.
         friction : float, pair or tuple of three of float, or callable
-            Coefficient between the floor and every rod; see `set_friction` for single rods. Two coefficients are those
-            along and across a rod, as of snakes and of bristles: for a slip in the direction s on rods with the tangent
-            t, friction is the normal force times mu_along (s . t) t + mu_across (s - (s . t) t) [Hu et al. 2009, PNAS
-            106]. Three are those of a rod that slides towards its end, towards its start, and across itself: mu_along
-            is the first or the second. A callable has friction vary over the floor: `f(points)`, points of shape (n, 3)
-            [m], answers n coefficients, or an image of it does, a `FrictionMap`. It is asked before each step, where
-            nodes and edges are then, and moves and turns with its obstacle.
+            Friction coefficient between the floor and every rod; `set_friction` sets it for one rod.
+
+            * Two coefficients act along and across a rod. For slip in direction s on a rod with tangent t, friction is
+              the normal force times mu_along (s . t) t + mu_across (s - (s . t) t) [Hu et al. 2009, PNAS 106].
+            * Three coefficients act on a rod that slides towards its end, towards its start, and across itself.
+            * A callable varies friction over the floor: ``f(points)``, with points of shape (n, 3) [m], returns n
+              coefficients. It is called before each step, and moves and turns with the obstacle. A `FrictionMap` is
+              such a callable, made from an image.
         restitution : float
-            Speed after an impact over that before it, from 0 to 1; see `enable_contact`.
+            Speed after an impact over the speed before, from 0 to 1; see `enable_contact`.
         rolling_friction : float
-            Of rods that roll on it: a couple of at most this times the rod's radius times the normal force
-            [Johnson 1985, Contact Mechanics, section 9.1]. "anchored" and "implicit" friction have it.
+            Coefficient of rolling friction. The resisting couple is at most the coefficient times the radius of the
+            rod times the normal force [Johnson 1985, Contact Mechanics, section 9.1]. Needs "anchored" or "implicit"
+            friction.
         name : str
+            Name of the floor. By default "floor 1", ...
 
         Returns
         -------
@@ -66,7 +70,7 @@ class Contacts:
         Raises
         ------
         ValueError
-            A height that is no number, negative friction, or a restitution outside 0 to 1.
+            A height that is not a number, negative friction, or a restitution outside of 0 to 1.
         """
         height = validation.number(height, "height of the floor")
         name = self._directory.new_name(name, "floor")
@@ -90,18 +94,22 @@ class Contacts:
         rolling_friction: float = 0.0,
         name: str | None = None,
     ) -> Obstacle:
-        """Add a plane through a point; what is behind it, against its normal, is solid.
+        """Add a plane through a point. The half space behind the plane, against the normal, is solid.
 
-        It touches the smooth curve of a rod that its nodes stand for, and not their corners.
+        Contact acts on the smooth curve through the nodes of a rod, not on its corners.
 
         Parameters
         ----------
         point : array_like of shape (3,) [m]
+            A point of the plane.
         normal : array_like of shape (3,)
-            Of any length.
+            Normal of any length, out of the solid.
         friction : float, pair or tuple of three of float, or callable
+            Friction coefficient, as in `add_floor`.
         restitution, rolling_friction : float
+            Coefficients of restitution and rolling friction, as in `add_floor`.
         name : str
+            Name of the plane. By default "plane 1", ...
 
         Returns
         -------
@@ -129,16 +137,21 @@ class Contacts:
     ) -> Obstacle:
         """Add a solid sphere.
 
-        With a radius of an edge's length and more (its rod's included) it touches the smooth curve of a rod, or its
-        edges where it is smaller.
+        If the radii of sphere and rod together are at least the length of an edge, contact acts on the smooth curve
+        through the nodes of the rod. For smaller spheres contact acts on the straight edges.
 
         Parameters
         ----------
         center : array_like of shape (3,) [m]
+            Center of the sphere.
         radius : float [m]
+            Radius of the sphere.
         friction : float, pair or tuple of three of float, or callable
+            Friction coefficient, as in `add_floor`.
         restitution, rolling_friction : float
+            Coefficients of restitution and rolling friction, as in `add_floor`.
         name : str
+            Name of the sphere. By default "sphere 1", ...
 
         Returns
         -------
@@ -165,19 +178,23 @@ class Contacts:
         rolling_friction: float = 0.0,
         name: str | None = None,
     ) -> Obstacle:
-        """Add a solid cylinder with round ends.
+        """Add a solid capsule, which is a cylinder with round ends.
 
-        With a radius of an edge's length and more (its rod's included) it touches the smooth curve of a rod, or its
-        edges where it is smaller.
+        If the radii of capsule and rod together are at least the length of an edge, contact acts on the smooth curve
+        through the nodes of the rod. For thinner capsules contact acts on the straight edges.
 
         Parameters
         ----------
         start, end : array_like of shape (3,) [m]
-            Of its axis.
+            Ends of the axis.
         radius : float [m]
+            Radius of the capsule.
         friction : float, pair or tuple of three of float, or callable
+            Friction coefficient, as in `add_floor`.
         restitution, rolling_friction : float
+            Coefficients of restitution and rolling friction, as in `add_floor`.
         name : str
+            Name of the capsule. By default "capsule 1", ...
 
         Returns
         -------
@@ -207,75 +224,73 @@ class Contacts:
         centreline_friction: bool = False,
         overlap: Overlap = "error",
     ) -> None:
-        """Let rods touch each other and themselves. Obstacles need no such word; its tolerances are theirs too.
+        """Enable contact of rods with each other and themselves, and set the contact model.
 
-        A rod does not touch itself within (pi / 2) (2 radius + tolerance) along it, joints included.
+        Contact with obstacles is always on and uses the same model and tolerances. Places of one rod that are closer
+        than (pi / 2) (2 radius + tolerance) along the rod, joints included, do not touch each other.
 
         Parameters
         ----------
         rods : bool
-            Whether rods touch each other and themselves; False leaves them to obstacles alone, with what is said here
-            of contact and friction.
+            True if rods touch each other and themselves. False enables contact with obstacles only.
         friction : float
-            Coefficient between rods.
+            Friction coefficient between rods.
         restitution : float
-            Speed at which surfaces part after an impact over that at which they met, from 0 to 1; see Notes.
+            Speed after an impact between rods over the speed before, from 0 to 1; see Notes.
         model : {"imcv2", "barrier", "imcv1", "spillmann_teschner"}
-            Energy of contact: the smooth penalty of Choi's dissertation, (5.2), or a barrier, (5.1), which gives way
-            by what yields under growing loads. Archival, for
-            comparison: its first penalty, (4.16), and the baseline of its 4.7, a penalty without a tolerance
-            that leads out of a depth within one step.
+            Contact energy: the smooth penalty (5.2) of Choi's dissertation, or its barrier (5.1). For comparison, its
+            first penalty (4.16), and the baseline of its section 4.7, which removes a penetration within one step.
         friction_model : {"anchored", "implicit", "lagged", "semi_explicit"}
-            An elastic stick that holds a load without creep, and gives by a twentieth of the distance tolerance before
-            it slips; a force that grows with the slip velocity, at the end of
-            the step, exactly, under which what is held creeps; the same with the forces of the step's start, which
-            keeps the equations symmetric; or, archival, with the forces and the direction of slip of its start (4.5
-            of Choi's dissertation), which holds nothing that is at rest.
+            * "anchored": elastic sticking without creep. A contact yields by a twentieth of the distance tolerance
+              before it slips.
+            * "implicit": the friction force grows with the slip velocity at the end of the step. Loaded contacts creep.
+            * "lagged": as "implicit", with the normal forces of the start of the step, so that the equations stay
+              symmetric.
+            * "semi_explicit": normal forces and slip direction of the start of the step (archival; section 4.5 of
+              Choi's dissertation). Does not model static friction.
         distance_tolerance : float [m]
-            Surfaces nearer than this press on each other. By default it follows the load: 0.005 of the smaller radius
-            where that is light, and up to a tenth for forces that bend rods, 1e-4 EI / radius^2 and more. With
-            integrator "verlet" it is a tenth always.
+            Distance of surfaces below which they press on each other. By default it follows the load: 0.005 of the
+            smaller radius for light loads, up to 0.1 of the radius for forces that bend rods (1e-4 EI / radius^2 and
+            more). With integrator "verlet" always 0.1 of the radius.
         slip_tolerance : float [m/s]
-            Slip slower than this counts as sticking, with less friction than the coefficient allows.
+            Slip velocity below which a contact sticks, with less friction than the coefficient allows.
         stiffness : float [N/m] or "source"
-            Of contact; by default it follows the forces, so that surfaces are about a tenth of the distance tolerance
-            deep in each other; ten times that where a load grows a thousandfold, for what becomes stiffer under it goes
-            on pressing as hard as before. Between bodies that hardly yield, where that depth decides how hard
-            they press, give it. "source" is the rule (5.17) of Choi's dissertation: 1e5 / m times the
-            greatest force on a node in contact, for all contacts; it has a scale, that of its flagella.
+            Contact stiffness. By default it follows the forces, so that surfaces penetrate each other by about a tenth
+            of the distance tolerance (up to ten times more if a load grows by a factor of 1000). Give a value if rigid
+            bodies press a rod between them, because the penetration then determines the force. "source" is rule (5.17)
+            of Choi's dissertation: 1e5 / m times the greatest contact force on a node.
         centreline_friction : bool
-            Let friction act on the centrelines, as in Choi's dissertation, and not where surfaces touch.
+            True if friction acts on the centrelines, as in Choi's dissertation, instead of the surfaces.
         overlap : {"error", "separate"}
-            What `build` does with surfaces that are drawn inside each other: refuse them, or move rods apart,
-            quasi-statically, with supports where they are. What is moved is stressed: its natural shape stays
-            that of the drawing.
+            Treatment of surfaces that are drawn inside each other: `build` raises `ValueError`, or moves the rods apart
+            quasi-statically, with supports fixed. The natural shape stays as drawn, so moved rods are stressed.
 
         Raises
         ------
         ValueError
-            Negative friction, a restitution outside 0 to 1, a tolerance or stiffness that is not positive, a tolerance
-            above a radius; from `build`, surfaces inside each other, with both edges and the depth, and a restitution
-            below 1 with integrator "verlet".
+            Negative friction, a restitution outside of 0 to 1, a tolerance or stiffness that is not positive, or a
+            tolerance above a radius. `build` raises it for overlapping surfaces, naming both edges and the depth, and
+            for a restitution below 1 with integrator "verlet".
 
         Notes
         -----
-        Impacts are elastic by default. In implicit midpoint and energy-momentum steps the force of a step does as much
-        work as contact stores [Gonzalez 1996; Laursen and Chawla 1997], so that they are elastic at any time step,
-        those of rods mostly to a thousandth; seldom, once in some hundred impacts, a coarse step takes some percent.
-        Steps are cut where two bodies that meet would pass around each other within one; and rods that slide over each
-        other are braked by friction alone. Backward Euler, and "lagged" and "semi_explicit" friction, lose most of an
-        impact shorter than a few steps, and nothing in the limit of short ones. A restitution e below 1 is the
-        energetic coefficient: contact gives back e^2 of the work that pressed it together [Stronge 1990, Proc. R. Soc.
-        A 431]; steps are cut until an impact is resolved, which takes hundreds of times as many where rods come to rest
-        on balls and posts, unless ``adaptive=False`` or `max_halvings` of `build` ends that. Weight works over the
-        depth p too, v1^2 = e^2 v0^2 - (1 - e^2) 2 g p, which is no longer e v0 for falls of some depths only. Rods
-        shake within after an impact, so that as a whole they part more slowly than e says. Surfaces that meet more
-        slowly than sqrt(g r / 100), r the smaller radius, or than the slip tolerance, rest on each other, and so do
-        those that stay in contact for longer than an impact lasts. What contact takes for good is part of
-        `Simulation.energy().dissipated`, and what it stores is `.contact`. Contact and friction between rods in flight
-        keep their momenta in implicit midpoint and energy-momentum steps; "lagged" and "semi_explicit" friction, which
-        act where a step begins, keep the linear one, and the angular one at first order in the step: to some
-        thousandths in an impact of rods that cross, in steps of 2 ms.
+        Energy. Impacts are elastic by default. In implicit midpoint and energy-momentum steps the contact force does as
+        much work as contact stores [Gonzalez 1996; Laursen and Chawla 1997], so impacts are elastic at any time step.
+        Impacts of rods lose mostly less than 0.1 %; about one in some hundred loses a few percent in coarse steps.
+        Backward Euler, and "lagged" and "semi_explicit" friction, lose most of an impact that is shorter than a few
+        steps. Energy removed by contact is reported in `Simulation.energy().dissipated`, stored energy in `.contact`.
+
+        Restitution. The coefficient e is energetic: contact returns e^2 of the work of compression [Stronge 1990, Proc.
+        R. Soc. A 431]. With e below 1, steps are subdivided until the impact is resolved; this may take hundreds of
+        times more steps when rods come to rest on balls and posts. ``adaptive=False`` and `max_halvings` of `build`
+        limit the subdivision. Weight also does work over the penetration p: v1^2 = e^2 v0^2 - (1 - e^2) 2 g p. Rods
+        vibrate after an impact, so their mean velocity is less than e times the velocity before. Surfaces that meet
+        more slowly than sqrt(g r / 100), with the smaller radius r, or than the slip tolerance, come to rest on each
+        other; so do surfaces that stay in contact for longer than an impact.
+
+        Momentum. Contact and friction between rods conserve linear and angular momentum in implicit midpoint and
+        energy-momentum steps. "lagged" and "semi_explicit" friction conserve linear momentum, and angular momentum to
+        first order in the time step. Steps are subdivided if two bodies would pass around each other within a step.
 
         Examples
         --------
@@ -308,15 +323,16 @@ class Contacts:
         )
 
     def set_friction(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, friction: Friction) -> None:
-        """Give two rods, or a rod and an obstacle, a friction coefficient of their own.
+        """Set the friction coefficient of two rods, or of a rod and an obstacle.
 
         Parameters
         ----------
         a, b : Rod, Obstacle or str
+            The two bodies.
         friction : float, pair or tuple of three of float, array_like of shape (edges,), or callable
-            One coefficient; of a rod and an obstacle also two, along and across the rod, or three, of a rod that slides
-            towards its end, towards its start, and across itself; one for each edge of the rod (as an array, where it
-            has three edges); or a function of position on the obstacle. See `add_floor`.
+            One coefficient. For a rod and an obstacle also two or three coefficients by direction, or a function of
+            position on the obstacle, as in `add_floor`; or one coefficient per edge of the rod (as an array if the rod
+            has three edges).
 
         Raises
         ------
@@ -336,27 +352,27 @@ class Contacts:
         _set_pair(self._directory, a, b, friction=own)
 
     def set_restitution(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, restitution: float) -> None:
-        """Give two rods, or a rod and an obstacle, a coefficient of restitution of their own, from 0 to 1."""
+        """Set the coefficient of restitution of two rods, or of a rod and an obstacle, from 0 to 1."""
         _set_pair(self._directory, a, b, restitution=validation.share(restitution, "restitution"))
 
     def set_contact_stiffness(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, stiffness: float) -> None:
-        """Give two rods, or a rod and an obstacle, a contact stiffness of their own [N/m].
+        """Set the contact stiffness of two rods, or of a rod and an obstacle [N/m].
 
-        It stays as it is, and grows only where a step would end with surfaces too deep in each other.
+        The stiffness is constant, except that it grows if surfaces would penetrate each other too deeply in a step.
         """
         _set_pair(self._directory, a, b, stiffness=validation.positive(stiffness, "stiffness of contact"))
 
     def ignore_contact(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str) -> None:
-        """Let two rods, or a rod and an obstacle, pass through each other; a rod and itself too."""
+        """Disable contact of two rods, of a rod and an obstacle, or of a rod with itself."""
         _set_pair(self._directory, a, b, ignored=True)
 
     def set_contact_group(self, rod: Rod | str, group: str) -> None:
-        """Put a rod into a group, whose members do not touch each other or themselves.
+        """Put a rod into a group. Rods of one group do not touch each other or themselves.
 
         Raises
         ------
         ValueError
-            Not a rod, or a group whose name is no text.
+            The first argument is not a rod, or the group is not text.
         """
         part = self._directory.rod(rod)
         if not isinstance(group, str) or not group:

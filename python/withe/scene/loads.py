@@ -45,31 +45,36 @@ class Loads:
         damping: float = 0.0,
         name: str | None = None,
     ) -> Spring:
-        """Add a spring without mass, with a damper beside it (Kelvin and Voigt), between two nodes.
+        """Add a spring with a parallel damper (Kelvin-Voigt) between two nodes.
 
-        At length l it pulls them together by stiffness (l - rest_length) + damping dl/dt, along the line between them,
-        and stores stiffness (l - rest_length)^2 / 2, which is `energy().spring`. Nothing touches it.
+        At length l the tension is stiffness (l - rest_length) + damping dl/dt, along the line between the nodes. The
+        energy stiffness (l - rest_length)^2 / 2 is part of `energy().spring`. A spring has no mass and no contact.
 
         Parameters
         ----------
         a, b : NodeHandle or str
-            Of one rod or of two; held or free. To a place in the room: of a rod that is pinned there.
+            Nodes of one rod or of two rods, supported or free. For a fixed point, use a node of a pinned rod.
         stiffness : float [N/m]
+            Stiffness of the spring.
         rest_length : float [m]
-            By default the distance as drawn. With 0 the force is proportional to that between the nodes.
+            Length without tension. By default the drawn distance of the nodes. With 0 the tension is proportional to
+            the distance.
         damping : float [N s/m]
+            Damping coefficient.
         name : str
+            Name of the spring. By default "spring 1", ...
 
         Returns
         -------
         Spring
-            `Simulation.set` changes stiffness, rest_length and damping; `Simulation.spring_tension` is its force.
+            `Simulation.set` changes stiffness, rest_length and damping; `Simulation.spring_tension` returns the
+            tension.
 
         Raises
         ------
         ValueError
-            One and the same node, a number that is negative or not finite, or a rest_length above zero between nodes
-            that coincide.
+            A node given twice, a number that is negative or not finite, or a positive rest_length between nodes that
+            coincide.
 
         Examples
         --------
@@ -92,37 +97,38 @@ class Loads:
         tension: float = 0.0,
         name: str | None = None,
     ) -> Tendon:
-        """Add a tendon that runs through guides on rods, without friction and without mass.
+        """Add a tendon that runs through guides on rods, without friction and mass.
 
-        Its guides sit at their own offsets from the centreline, along the material directors of an edge, and turn with
-        it; at the end of a rod that is clamped, or rigid with a joint, with what holds it. From one guide to the next
-        the tendon runs straight; at the first and the last it is fixed. It pulls with the same tension T all along, so
-        that its forces are minus the gradient of T times its length [Rucker and Webster 2011, IEEE Trans. Robot. 27]:
-        straight beside a slender rod, at the offset h, it bends that with the moment T h. What it pulls at is the rods
-        alone: forces and moments of a whole tendon are in balance, as are those of a motor that sits at the base.
-        Nothing touches it, and it is never slack.
+        Each guide sits at an offset from the centreline, along the material directors of an edge, and turns with the
+        edge. At the end of a rod that is clamped or rigidly joined, a guide turns with the support or joint. The tendon
+        is straight between guides, and fixed at the first and the last guide. Its tension T is constant along its
+        length, so its forces are minus the gradient of T times its length [Rucker and Webster 2011, IEEE Trans. Robot.
+        27]: a tendon beside a slender rod, at the offset h, bends the rod with the moment T h. The forces and moments
+        of a tendon on its rods are in balance. A tendon has no contact and is never slack.
 
         Parameters
         ----------
         guides : Rod, str, or iterable of EdgeHandle, NodeHandle or str
-            Of a rod: from its start through the middle of every edge to its end. Else edges, in the middle of each,
-            and ends of rods, in the order in which the tendon runs through them: disks of a robot, say.
+            A rod, for guides at its start, in the middle of every edge, and at its end. Or edges (guides in their
+            middle) and ends of rods, in the order of the tendon.
         offset : array_like of shape (2,) or (guides, 2) [m]
-            Of all guides, or of each, along d1 and d2.
+            Offset of all guides, or of each guide, along d1 and d2.
         tension : float [N]
+            Tension, not negative.
         name : str
+            Name of the tendon. By default "tendon 1", ...
 
         Returns
         -------
         Tendon
-            `Simulation.set` changes its tension; `Simulation.tendon_length` and `tendon_points` read it. What it does
-            is in `energy().loads`, as the work of loads is.
+            `Simulation.set` changes the tension; `Simulation.tendon_length` and `tendon_points` return the geometry.
+            The work of the tension is part of `energy().loads`.
 
         Raises
         ------
         ValueError
-            Fewer than two guides, two in a row at one point, an inner node, a number that is not finite, or a tension
-            below zero.
+            Fewer than two guides, two consecutive guides at one point, an inner node, a number that is not finite, or a
+            negative tension.
 
         Examples
         --------
@@ -138,14 +144,16 @@ class Loads:
         return cast(Tendon, self._directory.add(make_tendon(self._directory, guides, offset, tension, name)))
 
     def add_drag(self, coefficient: float, *, rods: Iterable[Rod | str] | None = None, name: str | None = None) -> Drag:
-        """Add viscous drag: a force per length against the velocity. Drags on one rod add up.
+        """Add viscous drag, which is a force per length against the velocity. Several drags on one rod add up.
 
         Parameters
         ----------
         coefficient : float [Pa s]
+            Force per length and velocity.
         rods : iterable of Rod or str
-            By default every rod, those added later included.
+            Rods with this drag. By default every rod, also rods that are added later.
         name : str
+            Name of the drag. By default "drag 1", ...
 
         Returns
         -------
@@ -168,43 +176,44 @@ class Loads:
         moments: bool = False,
         name: str | None = None,
     ) -> CustomForce:
-        """Add forces that a function computes: springs, magnets, buoyancy.
+        """Add forces that a Python function computes, for example magnets or buoyancy.
 
-        Without `jacobian` they are found once a step, where the scheme's own forces act, for positions and velocities
-        extrapolated to then: to the middle of an implicit midpoint or energy-momentum step (second order;
-        an oscillation of angular frequency w, in radians a second, keeps its amplitude for w time_step < 2;
-        where neighbours go to and fro, edges carry a third of their mass, and w^2 is up to three times the
-        spring constant over the mass at a node), to the end of a backward Euler step, and at the end that
-        a Verlet step reaches.
-
-        With `jacobian` they are solved for with everything else, at every iterate of an implicit step: second order
-        too, and stable at any time step. One force of a scene that has a jacobian is enough for all of them to be asked
-        for so often. Verlet steps have no use for it.
-
-        Equilibria balance them exactly: where there is no jacobian it is found by differences, which takes six calls a
-        node for every matrix. Such forces need not have a potential, so what is in balance is not always stable; see
-        `Equilibrium.stability`.
+        Without `jacobian`, the function is called once per step, with extrapolated positions and velocities. With
+        `jacobian`, the forces are implicit and stable at any time step: the function is called in every iteration.
 
         Parameters
         ----------
         function : callable
-            ``function(time, positions, velocities)`` returns the force on every node of the scene,
-            shape (nodes, 3) [N]; time [s], positions [m] and velocities [m/s] are those at which the force
-            shall act. It may be asked for states that no step ends in, and must give the same for the same.
+            ``function(time, positions, velocities)`` returns the force on every node of the scene, shape (nodes, 3)
+            [N], at a time [s], for positions [m] and velocities [m/s] of shape (nodes, 3). The function must be
+            deterministic; it is also called for states that no step ends in.
         jacobian : callable
-            ``jacobian(time, positions, velocities)`` returns the derivative of forces by positions, a SciPy sparse
-            matrix or an array of shape (3 nodes, 3 nodes) [N/m], both in the order x, y, z of the first node, then of
-            the second; or a pair of that and the derivative by velocities [N s/m]. `Simulation.check_jacobian`
-            compares it with differences.
+            ``jacobian(time, positions, velocities)`` returns the derivative of the forces by positions: a SciPy sparse
+            matrix or an array of shape (3 nodes, 3 nodes) [N/m], in the order x, y, z of the first node, then of the
+            second. Or a pair with the derivative by velocities [N s/m]. `Simulation.check_jacobian` compares the
+            jacobian with finite differences.
         moments : bool
-            Whether the function returns a pair (forces, moments), moments of shape (nodes, 3) [N m] in world axes, as
-            those of `add_moment`: each acts on the joint or clamp at its node, or else in equal parts on the edges
-            there. The jacobian may then have 6 nodes rows, forces first.
+            True if the function returns a pair (forces, moments), with moments of shape (nodes, 3) [N m] in world axes.
+            Each moment acts on the joint or clamp at its node, or in equal parts on the edges there. The jacobian may
+            then have 6 nodes rows, forces first.
         name : str
+            Name of the force. By default "custom force 1", ...
 
         Returns
         -------
         CustomForce
+
+        Notes
+        -----
+        Without `jacobian`, positions and velocities are extrapolated to the middle of an implicit midpoint or
+        energy-momentum step, and to the end of a backward Euler or Verlet step. The method is then of second order, and
+        an oscillation of angular frequency w keeps its amplitude for w time_step < 2. For modes in which neighbouring
+        nodes move against each other, w^2 is up to three times the stiffness over the mass at a node. If one force of a
+        scene has a jacobian, all custom forces are implicit. Verlet steps do not use the jacobian.
+
+        Equilibria balance custom forces exactly. Without `jacobian`, the derivative is found by finite differences with
+        six calls per node. Custom forces need not have a potential, so an equilibrium may be unstable; see
+        `Equilibrium.stability`.
 
         Examples
         --------
@@ -242,34 +251,36 @@ class Loads:
     ) -> Fluid:
         """Surround all rods by a viscous fluid without inertia, at rest far away (Stokes flow).
 
-        It neither carries (for buoyancy, change `gravity`) nor resists spin about a rod's tangent. What rods lose to it
-        is in `energy().dissipated`.
+        The fluid has no buoyancy (change `gravity` for this), and does not resist spin about the tangent of a rod. The
+        energy that it removes is part of `energy().dissipated`.
 
         Parameters
         ----------
         viscosity : float [Pa s]
+            Dynamic viscosity mu.
         model : {"stokeslets", "resistive"}
-            With "stokeslets" every piece of a rod moves the fluid at all others: regularized Stokeslet segments
-            [Cortez 2018, J. Comput. Phys. 375], whose dense equations are solved once a step, for velocities as
-            they are then; what these change within the step meets a local drag, so steps stay stable. The work of a
-            step grows with the square of the number of nodes. With "resistive" each piece is resisted as if alone,
-            -mu (c_t v_t + c_n v_n) per length, exactly and implicitly; rods do not feel each other.
+            * "stokeslets": regularized Stokeslet segments [Cortez 2018, J. Comput. Phys. 375], by which rods move each
+              other. The dense equations are solved once per step, and an implicit local drag keeps the step stable. The
+              cost grows with the square of the number of nodes.
+            * "resistive": resistive-force theory, with the force -mu (c_t v_t + c_n v_n) per length, exact and
+              implicit. Rods do not interact through the fluid.
         regularization : float [m]
-            Of "stokeslets" (not used by the other): the length over which a point force is spread. By default sqrt(e)
-            = 1.65 times the radius, for which a thin rod has the resistance that slender-body theory gives to a
-            cylinder; then the radius must be the same all over the scene. Edges of a third of it or more are needed.
+            Length over which a Stokeslet is spread, for "stokeslets" only. By default sqrt(e) = 1.65 times the radius,
+            for which a thin rod has the resistance of a cylinder in slender-body theory; all radii must then be equal.
+            Edges must be at least a third of this length.
         wavelength : float [m]
-            Of "resistive" (not used by the other): of waves along the rods, such as the length of one turn of a helix,
-            for c_t = 2 pi / ln(.18 wavelength / radius), c_n = 4 pi / (ln(.18 wavelength / radius) + 1/2)
-            [Lighthill 1976]. By default rods are taken as straight, those that are joined in a row as one of their
-            whole length: c_t = 2 pi / (ln(length / radius) - 1/2), c_n = 4 pi / (ln(length / radius) + 1/2), as of
-            spheroids [Happel and Brenner 1965].
+            Wavelength of the rods, such as the length of one turn of a helix, for "resistive" only:
+            c_t = 2 pi / ln(0.18 wavelength / radius), c_n = 4 pi / (ln(0.18 wavelength / radius) + 1/2)
+            [Lighthill 1976]. By default rods count as straight, and rods joined in a row as one rod:
+            c_t = 2 pi / (ln(length / radius) - 1/2), c_n = 4 pi / (ln(length / radius) + 1/2), as of spheroids
+            [Happel and Brenner 1965].
         name : str
+            Name of the fluid. By default "fluid 1".
 
         Returns
         -------
         Fluid
-            `Simulation.set` changes its viscosity.
+            `Simulation.set` changes the viscosity.
 
         Raises
         ------

@@ -33,11 +33,12 @@ FloatArray = npt.NDArray[np.float64]
 @keyword_hints
 @known_attributes("use a method such as set_friction, or an option of build")
 class Scene(AppliedLoads, Loads, Contacts, Supports):
-    """A description of rods, joints, supports and loads, from which simulations are built.
+    """Describe rods, joints, supports and loads, and build simulations from the description.
 
     Parameters
     ----------
     gravity : array_like of shape (3,) [m/s^2]
+        Acceleration of free fall.
 
     Examples
     --------
@@ -72,12 +73,12 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         return self._directory.rods
 
     def __getitem__(self, name: str) -> Any:
-        """The handle of the part, node or edge of that name: ``scene["arm"]``, ``scene["arm.end"]``.
+        """Return the handle of a part, node or edge by its name: ``scene["arm"]``, ``scene["arm.end"]``.
 
         Raises
         ------
         ValueError
-            There is none.
+            The scene has no part, node or edge of this name.
         """
         return self._directory.handle(name)
 
@@ -112,46 +113,50 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         discrete: bool = False,
         name: str | None = None,
     ) -> Rod:
-        """Add a rod, from end to end or along any centreline. It stretches, bends and twists; it does not shear.
+        """Add a rod between two ends or along a centreline.
+
+        The rod stretches, bends and twists. It does not shear (Kirchhoff rod).
 
         Parameters
         ----------
         start, end : array_like of shape (3,) [m]
-            Ends of a straight rod of `nodes` nodes.
+            Ends of a straight rod with `nodes` nodes.
         points : array_like of shape (n, 3) [m]
-            Centreline instead. Its points are the nodes, and the edges between them the rod; or `nodes`
-            asks for so many evenly spaced by arc length along it. Edges are then chords, and have the mass
-            and, where the rod is curved by nature, the compliance of their arcs: give smooth curves so.
+            Centreline, instead of `start` and `end`. Without `nodes`, the points are the nodes of the rod. With
+            `nodes`, the centreline is sampled at even arc lengths: its edges are then chords with the mass and the
+            natural compliance of their arcs. Use `nodes` for smooth curves.
         nodes : int
             Number of nodes, ends included.
         closed : bool
-            Whether the last point is joined to the first (which may be repeated at the end).
+            True if the last point is joined to the first, which may be repeated at the end.
         normal : array_like of shape (3,) or (edges, 3)
-            First director of the first edge, which the others get by parallel transport, or of every
-            edge; made normal to the edge. By default the first coordinate axis not close to the edge.
+            First director of the first edge, from which the other edges get theirs by parallel transport; or the first
+            director of every edge. The part along the edge is removed. By default the first coordinate axis that is
+            not close to the edge.
         radius : float or array_like of shape (edges,) [m]
-            Of a circular section; no more than ten times the length of the rod.
+            Radius of a circular section, at most ten times the length of the rod.
         section : Circle, Tube or Rectangle
-            Section instead of a radius; a rectangle's width lies along the first director.
+            Section, instead of a radius. The width of a rectangle lies along the first director.
         contact_radius : float or array_like of shape (edges,) [m]
-            Of the round surface that touches obstacles and rods, apart from the section, which gives stiffness and
-            mass and is drawn. By default the radius, of a rectangle half its smaller side: what lies flat.
+            Radius of the round surface that touches obstacles and rods. It does not change stiffness, mass or pictures.
+            By default the radius; for a rectangle half its smaller side.
         material : Material
+            Material, from which stiffness and mass follow.
         stiffness : Stiffness
-            Stiffnesses instead of a material, with `line_density`.
+            Stiffnesses, instead of a material. Needs `line_density`.
         line_density : float or array_like of shape (edges,) [kg/m]
             Mass per length.
         natural : {"as_built", "straight", "in_balance"}
-            Shape that is free of stress: the one drawn, or straight, or that with which the rod hangs as it is drawn,
-            under its weight and what loads, tendons and joints do as the scene is built.
+            Natural (stress-free) shape: as drawn, straight, or the shape with which the drawn rod is in equilibrium
+            under the weight, loads, tendons and joints of the scene.
         natural_curvature : array_like of shape (2,) or (stencils, 2) [1/m]
-            Stress-free curvature towards d1 and d2 instead, that of the smooth rod.
+            Natural curvature towards d1 and d2, instead of the one of `natural`.
         natural_twist : float or array_like of shape (stencils,) [rad/m]
-            Stress-free twist instead.
+            Natural twist, instead of the one of `natural`.
         discrete : bool
-            Whether natural_curvature is 2 tan(phi / 2) [-], phi the angle between two edges.
+            True if `natural_curvature` is given as 2 tan(phi / 2) [-], with phi the angle between two edges.
         name : str
-            By default "rod 1", "rod 2", ...
+            Name of the rod. By default "rod 1", "rod 2", ...
 
         Returns
         -------
@@ -160,7 +165,7 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         Raises
         ------
         ValueError
-            What cannot be a rod: the message names the argument, what was expected and what came.
+            An argument is out of range or contradicts another one. The message names the argument.
 
         Examples
         --------
@@ -242,50 +247,52 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         moment: float = 0.0,
         name: str | None = None,
     ) -> Joint | tuple[Joint, ...]:
-        """Make nodes that coincide one: two of them, or any number.
+        """Join two or more coincident nodes rigidly, by a pin or by a hinge.
 
-        Several nodes are joined to the first, each by a joint of its own. Joins at the same node add up. Revolute ones
-        there all turn against one rod, to which each of the others is joined; a clamp at that node holds that rod.
+        With more than two nodes, each of the others is joined to the first by its own joint. Further calls may add
+        rods to the same node. All revolute joints at one node turn against the same rod, to which each of the others
+        must be joined; a clamp at this node holds that rod.
 
-        A revolute joint has an angle theta, by which b has turned about the axis since it was drawn, seen from a, by
-        the right-hand rule. Its motor, spring and damper turn b, and a the other way, by the torque
+        The angle theta of a revolute joint is the rotation of `b` relative to `a` about the axis since the drawing,
+        by the right-hand rule. Motor, spring and damper act on `b` with the torque
 
-            moment - stiffness (theta - rest_angle) - damping dtheta/dt.
+            moment - stiffness (theta - rest_angle) - damping dtheta/dt,
 
-        A stiffness whose rest_angle `Simulation.set` moves is a servo; `Simulation.joint_angle` reads theta.
+        and on `a` with the opposite torque. For a servo, give a stiffness and move `rest_angle` by `Simulation.set`.
+        `Simulation.joint_angle` returns theta.
 
         Parameters
         ----------
         a, b, *others : NodeHandle or str
-            Ends or inner nodes, of several rods or of one.
+            Ends or inner nodes of one or several rods.
         kind : {"rigid", "pinned", "revolute"}
-            Whether the rods keep their angles, may turn freely, or about one axis. It may follow the nodes by position.
+            Relative rotation of the rods: none, free, or about one axis. May follow the nodes by position.
         axis : array_like of shape (3,)
-            Of a revolute joint, as it is drawn; it turns with a.
+            Axis of a revolute joint as drawn. The axis turns with `a`.
         form : {"frame", "pairs"}
-            A rigid joint as a body of its own, bent against every edge, or as one bending element for
-            every pair of edges (archival; stiffer).
+            Model of a rigid joint: "frame" is a body that is bent against every edge, "pairs" is one bending element
+            for every pair of edges (archival and stiffer).
         stiffness : float [N m/rad]
-            Of a revolute joint, as are those that follow. What it stores is in `energy().spring`.
+            Stiffness of the spring of a revolute joint. Its energy is part of `energy().spring`.
         rest_angle : float [rad]
-            At which the spring is free of stress; whole turns count.
+            Angle at which the spring is free of stress, whole turns included.
         damping : float [N m s/rad]
+            Damping coefficient of a revolute joint.
         moment : float [N m]
-            Of a motor; its work is in `energy().loads`, as that of loads is.
+            Torque of the motor of a revolute joint. Its work is part of `energy().loads`.
         name : str
-            Of several joints "NAME 1", "NAME 2", ...
+            Name of the joint. Several joints are named "NAME 1", "NAME 2", ...
 
         Returns
         -------
-        Joint
-            Of two nodes; else a tuple of joints, of the first node with each of the others in turn.
+        Joint or tuple of Joint
+            One joint for two nodes. For more, the joints of the first node with each of the others, in order.
 
         Raises
         ------
         ValueError
-            Nodes that are apart by more than 1e-9 of the scene, one and the same node, joins that contradict each
-            other, or an axis, a stiffness, a rest_angle, a damping or a moment without a revolute joint. Then nothing
-            is joined.
+            Nodes further apart than 1e-9 of the scene, a node given twice, contradicting joints at one node, or an
+            axis, stiffness, rest_angle, damping or moment without ``kind="revolute"``. Then no node is joined.
 
         Examples
         --------
@@ -329,7 +336,9 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         max_halvings: int | None = None,
         max_steps: int | None = None,
     ) -> Simulation:
-        """Turn the scene into the equations that it needs, ready to run. The scene may go on changing.
+        """Build a simulation of the scene.
+
+        Later changes of the scene do not affect the simulation.
 
         Parameters
         ----------
@@ -340,48 +349,49 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
             * "implicit_midpoint" (second order) conserves momentum. Its energy drifts where edges turn by more than
               about 0.1 rad in a step; a drift above 1 % of the greatest kinetic energy warns with
               :class:`withe.EnergyDriftWarning`.
-            * "fourth_order" composes five energy-momentum steps, the third of which goes back in time. It refuses
-              contact and viscosity, and takes drag only up to mass over time_step. Once a support has moved, the mass
-              of the edges that supports hold sits at their nodes, an error of the mesh that no step removes: 3 % of
-              the deflection of a cantilever whose clamp is accelerated with 5 nodes, 0.02 % with 17.
+            * "fourth_order" composes five energy-momentum steps, the third of which goes back in time. It does not
+              support contact and viscosity, and drag only up to mass over time_step. Once a support has moved, the
+              mass of held edges is lumped at their nodes: for a cantilever with an accelerated clamp, the deflection
+              is wrong by 3 % with 5 nodes and by 0.02 % with 17 nodes, at any time step.
             * "verlet" (second order) is explicit and stable for short time steps only.
             * "static" takes quasi-static steps, without mass.
         time_step : float [s]
+            Time step, which `adaptive` and `tolerance` may subdivide.
         adaptive : bool
-            Whether an implicit step that fails is halved; steps grow back. So are those in which surfaces that graze
-            would go through each other, impacts are not resolved for their restitution, or a clamp turns by more than
-            a quarter of a radian, but under backward Euler.
+            True to halve implicit steps that do not converge; later steps grow back. Except with backward Euler, steps
+            are also subdivided for glancing contacts, for impacts with restitution, and for clamps that turn by more
+            than 0.25 rad.
         tolerance : float [m]
-            Cut steps so that the error of positions stays below it, over `duration`. A fifth of it is kept for events
-            such as impacts, in which steps go by the error of each rather than by that per unit of time.
+            Bound on the error of positions over `duration`, by which steps are subdivided. A fifth of the bound is
+            reserved for events such as impacts.
         planar : bool
-            Force two or three dimensions; by default a scene that lies in a plane is solved in it, also where it
-            could buckle out of it: `equilibrium` warns of that, and steps stay in the plane as exact ones would. A
-            straight scene without gravity lies in many, and ``True`` takes that in which its revolute joints turn, or
-            that of its first director.
-            Loads that are functions and custom forces may leave any plane; with ``True`` they must not.
+            True for two dimensions, False for three. By default a planar scene is solved in its plane, and
+            `equilibrium` warns if the scene would buckle out of the plane. With True, custom forces and loads that are
+            functions must stay in the plane. A straight scene without gravity is solved in the plane of its revolute
+            joints, or of its first director.
         duration : float [s]
-            Over which `tolerance` holds; 1 s by default.
+            Time over which `tolerance` bounds the error. By default 1 s.
         bending : {"angle", "tangent"}
-            What bending strain is: the angle phi between two edges, to sixth order, or 2 tan(phi / 2) as in
-            [Bergou et al. 2008], which bends too stiffly on coarse meshes, and with which edges are always the
-            rod and never chords of its arcs.
+            Measure of bending strain: the angle phi between two edges, to sixth order; or 2 tan(phi / 2)
+            [Bergou et al. 2008], which is too stiff on coarse meshes and does not model the arcs of edges.
         solver : {"automatic", "band", "sparse"}
+            Solver of the linear equations.
         line_search : {"automatic", "goldstein_price"}
+            Line search of Newton's method.
         mixed : bool
-            Newton's method with the axial forces as unknowns of their own.
+            True to solve for axial forces as separate unknowns in Newton's method.
         step_tolerance : float
-            A Newton step below it, relative to the length of the scene, has converged.
+            Bound on the last Newton step, relative to the length of the scene.
         force_tolerance : float
-            And forces out of balance below it, relative to those in the scene.
+            Bound on the residual, relative to the forces in the scene.
         max_iterations : int
-            Of one Newton solve.
+            Maximum number of iterations of one Newton solve.
         max_halvings : int
-            The smallest step is time_step / 2^max_halvings; 12 by default, 20 with a tolerance. A run that needs
-            smaller ones ends in a :class:`withe.ConvergenceError`.
+            Bound on subdivision: the smallest step is time_step / 2^max_halvings. By default 12, and 20 with a
+            tolerance. If a smaller step is needed, the run raises :class:`withe.ConvergenceError`.
         max_steps : int
-            Inner steps that error control may take in one time step; by default 3e7 over the number of nodes, about
-            half a minute on one core. More raise a :class:`withe.ConvergenceError`, which names remedies.
+            Maximum number of inner steps in one time step with a tolerance. By default 3e7 over the number of nodes,
+            about half a minute on one core. More raise :class:`withe.ConvergenceError`.
 
         Returns
         -------
@@ -390,8 +400,8 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         Raises
         ------
         ValueError
-            A scene without rods, planar=True for one that lies in no plane, an explicit step above
-            the stable limit, "fourth_order" with viscosity or strong drag, or an option out of range.
+            A scene without rods, planar=True for a scene that is not planar, an explicit step above the stable limit,
+            "fourth_order" with viscosity or strong drag, or an option out of range.
         """
         options = BuildOptions(
             integrator=integrator,
@@ -416,16 +426,16 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         return Simulation._build(directory, self._gravity.copy(), options)
 
     def build_batch(self, n: int, *, workers: int | None = None, **options: Any) -> Batch:
-        """Build the scene many times over, for simulations that go side by side, as in reinforcement learning.
+        """Build a batch of equal simulations that step together, for example for reinforcement learning.
 
         Parameters
         ----------
         n : int
-            How many simulations.
+            Number of simulations.
         workers : int, optional
-            Number of threads that step them; by default one a processor.
+            Number of threads. By default one per processor.
         **options
-            As in `build`.
+            Options of `build`.
 
         Returns
         -------

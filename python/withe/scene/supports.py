@@ -31,19 +31,21 @@ class Supports:
         spin: bool = False,
         name: str | None = None,
     ) -> Support:
-        """Hold a node in place, and the direction and roll of its rod.
+        """Fix the position of a node, and the direction and roll of its rod.
 
         Parameters
         ----------
         node : NodeHandle or str
+            Node to clamp.
         hold : {"frame", "edge"}
-            Clamp the rod at the node itself, as a wall does, or hold its end edge: both its nodes and
-            its angle.
+            "frame" clamps the rod at the node, as a wall does. "edge" holds the end edge: both of its nodes and its
+            angle.
         free : array_like of shape (3,) or (2, 3)
             Directions along which the clamp may slide.
         spin : bool
-            Whether it may turn about the rod's tangent, which it goes on holding.
+            True if the rod may spin about its tangent, whose direction stays held.
         name : str
+            Name of the support. By default "clamp 1", ...
 
         Returns
         -------
@@ -52,14 +54,14 @@ class Supports:
         Raises
         ------
         ValueError
-            A node that is held already.
+            The node already has a support.
         """
         return _hold(self._directory, make_clamp(self._directory, node, hold, free, spin, name))
 
     def pin(self, node: NodeHandle | str, *, free: npt.ArrayLike | None = None, name: str | None = None) -> Support:
-        """Hold a node in place, and leave its rod free to turn.
+        """Fix the position of a node. The rod is free to turn.
 
-        Arguments, result and refusals are those of `clamp`.
+        Arguments, return value and errors are those of `clamp`.
         """
         return _hold(self._directory, make_pin(self._directory, node, free, name))
 
@@ -77,40 +79,42 @@ class Supports:
         feed_rate: float | None = None,
         name: str | None = None,
     ) -> Hand:
-        """Take hold of a rod by a hand, anywhere along it.
+        """Grasp a rod anywhere along its length by a hand.
 
-        The hand holds every edge that its length touches: a short one that between two nodes. They are held as one
-        rigid piece, of the shape that it has then. A hand that yields holds them by a bed of springs as long
-        as itself instead; what springs resist a turn of a long hand by, k length^2 / 12 for stiffness k across it,
-        adds to the stiffness about. Its energy is in `energy().spring`, and what hands do in ``energy().work``.
-        `Simulation.move`, `release`, `wrench`, `deflection` and `pose` take it.
+        A hand holds every edge that its length covers, and at least one, as one rigid piece with the present shape.
+        With `stiffness` the hand is compliant and holds the edges by a bed of springs along its length. The springs
+        also resist rotation, with k length^2 / 12 for stiffness k across the rod, in addition to the given stiffness.
+        Their energy is part of `energy().spring`; the work of hands is part of ``energy().work``.
+        `Simulation.move`, `release`, `wrench`, `deflection` and `pose` accept hands.
 
         Parameters
         ----------
         rod : Rod or str
+            Rod to grasp.
         at : float [m]
-            Arc length from the start of the rod, undeformed.
+            Undeformed arc length from the start of the rod to the middle of the hand.
         length : float [m]
-            Of the rod that is held, half of it on either side. With 0 a point.
+            Undeformed length of the rod that is held. With 0 the hand holds one point.
         pose : pair of array_like of shape (3,) [m] and rotation, array_like of shape (7,) or (4, 4)
-            Where the hand is: its position and its axes in the world. A rotation is a matrix of shape (3, 3) or a SciPy
-            Rotation; seven numbers are x, y, z, qw, qx, qy, qz, a matrix is homogeneous. By default
-            the hand is at the rod's point, and its axes are d1, d2 and the tangent there.
+            Position and axes of the hand in the world. A rotation is a matrix of shape (3, 3) or a SciPy Rotation.
+            Seven numbers are x, y, z, qw, qx, qy, qz; a matrix of shape (4, 4) is homogeneous. By default the hand is
+            at the point of the rod, with the axes d1, d2 and tangent.
         stiffness : pair, or array_like of shape (6,) [N/m, N m/rad]
-            Along d1, d2 and the tangent of what is held, and about them; of a pair each is one number for all three
-            or three. By default the hand does not yield.
+            Stiffness along d1, d2 and the tangent of the held rod, and about these axes. Each item of a pair is one
+            number for all three axes, or three numbers. By default the hand is rigid.
         force_limit : float [N]
-            Beyond which what is held slips through a hand that yields, as dry friction lets it; or a drive.
+            Force above which the rod slips through a compliant hand, as with dry friction, or a drive slips.
         slides : bool
-            Whether it is a ring, which the rod passes through: it holds the rod across, by one stiffness [N/m], and
-            neither along itself nor its direction. By default it is as stiff as an edge there is to stretching.
-            Two rings hold a direction. Rods leave a ring whose end passes it, with a `RingLeftWarning`.
+            True for a ring, through which the rod slides. A ring holds the rod across by one stiffness [N/m], by
+            default the stretching stiffness of an edge, but neither along the rod nor its direction. If the end of the
+            rod passes the ring, the ring is released with a `RingLeftWarning`.
         friction : float
-            Coulomb's coefficient of a ring that is not driven.
+            Coulomb friction coefficient of a ring without a drive.
         feed_rate : float [m/s]
-            Of a drive in the ring, which holds the rod along itself: by how much of its undeformed length it feeds the
-            rod towards its end, forwards through the ring. 0 holds it, until ``hand.feed`` sets another.
+            Undeformed length per time that a drive in the ring feeds towards the end of the rod. 0 holds the rod;
+            ``hand.feed`` changes the rate.
         name : str
+            Name of the hand. By default "hand 1", ...
 
         Returns
         -------
@@ -119,9 +123,9 @@ class Supports:
         Raises
         ------
         ValueError
-            Off the rod, an edge that is held already (two hands may hold neighbours: who came first holds the node
-            between them), a node that a clamp or a pin holds, a stiffness or force limit that is not positive,
-            friction that is negative, friction of a ring that is driven, or either without a ring.
+            A place off the rod, an edge that is already held, or a node that a clamp or pin holds. A stiffness or
+            force limit that is not positive, negative friction, friction of a driven ring, or a ring option without
+            ``slides=True``. Two hands may hold neighbouring edges; the first hand holds their common node.
 
         Examples
         --------

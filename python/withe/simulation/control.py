@@ -30,26 +30,27 @@ class Control:
     def set_natural_curvature(
         self, rod: Rod | str, curvature: npt.ArrayLike, over: float = 0.0, *, discrete: bool = False
     ) -> None:
-        """Actuate a rod by changing the curvature at which it is free of stress.
+        """Actuate a rod by setting its natural (stress-free) curvature.
 
-        A curvature out of the plane of a planar simulation makes it three-dimensional, unless it was
-        built with planar=True.
+        A curvature out of the plane of a planar simulation makes the simulation three-dimensional, unless it was built
+        with planar=True.
 
         Parameters
         ----------
         rod : Rod or str
+            Rod to actuate.
         curvature : array_like of shape (2,) or (stencils, 2) [1/m]
-            Towards the two directors; one pair for the whole rod, or one a stencil.
+            Natural curvature towards d1 and d2: one pair for the whole rod, or one per stencil.
         over : float [s]
-            Reached after so long, evenly; at once by default.
+            Duration of a linear ramp to the value. By default the change is immediate.
         discrete : bool
-            Whether the curvature is 2 tan(phi / 2) [-], phi the angle between two edges.
+            True if the curvature is given as 2 tan(phi / 2) [-], with phi the angle between two edges.
 
         Raises
         ------
         ValueError
-            Wrong shape, not finite, a turn of pi or more at a node, or out of the plane of a simulation
-            that was built with planar=True.
+            A wrong shape, a value that is not finite, a turn of pi or more at a node, or a curvature out of the plane
+            with planar=True.
 
         Examples
         --------
@@ -65,19 +66,21 @@ class Control:
         self._session.note("set_natural_curvature", part, {"natural_curvature": given}, float(over))
 
     def set_natural_twist(self, rod: Rod | str, twist: npt.ArrayLike, over: float = 0.0) -> None:
-        """Actuate a rod by changing the twist at which it is free of stress.
+        """Actuate a rod by setting its natural (stress-free) twist.
 
         Parameters
         ----------
         rod : Rod or str
+            Rod to actuate.
         twist : float or array_like of shape (stencils,) [rad/m]
+            Natural twist: one value for the whole rod, or one per stencil.
         over : float [s]
-            Reached after so long, evenly; at once by default.
+            Duration of a linear ramp to the value. By default the change is immediate.
 
         Raises
         ------
         ValueError
-            Wrong shape, not finite, or not zero in a simulation that was built with planar=True.
+            A wrong shape, a value that is not finite, or a twist that is not zero with planar=True.
         """
         part = self._session.directory.rod(rod)
         values = twist_array(twist, part.voronoi, part.owner)
@@ -85,24 +88,25 @@ class Control:
         self._session.note("set_natural_twist", part, {"natural_twist": np.asarray(twist)}, float(over))
 
     def set_natural_stretch(self, rod: Rod | str, stretch: npt.ArrayLike, over: float = 0.0) -> None:
-        """Actuate a rod by changing the length at which it is free of stress, as a muscle or a bellows does.
+        """Actuate a rod by setting its natural (stress-free) stretch, as a muscle or a bellows does.
 
-        The axial force is then n = EA (l / L - s), with s the natural stretch and L the drawn length of an edge: the
-        reference strain of a Cosserat rod along its tangent [Antman 2005, chapter 8]. Mass and what resists bending and
-        twisting stay those of the drawn lengths.
+        The tension is n = EA (l / L - s), with the natural stretch s and the drawn length L of an edge: s is the
+        reference strain of a Cosserat rod along its tangent [Antman 2005, chapter 8]. Mass, bending and twisting
+        stiffness keep the values of the drawn lengths.
 
         Parameters
         ----------
         rod : Rod or str
+            Rod to actuate.
         stretch : float or array_like of shape (edges,) [-]
             Natural length over drawn length: 1 as drawn, 0.9 for a muscle that shortens by a tenth.
         over : float [s]
-            Reached after so long, evenly; at once by default.
+            Duration of a linear ramp to the value. By default the change is immediate.
 
         Raises
         ------
         ValueError
-            Wrong shape, not finite, or not positive.
+            A wrong shape, or a value that is not finite or not positive.
 
         Examples
         --------
@@ -116,33 +120,39 @@ class Control:
     # Parameters
 
     def set(self, target: Settable | str | None = None, /, **values: Any) -> None:
-        """Change parameters while the simulation runs.
+        """Set parameters of a part or of the scene.
 
         Parameters
         ----------
         target : handle or str
-            None for what belongs to the whole scene; two bodies, such as `(arm, floor)`, for what is between them.
+            Part to change. None for the scene; a pair such as ``(arm, floor)`` for the contact of two bodies.
         **values
-            Of a rod: youngs_modulus, poisson_ratio, density, viscosity, stretch_stiffness, bend_stiffness,
-            twist_stiffness, line_density, viscous_time, drag (numbers, or one an edge), natural_curvature,
-            natural_twist, natural_stretch (natural over drawn length; see `set_natural_stretch`). Of a load: force,
-            moment, load or pressure, constant or a function of time. Of a mass: mass. Of a spring: stiffness,
-            rest_length, damping. Of a tendon: tension. Of a revolute joint: stiffness, rest_angle, damping, moment, as
-            `Scene.join` has them. Of a drag: drag. Of a fluid: viscosity, and the regularization [m] of Stokeslets. Of
-            an obstacle: friction, as `Scene.add_floor` takes it, rolling_friction and restitution. Of two bodies:
-            friction, as `Scene.set_friction` takes it. Of a support: position, rotation, as `move` takes them, and the
-            friction of a ring. Of the scene: gravity, friction and restitution between rods, the slip_tolerance of
-            friction, and the contact_stiffness [N/m], or None for one that follows the forces. See `set_restitution`
-            and `set_contact_stiffness` for two bodies.
+            Parameters of the target:
 
-            Of a rod, youngs_modulus sets stretch_stiffness, bend_stiffness, twist_stiffness and viscous_time too,
-            poisson_ratio twist_stiffness, density line_density, and viscosity viscous_time. Where one call has both,
-            the latter are as given, in whatever order; a later call of the former makes them anew.
+            * rod: youngs_modulus, poisson_ratio, density, viscosity, stretch_stiffness, bend_stiffness,
+              twist_stiffness, line_density, viscous_time, drag (one number, or one per edge), natural_curvature,
+              natural_twist, natural_stretch
+            * load: force, moment, load or pressure, constant or a function of time
+            * mass: mass
+            * spring: stiffness, rest_length, damping
+            * tendon: tension
+            * revolute joint: stiffness, rest_angle, damping, moment; see `Scene.join`
+            * drag: drag
+            * fluid: viscosity, and the regularization [m] of Stokeslets
+            * obstacle: friction, rolling_friction, restitution; see `Scene.add_floor`
+            * pair of bodies: friction; see `Scene.set_friction`
+            * support: position, rotation; see `move`; friction of a ring
+            * scene: gravity, friction and restitution between rods, slip_tolerance, contact_stiffness [N/m] (None for a
+              stiffness that follows the forces)
+
+            youngs_modulus also sets stretch_stiffness, bend_stiffness, twist_stiffness and viscous_time of a rod;
+            poisson_ratio sets twist_stiffness, density sets line_density, and viscosity sets viscous_time. If one call
+            gives both, the special value holds. A later call with the general value replaces the special one.
 
         Raises
         ------
         ValueError
-            A word that the target does not have, or a value out of range; then nothing is changed.
+            A parameter that the target does not have, or a value out of range. Then nothing is changed.
 
         Examples
         --------
@@ -152,27 +162,29 @@ class Control:
         set_values(self._session, target, values)
 
     def get(self, target: Settable | Support | str, word: str | None = None) -> Any:
-        """The present value of what `set` sets.
+        """Return the present value of a parameter of `set`.
 
         Parameters
         ----------
         target : handle or str
-            Or "gravity", "friction" or "restitution" of rods with each other, "slip_tolerance", "contact_stiffness".
+            Part to read. Or "gravity", "friction" or "restitution" between rods, "slip_tolerance" or
+            "contact_stiffness".
         word : str
-            As in `set`; of an obstacle "position" and "turn" too, which `move` changes; of a rod its "radius".
+            Parameter, as in `set`. Obstacles also have "position" and "turn", rods "radius".
 
         Returns
         -------
         float or ndarray
-            Stiffnesses and what else belongs to edges one an edge, (edges,); natural curvature
-            (stencils, 2) and twist (stencils,), natural stretch (edges,); loads (3,), or (edges, 3)
-            where they were so put on; positions (3,) [m], rotations (3, 3) and turns (3,) [rad] from
-            what was drawn. What belongs to a material as it was set.
+            * stiffnesses and other parameters of edges: shape (edges,)
+            * natural curvature (stencils, 2), natural twist (stencils,), natural stretch (edges,)
+            * loads (3,), or (edges, 3) if given per edge
+            * positions (3,) [m], rotations (3, 3), and turns (3,) [rad] since the drawing
+            * parameters of a material: as they were set
 
         Raises
         ------
         ValueError
-            A word that the target does not have.
+            A parameter that the target does not have.
 
         Examples
         --------
@@ -184,17 +196,17 @@ class Control:
     # Loads and custom forces
 
     def remove(self, load: Load | str) -> None:
-        """Take off a load that was put on while running; it acts no more from now on.
+        """Remove a load that was added during the simulation.
 
         Parameters
         ----------
         load : Load or str
-            As `add_force`, `add_moment`, `add_load` or `add_pressure` of the simulation returned it.
+            Load, as returned by `add_force`, `add_moment`, `add_load` or `add_pressure` of the simulation.
 
         Raises
         ------
         ValueError
-            A load that is not there any more, or one of the scene as it was drawn.
+            The load was already removed, or belongs to the scene.
 
         Examples
         --------
@@ -204,16 +216,16 @@ class Control:
         remove_load(self._session, load)
 
     def check_jacobian(self, force: CustomForce | str | None = None) -> None:
-        """Compare the jacobian of a custom force with differences of its function, at the present state.
+        """Compare the jacobian of a custom force with finite differences at the present state.
 
         Parameters
         ----------
         force : CustomForce or str
-            By default all that have a jacobian, one after the other.
+            Force to check. By default all custom forces with a jacobian.
 
         Raises
         ------
         ValueError
-            A jacobian that is wrong, with the entry that is farthest off; or none.
+            The jacobian differs; the message names the entry with the greatest error. Or there is no jacobian.
         """
         check_jacobian(self._session, force)

@@ -39,16 +39,16 @@ class Measurements:
 
     @property
     def rods(self) -> tuple[Rod, ...]:
-        """Handles of all rods, in the order of the scene."""
+        """Return the handles of all rods, in the order of the scene."""
         return self._session.directory.rods
 
     def positions(self, rod: Rod | str | None = None) -> FloatArray:
-        """Positions of the nodes of a rod, or of every node of the scene once.
+        """Return the positions of the nodes of a rod, or of all nodes of the scene.
 
         Returns
         -------
         ndarray of shape (nodes, 3) [m]
-            Of the whole scene without a rod; `rod.rows` are a rod's rows there.
+            Without a rod, every node of the scene once; `rod.rows` are the rows of a rod.
 
         Raises
         ------
@@ -63,7 +63,9 @@ class Measurements:
         )
 
     def obstacle_position(self, obstacle: Obstacle | str) -> FloatArray:
-        """Where an obstacle is: the point of a plane, a sphere's centre, a capsule's start, shape (3,) [m].
+        """Return the position of an obstacle, shape (3,) [m].
+
+        This is the point of a plane, the centre of a sphere, or the start of a capsule.
 
         Raises
         ------
@@ -74,7 +76,7 @@ class Measurements:
         return np.array(self._session.world.obstacle_position(self._session.directory.all(ObstaclePart).index(part)))
 
     def velocities(self, rod: Rod | str | None = None) -> FloatArray:
-        """Velocities of the nodes of a rod, or of every node once, shape (nodes, 3) [m/s]."""
+        """Return the velocities of the nodes of a rod, or of all nodes of the scene, shape (nodes, 3) [m/s]."""
         velocities = self._session.world.velocities()
         return (
             velocities
@@ -83,27 +85,27 @@ class Measurements:
         )
 
     def directors(self, rod: Rod | str) -> FloatArray:
-        """Material frames of the edges, shape (edges, 3, 3), rows d1, d2, tangent."""
+        """Return the material frames of the edges, shape (edges, 3, 3), with rows d1, d2, tangent."""
         return self._session.world.directors(self._session.directory.rod(rod).index).reshape(-1, 3, 3)
 
     def curvatures(self, rod: Rod | str) -> FloatArray:
-        """Curvatures towards d1 and d2, shape (stencils, 2) [1/m]."""
+        """Return the curvatures towards d1 and d2, shape (stencils, 2) [1/m]."""
         return self._session.world.curvatures(self._session.directory.rod(rod).index)
 
     def twists(self, rod: Rod | str) -> FloatArray:
-        """Twists, shape (stencils,) [rad/m]."""
+        """Return the twists per length, shape (stencils,) [rad/m]."""
         return self._session.world.twists(self._session.directory.rod(rod).index)
 
     def tensions(self, rod: Rod | str) -> FloatArray:
-        """Axial forces of the edges, pulling is positive, shape (edges,) [N].
+        """Return the tension of each edge, positive in tension, shape (edges,) [N].
 
-        After a step by the midpoint rule those in its middle, where forces are in balance, as reactions are: an edge
-        that turns by w in a step is longer at its end by w^2 / 8, which takes no force. Else those of the state.
+        After an implicit midpoint step, the tension is the one in the middle of the step, where the forces balance (an
+        edge that turns by w in a step ends with the spurious strain w^2 / 8). Otherwise it is the one of the state.
         """
         return self._session.world.tensions(self._session.directory.rod(rod).index)
 
     def spring_tension(self, spring: Spring | str) -> float:
-        """Axial force of a spring and its damper, pulling is positive [N].
+        """Return the force of a spring and its damper, positive in tension [N].
 
         Raises
         ------
@@ -113,10 +115,10 @@ class Measurements:
         return spring_tension(self._session, self._session.directory.find(spring, SpringPart, "spring"))
 
     def tendon_length(self, tendon: Tendon | str) -> float:
-        """From its first guide to its last, along a tendon [m]: what a motor that shortens it has to take in.
+        """Return the length of a tendon from its first guide to its last [m].
 
-        Forces are minus the gradient of the tension times this. Half an edge at a free end is straight in the rod's
-        energy; counted is the arc l / 2 as which it bends under the tension T at an offset r, T r^2 l / (2 EI).
+        The forces of a tendon are minus the gradient of its tension times this length. At a free end, the last half
+        edge of length l / 2 counts as bent by the tension T at the offset r, which adds T r^2 l / (2 EI).
 
         Raises
         ------
@@ -126,7 +128,7 @@ class Measurements:
         return tendon_length(self._session, self._session.directory.find(tendon, TendonPart, "tendon"))
 
     def tendon_points(self, tendon: Tendon | str) -> FloatArray:
-        """Where the guides of a tendon are, shape (guides, 3) [m].
+        """Return the positions of the guides of a tendon, shape (guides, 3) [m].
 
         Raises
         ------
@@ -136,9 +138,9 @@ class Measurements:
         return tendon_points(self._session, self._session.directory.find(tendon, TendonPart, "tendon"))
 
     def joint_angle(self, joint: Joint | str) -> float:
-        """By how much the second rod of a revolute joint has turned about its axis since it was drawn [rad].
+        """Return the angle of a revolute joint since the drawing [rad].
 
-        Seen from the first, by the right-hand rule; whole turns are counted.
+        The angle is the rotation of the second rod relative to the first, by the right-hand rule, whole turns included.
 
         Raises
         ------
@@ -148,9 +150,10 @@ class Measurements:
         return self._session.world.joint_angle(find_joint(self._session, joint))
 
     def joint_rate(self, joint: Joint | str) -> float:
-        """The rate of `joint_angle` [rad/s]: the mean of the last step (by fourth order, of its last part).
+        """Return the rate of `joint_angle` [rad/s].
 
-        Before the first one, and where a state was set, by how the edges at either side turn.
+        The rate is the mean over the last step; with "fourth_order", over its last inner step. Before the first step,
+        and after a state was set, the rate follows from the velocities of the edges at the joint.
 
         Raises
         ------
@@ -160,7 +163,7 @@ class Measurements:
         return self._session.world.joint_rate(find_joint(self._session, joint))
 
     def joint_torque(self, joint: Joint | str) -> float:
-        """By what its motor, spring and damper turn the second rod of a revolute joint, see `Scene.join` [N m].
+        """Return the torque of motor, spring and damper on the second rod of a revolute joint [N m]. See `Scene.join`.
 
         Raises
         ------
@@ -170,7 +173,7 @@ class Measurements:
         return self._session.world.joint_torque(find_joint(self._session, joint))
 
     def spins(self, rod: Rod | str) -> FloatArray:
-        """Angular velocities of the edges about their tangents, shape (edges,) [rad/s]."""
+        """Return the angular velocities of the edges about their tangents, shape (edges,) [rad/s]."""
         return self._session.world.spins(self._session.directory.rod(rod).index)
 
     @overload
@@ -180,18 +183,18 @@ class Measurements:
     def energy(self, rod: Rod | str) -> RodEnergy: ...
 
     def energy(self, rod: Rod | str | None = None) -> Energy | RodEnergy:
-        """Energies of the whole scene, or of one rod [J].
+        """Return the energies of the scene, or of one rod [J].
 
         Parameters
         ----------
         rod : Rod or str, optional
+            Rod whose energies are returned.
 
         Returns
         -------
-        Energy
-            Without a rod.
-        RodEnergy
-            Of a rod; loads, contact, work and dissipation belong to the scene.
+        Energy or RodEnergy
+            Energies of the scene without a rod, or of the rod. Loads, contact, work and dissipation belong to the scene
+            only.
         """
         if rod is not None:
             part = self._session.world.rod_energy(self._session.directory.rod(rod).index)
@@ -200,11 +203,11 @@ class Measurements:
         return Energy(**{name: getattr(energy, name) for name in Energy.__dataclass_fields__})
 
     def momentum(self) -> Momentum:
-        """Linear momentum, and angular momentum about the origin, of the whole scene.
+        """Return the linear momentum of the scene, and its angular momentum about the origin.
 
-        By the masses that the equations of motion have, nodes that supports hold included. Sum of x cross (M v) over
-        nodes, M the mass matrix, of I omega t over edges that spin at omega about their tangents t, and of what the
-        frames of joints carry.
+        The masses are the ones of the equations of motion, supported nodes included. The angular momentum is the sum of
+        x cross (M v) over nodes, with the mass matrix M; of I omega t over edges, with spin omega about the tangent t;
+        and of the momentum of joint frames.
 
         Returns
         -------
@@ -225,65 +228,69 @@ class Measurements:
         return Momentum(np.array(momentum.linear), np.array(momentum.angular))
 
     def reaction(self, support: Support | NodeHandle | str) -> Reaction:
-        """Force and moment of a support on the rod.
+        """Return the force and moment of a support on its rod.
 
-        In motion, the means over the last time step, of all its parts where it was cut (`statistics.steps` counts
-        parts): with all other forces, those by which momentum grew in that time. The moment is about the node,
-        wherever that goes. Times the way and the turn of a step
-        that was not cut they are what ``energy().work`` counts, to second order in the step. A support that starts or
-        stops at full speed gives what it holds its speed by an impulse, which is part of the force of that step: its
-        work is that times the mean of both speeds, half of what the way of the step would say.
+        During motion these are means over the last time step, inner steps included: together with all other forces they
+        account for the change of momentum. The moment is about the node.
 
         Parameters
         ----------
         support : Support, NodeHandle or str
-            A support, or the node that it holds.
+            The support, or its node.
 
         Raises
         ------
         ValueError
-            Nothing holds that node.
+            The node has no support.
+
+        Notes
+        -----
+        Force times displacement plus moment times rotation of a step without subdivision is the work in
+        ``energy().work``, to second order in the time step. A support that starts or stops at full speed applies an
+        impulse, which is part of the force of this step. Its work is the impulse times the mean of both velocities,
+        half of the force times the displacement.
         """
         index, _ = find_support(self._session, support)
         reaction = self._session.world.reaction(index)
         return Reaction(np.array(reaction.force), np.array(reaction.moment))
 
     def wrench(self, hand: Hand | str, about: npt.ArrayLike | None = None) -> Reaction:
-        """Force and moment of a hand on the rod, of all that it holds as one.
+        """Return the total force and moment of a hand on its rod.
 
-        In motion, the means over the last time step, of all its parts where it was cut. Together with gravity and other
-        forces they are by what momentum and angular momentum grew.
+        During motion these are means over the last time step, inner steps included: together with all other forces they
+        account for the change of linear and angular momentum.
 
         Parameters
         ----------
         hand : Hand or str
+            The hand.
         about : array_like of shape (3,) [m]
-            The point of the world that the moment is about; by default where the hand is.
+            Point about which the moment is taken. By default the position of the hand.
 
         Raises
         ------
         ValueError
-            No hand, or released.
+            Not a hand, or a released one.
         """
         return hand_wrench(self._session, hand, about)
 
     def deflection(self, hand: Hand | str) -> Deflection:
-        """How far what a hand that yields holds has gone from where it was grasped; zero of one that does not.
+        """Return the displacement of the held part of the rod relative to the hand. Zero for a rigid hand.
 
         Raises
         ------
         ValueError
-            No hand, or released.
+            Not a hand, or a released one.
         """
         return hand_deflection(self._session, hand)
 
     def passage(self, ring: Hand | str) -> Passage:
-        """How a rod passes a ring now: where along itself, and what the ring does to it there.
+        """Return the place where a rod passes a ring, and the forces of the ring on the rod.
 
         Raises
         ------
         ValueError
-            No ring, or released, or left by its rod.
+            Not a ring, or one that was released or left by its rod.
 
         Examples
         --------
@@ -294,32 +301,37 @@ class Measurements:
         return ring_passage(self._session, ring)
 
     def pose(self, support: Support | NodeHandle | str) -> HeldPose:
-        """Position and rotation of a support or a hand now; with `free`, where its node slides from.
+        """Return the present position and rotation of a support or hand.
+
+        For a support with `free`, the position is the one from which its node slides.
 
         Raises
         ------
         ValueError
-            Nothing holds that node.
+            The node has no support.
         """
         return support_pose(self._session, support)
 
     def contacts(self) -> npt.NDArray[np.void]:
-        """What touches now.
+        """Return the present contacts, as of the end of the last step.
 
         Returns
         -------
-        structured ndarray, a row per contact
-            "pair" (two names) and "edge" (their edges, -1 for an obstacle), "distance" of the centrelines
-            and "gap" of the surfaces [m], "point" between them [m], "normal" from the second to the first,
-            "normal_force" [N] and "friction" on the first [N], as the last step ended, "sticking".
+        structured ndarray, one row per contact
+            * "pair", "edge": names of the two bodies, and their edges (-1 for an obstacle)
+            * "distance", "gap": distance of the centrelines and of the surfaces [m]
+            * "point": point between the surfaces [m]
+            * "normal": unit vector from the second body to the first
+            * "normal_force", "friction": forces on the first body [N]
+            * "sticking": True if the contact does not slip
         """
         return contact_table(self._session.directory, self._session.world.contacts())
 
     def link(self, rod: Rod | str) -> float:
-        """Link of a rod [turns]: its twist and its writhe.
+        """Return the link of a rod, which is the sum of its twist and writhe [turns].
 
-        Kept by a closed rod, and by an open one whose ends are held and do not spin, as long as nothing
-        passes through it [Calugareanu 1961]. An open rod is carried on straight from both ends.
+        The link of a closed rod is constant as long as no rod passes through it; so is the link of an open rod whose
+        ends are held and do not spin [Calugareanu 1961]. An open rod is extended straight at both ends.
 
         Returns
         -------
@@ -331,13 +343,13 @@ class Measurements:
 
     @property
     def statistics(self) -> Statistics:
-        """What the work so far took."""
+        """Return counts and times of the work so far."""
         statistics = self._session.world.statistics
         return Statistics(**{name: getattr(statistics, name) for name in Statistics.__dataclass_fields__})
 
     @property
     def plan(self) -> Plan:
-        """What was decided for this scene: ``print(simulation.plan)``."""
+        """Return the decisions of `build` for this scene: ``print(simulation.plan)``."""
         plan, parts = self._session.world.plan, self._session.directory.all(RodPart)
         length = sum(float(part.arcs.sum()) for part in parts)
         rods = zip(parts, self._session.settings.rods, strict=True)

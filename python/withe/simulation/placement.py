@@ -38,22 +38,22 @@ class Placement:
         spin: bool = False,
         name: str | None = None,
     ) -> Support:
-        """Hold a node where it is now, and the direction and roll of its rod. See `Scene.clamp`.
+        """Clamp a node in its present position and direction. See `Scene.clamp`.
 
         Raises
         ------
         ValueError
-            A node that is held already.
+            The node already has a support.
         """
         return put_on(self._session, make_clamp(self._session.directory, node, hold, free, spin, name))
 
     def pin(self, node: NodeHandle | str, *, free: npt.ArrayLike | None = None, name: str | None = None) -> Support:
-        """Hold a node where it is now. See `Scene.pin`.
+        """Pin a node in its present position. See `Scene.pin`.
 
         Raises
         ------
         ValueError
-            A node that is held already.
+            The node already has a support.
         """
         return put_on(self._session, make_pin(self._session.directory, node, free, name))
 
@@ -71,20 +71,20 @@ class Placement:
         feed_rate: float | None = None,
         name: str | None = None,
     ) -> RunningHand:
-        """Take hold of a rod by a hand, where it is and as it is now: nothing jumps. See `Scene.grasp`.
+        """Grasp a rod by a hand in its present pose. See `Scene.grasp`.
 
-        A hand that does not yield brings what it holds to rest, or to its own motion, within the next time step.
+        A rigid hand brings the held edges to rest, or to its own motion, within the next time step.
 
         Returns
         -------
         RunningHand
-            A handle with methods of its own: ``move``, ``wrench``, ``release``, ``pose``, ``deflection``, of a ring
+            A handle with the methods ``move``, ``wrench``, ``release``, ``pose`` and ``deflection``; a ring also has
             ``passage`` and ``feed``.
 
         Raises
         ------
         ValueError
-            As `Scene.grasp`.
+            See `Scene.grasp`.
 
         Examples
         --------
@@ -99,12 +99,12 @@ class Placement:
         return RunningHand(handle.scene_id, handle.name, self._session)
 
     def hand(self, hand: Support | str) -> RunningHand:
-        """A hand of this simulation, by its handle or name, with the methods of what `grasp` returns.
+        """Return a hand of this simulation by its handle or name, with the methods of `RunningHand`.
 
         Raises
         ------
         ValueError
-            No hand, or released.
+            Not a hand of this simulation, or a released one.
 
         Examples
         --------
@@ -116,13 +116,14 @@ class Placement:
         return RunningHand(self._session.directory.scene_id, name, self._session)
 
     def feed(self, ring: Support | str, rate: float) -> None:
-        """Let the drive of a ring feed its rod from now on; see ``feed_rate`` of `Scene.grasp`.
+        """Set the feed rate of a ring with a drive; see ``feed_rate`` of `Scene.grasp`.
 
         Parameters
         ----------
         ring : Hand or str
+            A ring with a drive.
         rate : float [m/s]
-            Undeformed length of the rod that goes through the ring towards its end; negative: back.
+            Undeformed length per time that is fed towards the end of the rod. Negative rates feed backwards.
 
         Raises
         ------
@@ -132,17 +133,17 @@ class Placement:
         feed_ring(self._session, ring, rate)
 
     def release(self, support: Support | NodeHandle | str) -> None:
-        """Let go of a node.
+        """Remove a support.
 
         Parameters
         ----------
         support : Support, NodeHandle or str
-            A support, or the node that it holds.
+            The support, or its node.
 
         Raises
         ------
         ValueError
-            Nothing holds that node.
+            The node has no support.
         """
         release(self._session, support)
 
@@ -157,45 +158,46 @@ class Placement:
         over: float = 0.0,
         path: PathLike | None = None,
     ) -> None:
-        """Move a support or an obstacle, or let it move along a path from now on.
+        """Move a support or an obstacle to a target, or along a path.
 
-        What is not given goes on as it does: a position, a tangent, a rotation or a roll that is on its way arrives
-        when it was to arrive, and a path goes on in what else it gives.
+        Ramps and paths of other quantities continue: for example, a position that is still ramping arrives as planned
+        when only a rotation is given. The work on the rods is part of ``energy().work``.
 
         Parameters
         ----------
         support : Support, NodeHandle, Obstacle or str
-            A support, the node that it holds, or a floor, plane, sphere or capsule: its position is that of the point
-            of a plane, the centre of a sphere, the start of a capsule. What it does to rods is part of
-            ``energy().work``.
+            A support or its node, or a floor, plane, sphere or capsule. The position of an obstacle is the point of a
+            plane, the centre of a sphere, or the start of a capsule.
         position : array_like of shape (3,) [m]
+            Target position.
         rotation : array_like of shape (4,) or (3, 3), or a SciPy Rotation
-            A unit quaternion (w, x, y, z), a matrix, or a Rotation.
-            Relative to the orientation as drawn; of a hand, its axes in the world as columns.
+            Target rotation: a unit quaternion (w, x, y, z), a matrix or a Rotation, relative to the drawn orientation.
+            For a hand, its axes in the world, as columns.
         tangent : array_like of shape (3,)
-            Where the rod is to point, instead: the smallest turn from the drawn tangent, and then ...
+            Target direction of the rod, instead of a rotation: the smallest turn from the drawn tangent, followed by
+            `roll`. For a sphere, the axis of `roll`.
         roll : float [rad]
-            ... a turn about it. Full turns count, and take time: at most half a turn in a time step. With
-            integrator="static" they need no time: `equilibrium` and a step follow a roll of any size that is given
-            without `over`. An obstacle turns so about the normal of a plane, the axis of a capsule from start to end,
-            or the tangent that is given for a sphere: rollers, drums and turntables, which drag rods by friction. A
-            belt is a plane that moves along itself.
+            Rotation about the tangent, full turns included: at most half a turn per time step. With
+            integrator="static", `equilibrium` and steps follow any roll without `over`. A plane rolls about its
+            normal, a capsule about its axis from start to end, and drags rods by friction.
         over : float [s]
-            Reached after so long, evenly; within the next step by default.
+            Duration of the ramp to the target. By default the target is reached within the next step.
         path : callable, pair of callables, or array_like of shape (poses, 4) or (poses, 8)
-            Instead of all these: a function of time [s] that returns a position, a position and a
-            rotation, or seven numbers x, y, z, qw, qx, qy, qz; or one for the position and one for the rotation, such
-            as a CubicSpline and a RotationSpline of SciPy; of an obstacle, a function that returns a position and a
-            roll (of a sphere, times the axis, shape (3,)). Or rows (t, x, y, z) or (t, x, y, z, qw, qx, qy, qz), times
-            of the simulation [s] that grow, and unit quaternions with the scalar first: evenly from one to the next,
-            at rest before the first and after the last. What a path does not give when it is set goes on as it did.
-            `path` of a plan has such rows, and `withe.io.load_poses` reads them from tables of poses, which have the
-            scalar last.
+            Path, instead of the targets above.
+
+            * A function of time [s] that returns a position; a position and a rotation; or the seven numbers
+              x, y, z, qw, qx, qy, qz.
+            * Two functions of time, one for the position and one for the rotation, such as a CubicSpline and a
+              RotationSpline of SciPy.
+            * For an obstacle, a function that returns a position and a roll; for a sphere the roll times its axis.
+            * Rows (t, x, y, z) or (t, x, y, z, qw, qx, qy, qz), with increasing times of the simulation [s] and unit
+              quaternions, scalar first. Poses are interpolated, and constant before the first and after the last row.
+              `withe.io.load_poses` reads such rows from tables with the scalar last.
 
         Raises
         ------
         ValueError
-            Nothing holds that node, a direction for a pin or an obstacle, or arguments that contradict each other.
+            The node has no support, a direction is given for a pin or an obstacle, or arguments contradict each other.
 
         Examples
         --------
@@ -215,7 +217,7 @@ class Placement:
         move_obstacle(self._session, *obstacle, position, tangent, roll, over, path)
 
     def set_friction(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, friction: Friction) -> None:
-        """Give two rods, or a rod and an obstacle, another friction coefficient of their own. See `Scene.set_friction`.
+        """Change the friction coefficient of two rods, or of a rod and an obstacle. See `Scene.set_friction`.
 
         Raises
         ------
@@ -225,14 +227,14 @@ class Placement:
         set_pair_friction(self._session, a, b, friction)
 
     def set_restitution(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, restitution: float) -> None:
-        """Give two rods, or a rod and an obstacle, another coefficient of restitution of their own.
+        """Change the coefficient of restitution of two rods, or of a rod and an obstacle.
 
-        It acts from the next step on, on impacts that are under way too.
+        The change acts from the next step on, also on impacts that have begun.
 
         Raises
         ------
         ValueError
-            Two obstacles, or a number outside 0 to 1.
+            Two obstacles, or a number outside of 0 to 1.
 
         Examples
         --------
@@ -241,9 +243,9 @@ class Placement:
         set_pair_restitution(self._session, a, b, restitution)
 
     def set_contact_stiffness(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, stiffness: float) -> None:
-        """Give two rods, or a rod and an obstacle, another contact stiffness of their own [N/m].
+        """Change the contact stiffness of two rods, or of a rod and an obstacle [N/m].
 
-        What that does to the energy of surfaces that press is work of actuation; see `Scene.set_contact_stiffness`.
+        The change of contact energy is part of ``energy().work``. See `Scene.set_contact_stiffness`.
 
         Raises
         ------
@@ -266,36 +268,37 @@ class Placement:
         directors: npt.ArrayLike | None = None,
         spins: npt.ArrayLike | None = None,
     ) -> None:
-        """Put a rod elsewhere, at once. What is not given stays as it is.
+        """Set the state of a rod. Arguments that are not given keep their present values.
 
-        Joints turn with the edges at them. The energy that this puts in does not count as work: the balance of
-        ``energy()`` begins anew. What a rod whose nodes move touches is met anew, as in a drawing; other contacts go
-        on. A state out of the plane of a planar simulation makes it three-dimensional, unless
-        it was built with planar=True.
+        Joints turn with their edges. The energy balance of ``energy()`` begins anew, without counting the change as
+        work. Contacts of the moved rod are detected anew, as at the start; other contacts keep their history. A state
+        out of the plane of a planar simulation makes the simulation three-dimensional, unless it was built with
+        planar=True.
 
         Parameters
         ----------
         rod : Rod or str
+            Rod to change.
         positions : array_like of shape (nodes, 3) [m]
-            The first director of the first edge follows by the smallest turn. Nodes that a support holds must stay, or
-            go to the position to which `move` moved the support without `over`.
+            Positions of the nodes. The first director of the first edge follows by the smallest turn. Supported nodes
+            must stay, or be at the place to which `move` moved their support without `over`.
         velocities : array_like of shape (nodes, 3) or (3,) [m/s]
-            A support that moves otherwise stops the nodes that it holds, or carries them along, in the next step.
+            Velocities of the nodes. Supports impose their own velocity on their nodes in the next step.
         twist : float or array_like of shape (stencils,) [rad/m]
-            As `twists` reads it. By default that of now; a closed rod spreads evenly what new positions
-            change of it, so that it is closed again.
+            Twist per length, as `twists` returns it. By default the present twist; in a closed rod, a difference due to
+            new positions is spread evenly.
         directors : array_like of shape (edges, 3, 3) or (edges, 3)
-            Instead of twist: as `directors` reads them, or the first ones alone. Each stencil then has the least of
-            the twists that fit, less than half a turn.
+            Directors, instead of twist: as `directors` returns them, or the first ones only. The twist of each stencil
+            is then less than half a turn.
         spins : float or array_like of shape (edges,) [rad/s]
             Angular velocities of the edges about their tangents.
 
         Raises
         ------
         ValueError
-            Wrong shapes, not finite, directors that are not normal to their edges, twist that does not close a
-            closed rod, an edge without length, a rod that folds right back, a node that is held, surfaces that
-            would overlap, or what leaves the plane of a simulation built with planar=True. Then nothing is changed.
+            A wrong shape or a value that is not finite; directors that are not normal to their edges; twist that does
+            not close a closed rod; an edge of zero length or folded back; a moved supported node; overlapping surfaces;
+            or a state out of the plane with planar=True. Then nothing is changed.
 
         Examples
         --------
@@ -306,19 +309,20 @@ class Placement:
     def set_velocities(self, rod: Rod | str | None, velocities: npt.ArrayLike) -> None:
         """Set the velocities of the nodes of a rod.
 
-        A support that moves otherwise stops the nodes that it holds, or carries them along, in the next step:
-        `reaction` contains that impulse divided by the duration of the time step. A rod and its support that move
-        together from the start need both: the velocities here and the way of the support by `move(path=)`.
+        Supports impose their own velocity on their nodes in the next step; `reaction` then contains the impulse divided
+        by the time step. If a rod and its support move together from the start, set the velocities here and the motion
+        of the support by `move(path=)`.
 
         Parameters
         ----------
-        rod : Rod or str
-            None for every node of the scene.
+        rod : Rod or str or None
+            Rod to change. None for every node of the scene.
         velocities : array_like of shape (nodes, 3) or (3,) [m/s]
+            Velocities of the nodes, or one velocity for all.
 
         Raises
         ------
         ValueError
-            Wrong shape, or not finite.
+            A wrong shape, or a value that is not finite.
         """
         set_velocities(self._session, rod, velocities)

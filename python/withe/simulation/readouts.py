@@ -16,22 +16,22 @@ FloatArray = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Energy:
-    """Energies [J].
+    """Energies of a scene [J].
 
-    Work is booked by time steps. `equilibrium` and static steps go from one balance to the next by paths of their own:
-    they add nothing to `loads` and `dissipated`, and to `work` nothing of what supports do.
+    Time steps account for all work. `equilibrium` and static steps do not: they add nothing to `loads` and
+    `dissipated`, and no work of supports to `work`.
 
     Attributes
     ----------
     kinetic, stretch, bend, twist, gravity, contact, spring
     loads
-        Minus the work done by loads, motors of joints, tendons and custom forces since the start.
+        Minus the work of loads, motors of joints, tendons and custom forces since the start.
     total
         Sum of the above.
     work
-        Done by supports and actuation since the start.
+        Work of supports and actuation since the start.
     dissipated
-        By viscosity, drag, dampers, fluids and contact since the start.
+        Energy removed by viscosity, drag, dampers, fluids and contact since the start.
     """
 
     kinetic: float
@@ -49,7 +49,7 @@ class Energy:
 
 @dataclass(frozen=True, eq=False)
 class Momentum:
-    """Momenta of everything in a scene: nodes, the mass along edges, their spin, the frames of joints.
+    """Linear and angular momentum of a scene, with the spin of edges and the frames of joints.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class Momentum:
 
 @dataclass(frozen=True, eq=False)
 class Reaction:
-    """What a support does to the rod.
+    """Force and moment of a support on its rod.
 
     Attributes
     ----------
@@ -79,11 +79,10 @@ class Reaction:
 
 @dataclass(frozen=True)
 class RodEnergy:
-    """Energies of one rod [J]; those of all rods sum up to what the scene has of each.
+    """Energies of one rod [J]. The energies of all rods add up to those of the scene.
 
-    What rods share is divided: a node's kinetic energy and weight, with any mass added there, by the masses of the
-    half edges that meet at it, and bending across a joint by halves. Loads, contact, work and dissipation belong to
-    the scene: see `Energy`.
+    Kinetic energy and weight of a shared node are divided by the masses of the half edges at the node, and bending
+    energy across a joint in equal parts. Loads, contact, work and dissipation belong to the scene; see `Energy`.
 
     Attributes
     ----------
@@ -102,25 +101,23 @@ class RodEnergy:
 
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
-    """How a static equilibrium was found, and how it depends on what acts.
+    """Result of `Simulation.equilibrium`: stability, convergence, and derivatives of the equilibrium.
 
     Attributes
     ----------
     stable : bool
-        Whether no small motion would grow. A scene that is solved in a plane, as its `plan` says, stays in it, but
-        motions out of it count too, with an `OutOfPlaneWarning` where one would grow; not so if it was built with
-        planar=True, or under friction, custom forces and loads that turn with the rod.
+        True if no small motion would grow. Motions out of the plane of a planar scene count too, and an unstable one
+        warns with `OutOfPlaneWarning`; they do not count with planar=True, friction, custom forces or follower loads.
     stability : {"stable", "diverges", "flutters"}
-        Where one grows, whether steadily or swinging, which only loads that turn with the rod can make it do; see
-        `Linearisation.stability`. Friction counts as what it does to the stiffness.
+        Growth of the unstable motion: steady, or oscillating, which needs follower loads. See
+        `Linearisation.stability`. Friction enters by its stiffness.
     branch_changed : bool
-        Whether the equilibrium lies on another branch than the state before: the path of equilibria along which
-        supports move and loads change ended on the way (at a limit point), or lost its stability (at a bifurcation);
-        the scene then went on dynamically, losing energy, to what it settled in.
+        True if the equilibrium lies on another branch than the state before. The branch ended at a limit point, or lost
+        its stability at a bifurcation, and the scene moved dynamically to another equilibrium.
     iterations : int
-        Of Newton's method.
+        Number of iterations of Newton's method.
     residual : float [N]
-        Greatest force out of balance that is left.
+        Greatest residual force.
     """
 
     stable: bool
@@ -132,45 +129,51 @@ class Equilibrium:
     _jacobian: Callable[[Any, Sequence[Any]], list[FloatArray]] = field(repr=False)
 
     def gradient(self, dL_dx: npt.ArrayLike | Mapping[str, Any], wrt: Sequence[Any]) -> list[Any]:
-        """Derivatives of a scalar L of this equilibrium, by the adjoint method.
+        """Return derivatives of a scalar L of this equilibrium, by the adjoint method.
 
-        One solve with the transposed stiffness, whatever the number of unknowns: with g the derivative of L by all
-        unknowns q of the equilibrium R(q, p) = 0, r = -K^-T g gives dL/dp = r^T dR/dp [Giles and Pierce 2000, 2.1].
+        The cost is one linear solve for any number of parameters.
 
         Parameters
         ----------
         dL_dx : array_like of shape (nodes, 3) [1/m], or mapping
-            Derivative of L by the positions of all nodes of the scene, as `Simulation.positions()` has them. Or words
-            of read-outs with derivatives by them: "positions", so or by rods; of rods "directors", "curvatures",
-            "twists", "tensions", of supports and hands "reaction_forces" [1/N] and "reaction_moments" [1/(N m)], as
-            `Simulation.reaction` and `Simulation.wrench` answer, such as
-            ``{"curvatures": {arm: dL_dk}, "reaction_forces": {wall: dL_dF}}``, each shaped like the read-out. A number
-            that a read-out depends on directly, as a tension does on the stiffness, counts with that too.
+            Derivative of L by the positions of all nodes, as `Simulation.positions()` returns them. Or a mapping from
+            read-outs to derivatives, each shaped like the read-out:
+
+            * "positions", for all nodes or for rods
+            * "directors", "curvatures", "twists", "tensions" of rods
+            * "reaction_forces" [1/N] and "reaction_moments" [1/(N m)] of supports and hands, as in
+              `Simulation.reaction` and `Simulation.wrench`
+
+            For example ``{"curvatures": {arm: dL_dk}, "reaction_forces": {wall: dL_dF}}``.
         wrt : sequence
-            Pairs of a part and a word of `Simulation.get`: of a rod natural_curvature, natural_twist, natural_stretch,
-            youngs_modulus, poisson_ratio, density, bend_stiffness and so on, and "radius" [m] of a withe.Circle, one an
-            edge, and "points" [m], the nodes as they were drawn, (nodes, 3), both as if the scene were built anew, the
-            latter with ends of other rods that are joined there; of a load its value; of a mass "mass"; of a support or
-            a hand "position" [m] and "rotation" (a rotation vector [rad], about where it is); of a hand that yields
-            "stiffness", all six as `Scene.grasp` takes them, and "force_limit"; of an obstacle "position" [m]. Or
-            "gravity".
+            Parameters: pairs of a part and a word of `Simulation.get`, or "gravity".
+
+            * rod: natural_curvature, natural_twist, natural_stretch, youngs_modulus, poisson_ratio, density,
+              bend_stiffness and so on; "radius" [m] per edge of a withe.Circle; and "points" [m], the drawn nodes of
+              shape (nodes, 3) with the joined ends of other rods
+            * load: its value; mass: "mass"
+            * support or hand: "position" [m] and "rotation" (rotation vector about its position [rad])
+            * compliant hand: "stiffness" (six values, as in `Scene.grasp`) and "force_limit"
+            * obstacle: "position" [m]
 
         Returns
         -------
         list
-            For each of `wrt`, dL over it, shaped like `Simulation.get`.
+            Derivative of L by each item of `wrt`, shaped like `Simulation.get`.
 
         Raises
         ------
         ValueError
-            The simulation has left this equilibrium, or it follows not from what acts (a rod free to spin, a limit
-            point, friction or a hand at its force limit that holds it); contact whose stiffness was not given; a wrong
-            shape; something without a gradient; positions off the plane of a scene built with planar=True.
+            The simulation has left this equilibrium; the equilibrium is not determined by the parameters (a rod that
+            can spin freely, a limit point, friction, or a hand at its force limit); contact without a given stiffness;
+            a wrong shape; a parameter without a gradient; or derivatives out of the plane with planar=True.
 
         Notes
         -----
-        What leads out of the plane of a planar scene counts, as if it were built in space; with planar=True nothing
-        does.
+        With the derivative g of L by all unknowns q of the equilibrium R(q, p) = 0, the adjoint r = -K^-T g gives
+        dL/dp = r^T dR/dp [Giles and Pierce 2000, 2.1]. Direct dependence of a read-out on a parameter, as of a tension
+        on the stiffness, is included. Motions out of the plane of a planar scene count as in space, except with
+        planar=True.
 
         Examples
         --------
@@ -190,20 +193,20 @@ class Equilibrium:
         return self._gradient(dL_dx, wrt)
 
     def jacobian(self, of: Any, wrt: Sequence[Any]) -> list[FloatArray]:
-        """Derivatives of positions, or of another read-out, in this equilibrium.
+        """Return derivatives of positions, or of another read-out, of this equilibrium.
 
         Parameters
         ----------
         of : handle of a node or rod, or name; or a pair
-            Of a rod or support and a word of `gradient`, such as ``(arm, "curvatures")``.
+            Node or rod whose positions are differentiated. Or a pair of a rod or support and a read-out of `gradient`,
+            such as ``(arm, "curvatures")``.
         wrt : sequence
-            See `gradient`.
+            Parameters, as in `gradient`.
 
         Returns
         -------
         list of ndarray of shape (3, ...) or (nodes, 3, ...)
-            For each of `wrt`, the position of the node (or of the rod's nodes), or the read-out, over it: first the
-            axes of these, then those of `Simulation.get`.
+            Derivative by each item of `wrt`: first the axes of the read-out, then those of `Simulation.get`.
 
         Raises
         ------
@@ -215,22 +218,22 @@ class Equilibrium:
 
 @dataclass(frozen=True)
 class Statistics:
-    """What the work of a simulation took so far.
+    """Counts and times of the work of a simulation so far.
 
     Attributes
     ----------
     steps, rejected_steps : int
-        Inner steps: a time step that had to be cut counts several.
+        Accepted and rejected inner steps. A subdivided time step counts several.
     iterations, evaluations, factorizations : int
-        Of Newton's method, its residual (with or without the matrix), its matrix.
+        Iterations of Newton's method, evaluations of its residual, and factorisations of its matrix.
     largest_turn : float [rad]
         Greatest turn of an edge within one inner step.
     energy_momentum_steps : int
-        Inner steps of the energy-momentum rule: all of those of the default integrator and of "fourth_order".
+        Inner steps of the energy-momentum rule: all steps of the default integrator and of "fourth_order".
     branch_changes : int
-        Equilibria that lie on another branch than the state before; see `Equilibrium.branch_changed`.
+        Number of equilibria with `Equilibrium.branch_changed`.
     assembly_time, solve_time, fluid_time, total_time : float [s]
-        Fluid: of Stokeslets, whose equations are solved once a step.
+        Times of assembly, linear solves, Stokeslets, and in total.
     """
 
     steps: int
@@ -249,19 +252,22 @@ class Statistics:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """What was decided for a scene. `print(plan)` says it in a few lines.
+    """Decisions of `Scene.build` for a scene. ``print(plan)`` shows them.
 
     Attributes
     ----------
     planar : bool
+        True if the scene is solved in a plane.
     plane_normal : ndarray of shape (3,), or None
+        Normal of this plane.
     unknowns : int
+        Number of unknowns.
     solver : str
-        Of the linear equations.
+        Solver of the linear equations.
     stable_step : float or None
-        Of the explicit scheme, as drawn [s].
+        Stable step of the explicit scheme in the drawn state [s].
     notes : tuple of str
-        What is left out or was decided, and why.
+        Decisions and their reasons.
     """
 
     planar: bool

@@ -50,9 +50,9 @@ _MAX_STEPS = 2**31 - 1
 @keyword_hints
 @known_attributes("use set, such as set(gravity=(0, 0, -1.6)), or an option of Scene.build")
 class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
-    """A scene while it runs. Made by `Scene.build`.
+    """Run a scene. `Scene.build` returns simulations.
 
-    Read-outs are copies. Rods, nodes, supports and loads are given by their handles or their names.
+    Arrays that methods return are copies. Rods, nodes, supports and loads are given by handle or by name.
 
     Examples
     --------
@@ -101,23 +101,23 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
 
     @property
     def time(self) -> float:
-        """Time since the start [s]."""
+        """Return the time since the start [s]."""
         return self._stepping.time
 
     @property
     def time_step(self) -> float:
-        """As it was given to `Scene.build` [s]."""
+        """Return the time step that was given to `Scene.build` [s]."""
         return self._session.options.time_step
 
     def step(self, count: int = 1) -> None:
-        """Advance by exactly `count` time steps, whatever is cut inside.
+        """Advance by `count` time steps. Subdivision inside a step does not change the count.
 
         Raises
         ------
         ConvergenceError
-            A step that cannot be solved even when cut; the state is then the last accepted one.
+            A step did not converge, even after subdivision. The simulation keeps its last accepted state.
         ValueError
-            A count that is not a whole number, or negative.
+            `count` is negative or not a whole number.
         RuntimeError
             Called by a callback of `run`, or while another thread runs the simulation.
         """
@@ -251,47 +251,46 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
         differentiable: bool = False,
         longest_step: Callable[[Simulation], float] | None = None,
     ) -> Record:
-        """Advance by a duration and record what happens.
+        """Advance by a duration and record frames.
 
-        Frames are taken at the start, at every multiple of `record_every` after it, and at the end. Where
-        that is no multiple of the time step, steps are shortened evenly to land on the frames.
+        Frames are recorded at the start, at every multiple of `record_every`, and at the end. Time steps are shortened
+        evenly if `record_every` is not a multiple of the time step.
 
         Parameters
         ----------
         duration : float [s]
+            Duration of the run.
         record_every : float [s]
-            By default a hundredth of the duration, rounded up to whole time steps.
+            Interval of frames. By default a hundredth of the duration, rounded up to whole time steps.
         progress : bool or "always"
-            Whether to show a progress bar; True shows one on a terminal and in a notebook.
+            True to show a progress bar on a terminal and in a notebook.
         before_step : callable
-            Called with the simulation once before every time step, never before an inner or repeated one:
-            the place for a controller.
+            Controller: called with the simulation once before every time step, not before inner steps.
         until : callable
-            Called with the simulation after every time step; the run ends when it returns true.
+            Called with the simulation after every time step. The run ends when it returns True.
         record : mapping of str to callable
-            What else to record: each is called with the simulation at every frame, and its results are
+            Further quantities to record. Each function is called with the simulation at every frame; its results are
             ``record[name]``.
         differentiable : bool
-            Whether to keep what `Record.gradient` needs: the unknowns of every step, 8 bytes each.
+            True to keep the data for `Record.gradient`: 8 bytes per unknown and step.
         longest_step : callable
-            Called with the simulation before every time step: how long it may be [s], where the motion is quicker than
-            what the time step of the simulation resolves. Steps are never longer than that.
+            Called with the simulation before every time step. Returns the maximum duration of this step [s].
 
         Returns
         -------
         Record
-            Also kept as `simulation.record`.
+            The recorded frames, also available as `simulation.record`.
 
         Raises
         ------
-        ConvergenceError, KeyboardInterrupt, or what a callback raised
-            What was recorded until then is `simulation.record`.
+        ConvergenceError, KeyboardInterrupt, or the exception of a callback
+            The run ended early. `simulation.record` holds the frames until then.
         ValueError
-            A duration or record_every that is not positive or too short to change the time, a callback
-            that cannot be called, or a longest step that is not positive.
+            A duration, record_every or longest step that is not positive or too short, or a callback that cannot be
+            called.
         RuntimeError
-            Called by a callback of a run: those may read, set, hold and copy the simulation, but not advance it
-            or take it back.
+            Called by a callback of a run. Callbacks may read, set, hold and copy the simulation, but neither advance
+            nor restore it.
         """
         self._stepping.refuse_in_run("run")
         loop = Run(
@@ -303,12 +302,12 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
 
     @property
     def record(self) -> Record:
-        """What the last `run` recorded, also when it ended early.
+        """Return the record of the last `run`, also if the run ended early.
 
         Raises
         ------
         RuntimeError
-            There was none.
+            No run was made.
         """
         if self._stepping.recorder is None:
             raise RuntimeError("simulation has no record: call run first")
@@ -317,12 +316,12 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
     # At a moment
 
     def linearise(self) -> Linearisation:
-        """Equations of motion linearised about the present configuration, with supports held.
+        """Linearise the equations of motion about the present configuration, with supports held.
 
         Returns
         -------
         Linearisation
-            Tangent stiffness, masses, natural frequencies and modes. Meaningful at an equilibrium.
+            Tangent stiffness, masses, natural frequencies and modes. They are meaningful at an equilibrium.
 
         Examples
         --------
@@ -337,7 +336,7 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
         return self._stepping.linearise()
 
     def __getitem__(self, name: str) -> Any:
-        """The handle of the part, node or edge of that name."""
+        """Return the handle of a part, node or edge by its name."""
         return self._session.directory.handle(name)
 
     def __repr__(self) -> str:
@@ -347,30 +346,30 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
     # State
 
     def snapshot(self) -> Snapshot:
-        """The whole state, to go back to with `restore`, bit by bit."""
+        """Return the whole state. `restore` continues from it bit for bit."""
         session = self._session
         return Snapshot(session.world.snapshot(), session.world.time, session.settings.copy(), scene=session.scene)
 
     def restore(self, snapshot: Snapshot | Record, frame: int = -1) -> None:
-        """Go back to a snapshot, of this simulation or another of the same scene, or to a frame of a record.
+        """Restore the state of a snapshot or of a frame of a record.
 
-        A record holds positions, velocities, frames and spins of rods and their time, to the last digit or nearly;
-        everything else stays as it is here: supports must be where they were then, and what was set (loads, natural
-        shapes, materials) and the history that contact and friction remember are not in it. Joints are
-        turned so that they stress the edges at them least, and turn as these do on the mean; of whole turns of revolute
-        ones a record knows nothing: their angles are those nearest to the present ones.
+        Snapshots may come from another simulation of the same scene. A record holds the time, and positions,
+        velocities, frames and spins of rods only. Supports must be where they were in the frame; loads, natural shapes,
+        materials, and the history of contact and friction keep their present values. Joints take the orientation of
+        least stress; angles of revolute joints are the nearest to the present ones.
 
         Parameters
         ----------
         snapshot : Snapshot or Record
+            State to restore.
         frame : int
-            Of a record; the last one by default.
+            Frame of a record. By default the last one.
 
         Raises
         ------
         ValueError
-            A snapshot or record of another scene, a damaged one, a snapshot from a file that needs functions of time
-            that this simulation does not have, or a record whose nodes are elsewhere than supports hold them.
+            A snapshot or record of another scene or a damaged one; a snapshot file that needs functions of time which
+            this simulation does not have; or a record with supported nodes in other places.
         RuntimeError
             Called by a callback of `run`.
         """
@@ -385,7 +384,7 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
         self._session.restorations += 1
 
     def reset(self) -> None:
-        """Go back to the scene as it was drawn, and undo everything that was set since.
+        """Restore the state after `Scene.build`, and undo every later change.
 
         Raises
         ------
@@ -396,7 +395,7 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
         self.restore(self._initial)
 
     def copy(self) -> Simulation:
-        """Another simulation in the same state, which goes its own way from here."""
+        """Return an independent simulation in the same state."""
         return Simulation._of(self._stepping.copy(), self._initial)
 
     def __copy__(self) -> Simulation:
@@ -430,11 +429,11 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
     # Pictures
 
     def plot(self, **options: Any) -> Any:
-        """The present shape as a matplotlib figure; see `withe.view.plot` for the options."""
+        """Plot the present shape as a matplotlib figure; see `withe.view.plot` for the options."""
         return self._frame().plot(**options)
 
     def view(self, **options: Any) -> Any:
-        """The present shape to turn about, in a notebook or a window; see `withe.view.view`."""
+        """Show the present shape interactively in a notebook or a window; see `withe.view.view`."""
         return self._frame().view(**options)
 
     def picture(self, path: str | os.PathLike[str], **options: Any) -> FilePath:
