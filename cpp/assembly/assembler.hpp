@@ -25,11 +25,11 @@ class ElementTable {
     return dofs_.data() + static_cast<std::size_t>(element) * static_cast<std::size_t>(width_);
   }
 
-  /// Whether an element's unknowns follow one another, and so do its numbers in each line of the matrix (columns of
+  /// True if an element's unknowns follow one another, and so do its numbers in each line of the matrix (columns of
   /// the lower triangle, or whole lines); then where its lines begin.
   bool regular(int element, std::vector<std::ptrdiff_t>& lines) const;
 
-  /// Whether a regular element's lines are rows.
+  /// True if a regular element's lines are rows.
   bool by_rows(int element) const { return offset(element, 0, 1) == offset(element, 0, 0) + 1; }
 
   /// Where the entry of row i and column j of an element's square stands in the solver's values.

@@ -79,7 +79,7 @@ inline Pack with_sign_of(Pack a, Pack b) {
   return Pack(reinterpret_cast<Pack::Native>((reinterpret_cast<Pack::Integers>(a.v) & ~kSign) |
                                              (reinterpret_cast<Pack::Integers>(b.v) & kSign)));
 }
-/// Whether the mask is set in every lane.
+/// True if the mask is set in every lane.
 inline bool all(Pack::Integers mask) {
   long long set = -1;
   for (int l = 0; l < kLanes; ++l) set &= mask[l];

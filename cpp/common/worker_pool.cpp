@@ -42,7 +42,7 @@ struct WorkerPool::Crew {
     take();
   }
 
-  /// Whether every thread has come to the end of the list within 20 ms.
+  /// True if every thread has come to the end of the list within 20 ms.
   bool finished() {
     std::unique_lock lock(mutex);
     return done.wait_for(lock, std::chrono::milliseconds(20), [this] { return busy == 0; });

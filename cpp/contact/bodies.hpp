@@ -11,7 +11,7 @@
 
 namespace withe {
 
-/// Where two surfaces are closest to each other.
+/// Closest points of two surfaces.
 struct Proximity {
   ClosestPoints points;         ///< of a curve: its s alone
   CurveDistance<double> curve;  ///< of a curve
@@ -26,7 +26,7 @@ struct Bodies {
   const Obstacle& obstacle(const ContactPair& pair) const {
     return obstacles[static_cast<std::size_t>(-1 - pair.key.b)];
   }
-  /// Whether a pair is one with a plane, which has no other side.
+  /// True if a pair is one with a plane, which has no other side.
   bool flat(const ContactPair& pair) const { return pair.key.b < 0 && obstacle(pair).kind == ObstacleKind::plane; }
   /// Puts obstacles where they are now; how far the farthest of them came [m].
   double place(std::span<const ObstaclePlace> places);
@@ -34,9 +34,9 @@ struct Bodies {
   void end_points(const ContactPair& pair, const VectorX& q, Vec3d (&x)[4]) const;
   /// Unknowns of a pair at q (obstacles' points where there are none).
   void values(const ContactPair& pair, const VectorX& q, double (&x)[kContactUnknowns]) const;
-  /// How near a piece of a curve is to its obstacle, or to where that was before its `drift`.
+  /// Distance of a piece of a curve from its obstacle, or from the obstacle's place before its `drift`.
   CurveDistance<double> piece_distance(const ContactPair& pair, const VectorX& q, const Vec3d& drift = {}) const;
-  /// Of surfaces that are farther apart than of interest no more than a lower bound of their distance; `whole`: the
+  /// Distance of two surfaces; for surfaces beyond reach, a lower bound of the distance only. `whole`: also the
   /// closest points of these too.
   Proximity proximity(const ContactPair& pair, const VectorX& q, bool whole = false) const;
 };

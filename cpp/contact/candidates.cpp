@@ -144,7 +144,7 @@ void Candidates::set_bounds(double distance, std::size_t p) {
   bounds_[p] = {above(pair.reach()), above(std::sqrt(pair.nearest() * pair.nearest() + weights))};
 }
 
-/// Whether some node has left, or would leave, what the candidates were found for.
+/// True if some node has left, or would leave, what the candidates were found for.
 bool Candidates::outgrown(const VectorX& q, const VectorX* change) const {
   if (surfaces_.edges().empty()) return false;
   if (reference_.size() != q.size()) return true;

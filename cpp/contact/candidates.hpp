@@ -47,14 +47,14 @@ class Candidates {
       if (proximity.distance < pairs[p].reach()) add(pairs[p], proximity);
     }
   }
-  /// How much of a change of q may be made before centrelines come too close, from 0 to 1.
+  /// Share of a change of q that keeps centrelines apart, from 0 to 1.
   double allowed(const VectorX& q, const Bodies& bodies, const VectorX& change);
-  /// Whether an obstacle that moves by its `shift` would pass through a rod that stays at q.
+  /// True if an obstacle that moves by its `shift` would pass through a rod that stays at q.
   bool blocked(const VectorX& q, const Bodies& bodies, const std::vector<Vec3d>& shift) const;
-  /// Whether surfaces that are apart at q, and were before it, have gone through each other in between, on a way that
+  /// True if surfaces that are apart at q, and were before it, have gone through each other in between, on a way that
   /// the candidates are known for. `shift`: of obstacles since then; empty: they rest.
   bool missed(const VectorX& before, const VectorX& q, const Bodies& bodies, const std::vector<Vec3d>& shift);
-  /// What is within reach and half of its radii at q, sorted by key, whatever the candidates are; and all obstacles'
+  /// Pairs within reach and half of their radii at q, sorted by key, whatever the candidates are; and all obstacles'
   /// pairs. Empty q: these alone.
   std::vector<ContactKey> near(const VectorX& q, const Bodies& bodies) const;
   /// Coefficients of friction of the surfaces have changed.

@@ -57,15 +57,15 @@ class Contact {
   const Surfaces& surfaces() const { return surfaces_; }
   /// True if the stiffness of the pair is a number that the scene gives.
   bool has_given_stiffness(const ContactPair& pair) const { return problem_.fixed(pair); }
-  /// Whether friction is there at all, and its Jacobian unsymmetric.
+  /// True if friction is there at all, and its Jacobian unsymmetric.
   bool frictional() const { return surfaces_.frictional(); }
   bool unsymmetric() const { return problem_.unsymmetric(); }
-  /// Whether friction goes with the way, and not with the velocity.
+  /// True if friction goes with the way, and not with the velocity.
   bool anchored() const { return problem_.anchored(); }
-  /// Whether friction grows with slip, so that a continuation in the slip tolerance leads to it.
+  /// True if friction grows with slip, so that a continuation in the slip tolerance leads to it.
   bool regularises() const;
 
-  /// Whether an obstacle would pass through a rod on its way through this step.
+  /// True if an obstacle would pass through a rod on its way through this step.
   bool blocked() const { return blocked_; }
 
   /// Takes over how surfaces press and rub, for read-outs before the next step.
@@ -99,24 +99,24 @@ class Contact {
   /// Energy of contact and of anchors at q1, and at the start of the step [J].
   double energy() const { return set_.energy(problem_); }
   double start_energy() const { return problem_.start_energy; }
-  /// Of a step that ends at q1, `change` after its start: see contact_work.hpp.
+  /// Work of pressing in a step that ends at q1, `change` after its start: see contact_work.hpp.
   double pressing_gain(const VectorX& change) const;
   double mean_friction_loss(const VectorX& change, const VectorX& start, const VectorX& end) const;
   void friction_force(VectorX& out) const;
   double obstacle_work() const;
-  /// Whether what touches has kept, in an accepted state, the stiffness that it was given; not, where none was.
+  /// True if what touches has kept, in an accepted state, the stiffness that it was given; not, where none was.
   bool has_given_stiffness(const State& state) const;
-  /// Whether surfaces are deeper in each other than a step may end with.
+  /// True if surfaces are deeper in each other than a step may end with.
   bool too_deep() const { return set_.depth() > deepest_; }
   void allow_depth(double deepest) { deepest_ = deepest; }
-  /// Whether a step of dt would be too long for what an impact loses by its restitution.
+  /// True if a step of dt would be too long for what an impact loses by its restitution.
   bool unresolved(double dt) const;
-  /// Whether the step from q0, now at its end, is too long to see that surfaces met.
+  /// True if the step from q0, now at its end, is too long to see that surfaces met.
   bool missed(const VectorX& q0) { return candidates_.missed(q0, set_.q(), problem_.bodies, problem_.shift); }
-  /// What touches or is near at q1, sorted: what the matrix should have room for.
+  /// Pairs that touch or are near at q1, sorted: the matrix should have room for them.
   std::vector<ContactKey> near() const;
 
-  /// How much of a change of q1 may be made before centrelines come too close, from 0 to 1.
+  /// Share of a change of q1 that keeps centrelines apart, from 0 to 1.
   double allowed(const VectorX& q1, const VectorX& change) { return candidates_.allowed(q1, problem_.bodies, change); }
 
   /// Predicts the friction of a step of Newton's method by which `change` is to be added to q1.
@@ -138,7 +138,7 @@ class Contact {
   void accept_at_rest(State& state, bool arrived, double deepest = kDeepest);
   /// The greatest of the stiffnesses that forces want of contacts, over what they have; no less than 1.
   double wanted_ratio() const { return ContactStiffness(problem_).wanted_ratio(set_); }
-  /// Whether what was accepted last there presses as it did, but for rounding.
+  /// True if what was accepted last there presses as it did, but for rounding.
   bool presses_alike() const { return scratch_.change <= 1e-9 * scratch_.pressing; }
   /// The same for a step so short that stiffness stays as it is.
   void remember(State& state);

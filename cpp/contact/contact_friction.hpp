@@ -7,17 +7,17 @@
 
 namespace withe {
 
-/// Whether friction grows with slip, so that its slip tolerance can be made greater for a while.
+/// True if friction grows with slip, so that its slip tolerance can be made greater for a while.
 bool regularises_friction(const Model& model);
 /// K / (2 dt), over what makes the slip tolerance greater [1/m].
 double slip_rate(const ContactProblem& problem, double regularisation);
-/// Whether there is friction on a contact in a step, of a kind or at all.
+/// True if there is friction on a contact in a step, of a kind or at all.
 bool has_friction(const ContactProblem& problem, const Touching& t, FrictionKind kind);
 bool rubs(const ContactProblem& problem, const Touching& t);
 /// Stiffness of an anchor, for a contact of that stiffness [N/m].
 double anchor_stiffness(const ContactPair& pair, FrictionKind kind, double stiffness);
-/// Of a contact that presses, or of a lagged one as it was at the start. `regularisation`, `predicted`: see
-/// `ContactLinearisation`; what it refers to must outlive it.
+/// Friction setting of a contact that presses, or of a lagged one as it was at the start. `regularisation`,
+/// `predicted`: see `ContactLinearisation`; what it refers to must outlive it.
 FrictionSetting friction_setting(const ContactProblem& problem, const Touching& t, FrictionKind kind,
                                  double regularisation, const Vec3d* predicted);
 /// Friction by the slip, at most [N/m].
@@ -27,9 +27,9 @@ bool add_friction(const ContactProblem& problem, const Touching& t, const Contac
                   bool with_hessian, ContactLocal& out);
 /// Work of anchors' forces over the change of their elastic slip; `mean`: of the mean of those at both ends [J].
 double anchor_work(const ContactProblem& problem, const Touching& t, bool mean);
-/// What an anchor stores as a step ends, nothing where the contact opens [J].
+/// Energy of an anchor at the end of a step, zero if the contact opens [J].
 double anchor_energy(const ContactProblem& problem, const Touching& t);
-/// What it stores as the next begins: all that the last left, also where the surfaces now press too little to hold it.
+/// Energy of an anchor at the start of a step: all of the last step, also if the surfaces now press too little for it.
 /// The next step takes that, and counts it.
 double kept_anchor_energy(const ContactProblem& problem, const Touching& t);
 /// Work of an obstacle's turning against friction [J].
@@ -47,7 +47,7 @@ struct Slipping {
 };
 Slipping slipping(const ContactProblem& problem, const Touching& t, FrictionKind kind,
                   const ContactLinearisation& linearisation, const VectorX& change);
-/// Whether all surfaces slip so little by `change` that a tangent says enough.
+/// True if all surfaces slip so little by `change` that a tangent says enough.
 bool slips_shortly(const ContactProblem& problem, const ContactLinearisation& linearisation, const VectorX& change);
 
 /// Friction with J of the start, where frames have not turned yet, of what touches there.

@@ -1,6 +1,6 @@
 #pragma once
-/// How Newton's method takes contact: a continuation in the slip tolerance, what its derivatives leave out, and the
-/// friction that its last step has predicted.
+/// Linearisation of contact for Newton's method: a continuation in the slip tolerance, what its derivatives leave out,
+/// and the friction that its last step has predicted.
 
 #include <algorithm>
 #include <utility>
@@ -43,7 +43,7 @@ class FrictionPrediction {
   std::vector<Share> shares_, next_;  ///< sorted by key
 };
 
-/// Of surfaces that slip, or of a rod that rolls: see friction.hpp.
+/// Kind of friction: of surfaces that slip, or of a rod that rolls; see friction.hpp.
 enum class FrictionKind { slipping, rolling };
 inline constexpr FrictionKind kFrictionKinds[] = {FrictionKind::slipping, FrictionKind::rolling};
 

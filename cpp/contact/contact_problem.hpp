@@ -1,5 +1,5 @@
 #pragma once
-/// What contact is given by in one step: const while the step is solved.
+/// Problem of contact in one step: const while the step is solved.
 
 #include <algorithm>
 #include <vector>
@@ -18,7 +18,7 @@ inline constexpr double kDeepest = 0.04;
 /// radius.
 inline constexpr double kMostYield = 0.02;
 
-/// How surfaces press in a step (see pressing_law.hpp): in statics and explicit steps, where nothing is known of
+/// Law of the pressing force in a step (see pressing_law.hpp): in statics and explicit steps, where nothing is known of
 /// impacts; by the force at its end; by that of the whole step, where they have just met; and along the mean direction
 /// too, so that sliding gains nothing.
 enum class Pressing { still, end, mean, mean_direction };
@@ -54,9 +54,9 @@ struct Touching {
   void end_points(Vec3d (&x)[4]) const {
     for (int i = 0; i < 4; ++i) x[i] = {now[3 * i], now[3 * i + 1], now[3 * i + 2]};
   }
-  /// Of the surfaces in each other, over the smaller radius; what has yielded does not press.
+  /// Depth of the surfaces in each other, less the yielded part, over the smaller radius.
   double depth() const { return (pair.radii() - (proximity.distance + yielded)) / pair.small_radius(); }
-  /// Whether no more than the tail of the contact law presses the surfaces.
+  /// True if no more than the tail of the contact law presses the surfaces.
   bool apart() const { return proximity.distance + yielded >= pair.radii(); }
 };
 
@@ -71,14 +71,14 @@ struct LaggedFriction {
   Vec3d column(int i) const { return {slip[0][i], slip[1][i], slip[2][i]}; }
 };
 
-/// How deep two bodies are in each other before they press, where they press as a step begins.
+/// Depth of two bodies in each other below which they do not press, if they press as a step begins.
 struct BodyOffset {
   int rod = 0, other = 0;  ///< the latter, or an obstacle as -1 - index
   double force = 0;        ///< [N]
   double moment = 0;       ///< sum of forces times depths that press no more [N m]
 };
 
-/// What contact needs of the parameters.
+/// Parameters that contact needs.
 struct ContactParameters {
   ContactParameters() = default;
   ContactParameters(const Surfaces& surfaces, const Parameters& parameters);
@@ -114,15 +114,15 @@ struct ContactProblem {
   const Model& model() const { return *bodies.model; }
   const ContactDescription& description() const { return model().description.contact; }
   bool frictional() const { return surfaces->frictional(); }
-  /// Whether friction is that of contacts at the start of the step.
+  /// True if friction is that of contacts at the start of the step.
   bool lags() const { return lags(model()); }
   static bool lags(const Model& model) {
     const FrictionLaw law = model.description.contact.friction_law;
     return law == FrictionLaw::lagged || law == FrictionLaw::semi_explicit;
   }
-  /// Whether edges spin by the rates of finite rotations, as in energy-momentum steps.
+  /// True if edges spin by the rates of finite rotations, as in energy-momentum steps.
   bool finite_turns() const { return pressing == Pressing::mean_direction; }
-  /// Whether the Jacobian of friction is unsymmetric.
+  /// True if the Jacobian of friction is unsymmetric.
   bool unsymmetric() const { return frictional() && !lags(); }
   bool anchored() const { return description().friction_law == FrictionLaw::anchored; }
   /// Way of a pair's obstacle in the step [m], and by which it turns then [rad].
@@ -130,7 +130,7 @@ struct ContactProblem {
   Vec3d turn_of(const ContactPair& pair) const { return of_obstacle(pair, turn); }
   /// Known before anything is found, unlike the way.
   Vec3d velocity_of(const ContactPair& pair) const { return of_obstacle(pair, velocity); }
-  /// What is remembered of a contact as the step begins, or nothing.
+  /// Record of a contact as the step begins, or nothing.
   const ContactRecord* record_of(const ContactKey& key, OrderedLookup& lookup) const {
     const ContactRecord* found = renewed.empty() ? nullptr : find_record(renewed, key);
     return found ? found : find_record(start->contacts, key, lookup);
@@ -143,11 +143,11 @@ struct ContactProblem {
   /// rests is neither lower nor higher [m].
   double offset(const ContactPair& pair) const;
   void find_offsets();
-  /// Whether surfaces at that distance, of which so much presses no more, are near enough to press.
+  /// True if surfaces at that distance, of which so much presses no more, are near enough to press.
   bool touch(const ContactPair& pair, double distance, double yielded) const {
     return distance + (offsets.empty() ? 0.0 : std::min(yielded, offset(pair))) < pair.reach();
   }
-  /// Whether a stiffness is given.
+  /// True if a stiffness is given.
   bool fixed(const ContactPair& pair) const {
     return pair.stiffness > 0.0 || surfaces->parameters().contact_stiffness > 0.0;
   }
@@ -164,14 +164,14 @@ struct ContactProblem {
   double stiffness_to_bear_more(double firm, double stiffness, double times) const;
   /// The distance tolerance of a contact so stiff, of a whole node [m].
   double tolerance(const ContactPair& pair, double stiffness) const;
-  /// Of the edges, or half of both beside a node, that a contact holds up [kg].
+  /// Mass of the edges, or of half of both beside a node, that a contact holds up [kg].
   double mass_of(const ContactPair& pair) const;
   /// Adds `by` times its derivatives by masses of edges.
   void add_mass_slopes(const ContactPair& pair, double by, VectorX& edge_mass) const;
-  /// Whether surfaces press along the mean direction of the step. Curves have a mean of their own; and in a midpoint
+  /// True if surfaces press along the mean direction of the step. Curves have a mean of their own; and in a midpoint
   /// step only rods do, which thereby keep their angular momentum, unless friction is to stay symmetric.
   bool turns(const ContactPair& pair) const;
-  /// Whether curves do, along shares of the directions at both ends.
+  /// True if curves do, along shares of the directions at both ends.
   bool means_direction() const {
     return pressing == Pressing::mean_direction || (pressing == Pressing::mean && unsymmetric());
   }

@@ -1,5 +1,5 @@
 #pragma once
-/// What touches at a configuration: a value, which knows of no other.
+/// Set of contacts at one configuration: a value without memory.
 
 #include "contact/candidates.hpp"
 #include "contact/contact_linearisation.hpp"
@@ -37,7 +37,7 @@ class ContactSet {
   /// Gives a contact what a record that has changed says.
   void renew(const ContactProblem& problem, int i, const ContactRecord& record);
 
-  /// What pressing stores, and that with what anchors do, as a step ends and as the next begins [J].
+  /// Energy of pressing, and with that of anchors, at the end of a step and at the start of the next [J].
   double pressing_energy() const;
   double energy(const ContactProblem& problem) const;
   double kept_energy(const ContactProblem& problem) const;

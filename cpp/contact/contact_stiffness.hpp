@@ -1,5 +1,5 @@
 #pragma once
-/// How stiff contacts are: from the records of contacts as a step begins, and what touches at its end, to the records
+/// Stiffness of contacts: from the records of contacts as a step begins, and what touches at its end, to the records
 /// that it leaves.
 ///
 /// Stiffness k follows each contact's force so that surfaces are about `kDepth` of the smaller radius deep in each
@@ -12,10 +12,10 @@
 
 namespace withe {
 
-/// Of a contact that begins, for a whole node [N/m]. `stiffness`: of contacts that begin, per rod.
+/// Stiffness of a contact that begins, for a whole node [N/m]. `stiffness`: of contacts that begin, per rod.
 double start_stiffness(const ContactProblem& problem, const ContactPair& pair, const VectorX& stiffness);
-/// Of a contact without a record. What touches already when the step begins does not become stiffer by its speed, which
-/// would put energy in.
+/// Stiffness of a contact without a record. What touches already when the step begins does not become stiffer by its
+/// speed, which would put energy in.
 double first_stiffness(const ContactProblem& problem, const ContactPair& pair);
 
 /// Scratch of the end of a step.
@@ -61,7 +61,7 @@ class ContactStiffness {
   bool begins_at_rest(const Touching& t, ContactRecord& record) const;
   bool begins_anew(const Touching& t, bool struck, ContactRecord& record) const;
   bool is_struck(const Touching& t) const;
-  /// Whether it is near enough to press, and not there for its friction of the start alone.
+  /// True if it is near enough to press, and not there for its friction of the start alone.
   bool presses(const Touching& t) const;
   ContactRecord record(const Touching& t) const;
   void finish(const ContactSet& set, std::vector<ContactRecord>& records) const;

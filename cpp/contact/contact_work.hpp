@@ -1,14 +1,15 @@
 #pragma once
-/// What contact does over a step: forces per unknown, and their work.
+/// Work of contact over a step: forces per unknown, and their work.
 
 #include "contact/contact_set.hpp"
 
 namespace withe {
 
-/// What pressing has put in over a step that ends at the set's q, `change` after its start: more than it stored before,
-/// and friction apart [J]. Below zero along a straight way onto a surface; above it where surfaces slide over a summit.
+/// Energy that pressing has added over a step that ends at the set's q, `change` after its start: more than it stored
+/// before, and friction apart [J]. Below zero along a straight way onto a surface; above it where surfaces slide over a
+/// summit.
 double pressing_gain(const ContactProblem& problem, const ContactSet& set, const VectorX& change);
-/// What friction takes over such a step, what anchors store apart [J].
+/// Energy that friction dissipates over such a step, without the energy that anchors store [J].
 double friction_loss(const ContactProblem& problem, const ContactSet& set, const VectorX& change);
 /// The same of an explicit step, whose velocities change by the mean of the forces at both its ends; `start`, `end`:
 /// `friction_force` there.

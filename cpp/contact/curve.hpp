@@ -37,7 +37,7 @@ struct CurveWeights {
 
   double high() const { return low + 1.0; }
   double sample(int j) const { return low + 0.5 * j; }
-  /// How far along its edge s is.
+  /// Share of its edge at which s is.
   double along(double s) const { return edges > 1 ? (s > 0.0 ? s : 1.0 + s) : middle[1] + s * slope[1]; }
   double at(int node, double s) const { return middle[node] + s * (slope[node] + 0.5 * s * bend[node]); }
 };
@@ -133,7 +133,7 @@ Vec3<Scalar> curve_direction(const CurveWeights& w, const Vec3<Scalar>* x, const
   return u;
 }
 
-/// How near a piece is whose three distances, g1 and g2 are known, and g0.
+/// Distance of a piece whose three distances, g1 and g2 are known, and g0.
 template <class Scalar>
 void set_distance(const CurvePiece& piece, const Scalar& value, CurveDistance<Scalar>& d) {
   using std::sqrt;
@@ -146,7 +146,7 @@ void set_distance(const CurvePiece& piece, const Scalar& value, CurveDistance<Sc
   d.distance = value + d.s * (d.slope + 0.5 * d.stiff * d.s);
 }
 
-/// How near a piece comes to a plane above which its nodes are by `height`, nothing where there is none: distances are
+/// Distance of a piece from a plane above which its nodes are by `height`, nothing if there is none: distances are
 /// linear in these.
 template <class Scalar>
 CurveDistance<Scalar> plane_distance(const CurvePiece& piece, const Obstacle& o, const Scalar (&height)[3]) {
@@ -169,7 +169,7 @@ CurveDistance<Scalar> plane_distance(const CurvePiece& piece, const Obstacle& o,
   return d;
 }
 
-/// How near a piece with nodes x comes to an obstacle, or to where it was before its `drift`.
+/// Distance of a piece with nodes x from an obstacle, or from the obstacle's place before its `drift`.
 template <class Scalar>
 CurveDistance<Scalar> curve_distance(const CurvePiece& piece, const Obstacle& o, const Vec3<Scalar>* x,
                                      const Vec3d& drift = {}) {

@@ -37,7 +37,7 @@
 
 namespace withe {
 
-/// What stays the same while the unknowns of one contact change.
+/// Constants of one contact while its unknowns change.
 struct FrictionSetting {
   const ContactPair* pair = nullptr;
   const Obstacle* obstacle = nullptr;
@@ -62,7 +62,7 @@ struct FrictionSetting {
   const Vec3d* predicted = nullptr;  ///< friction over its limit, as a step of Newton's method predicts it
 };
 
-/// What of that comes from the start of the step, on any scalar.
+/// Values from the start of the step, on any scalar.
 template <class Scalar>
 struct SlipStart {
   Scalar unknown[kContactUnknowns];
@@ -125,7 +125,7 @@ Scalar slip_factor(const Scalar& square, double c) {
   return chain(square, c * t / x, 0.5 * c * c * c * ((1.0 - t * t) - t / x) / x2);
 }
 
-/// Whether an elastic stick of a length, squared, holds, if it bears at most another. What slipped at the end of a step
+/// True if an elastic stick of a length, squared, holds, if it bears at most another. What slipped at the end of a step
 /// is at its limit to rounding: it is taken to slip on. As a stick it would hold its neighbours too, and Newton's
 /// method would free one contact an iteration.
 inline bool holds(double square, double most) { return square <= (1.0 - 1e-12) * most * most; }
@@ -235,7 +235,7 @@ void set_weights(const ContactPair& pair, SlippingSurfaces<Scalar>& c) {
   c.w[3] = Scalar(0.0);
 }
 
-/// How near a curve is.
+/// Distance of a curve.
 template <class Scalar>
 CurveDistance<Scalar> distance_of(const FrictionSetting& f, const Vec3<Scalar> (&x)[4]) {
   if constexpr (std::is_same_v<Scalar, double>)
@@ -243,7 +243,7 @@ CurveDistance<Scalar> distance_of(const FrictionSetting& f, const Vec3<Scalar> (
   return curve_distance(f.pair->piece, *f.obstacle, x);
 }
 
-/// Where the surfaces touch, and how hard they press.
+/// Point of contact, and normal force.
 template <class Scalar>
 void find_contact(const FrictionSetting& f, const SlipStart<Scalar>& start, const Vec3<Scalar> (&x)[4],
                   SlippingSurfaces<Scalar>& c) {
@@ -273,7 +273,7 @@ void find_contact(const FrictionSetting& f, const SlipStart<Scalar>& start, cons
   if (pair.rod_b < 0 && !pair.curve()) c.w[2] = c.w[3] = Scalar(0.0);
 }
 
-/// Whether an edge's turning moves a's surface, or b's against it.
+/// Sign of an edge's turning: it moves a's surface (+1), or b's against a's (-1).
 inline double turn_sign(const FrictionSetting& f, int side) { return side == 0 || f.pair->curve() ? 1.0 : -1.0; }
 
 /// On which an obstacle's turning is slip: from where it is placed to where it is touched; of rolling friction, for
@@ -307,7 +307,7 @@ void direct_friction(const FrictionSetting& f, SlippingSurfaces<Scalar>& c) {
   c.friction.force = Scalar(pair.across) * c.plain + (Scalar(more) * share) * c.along;
 }
 
-/// What of an edge's direction in the middle of the step lies along the mean of those at its ends.
+/// Component of an edge's direction in the middle of the step along the mean of those at its ends.
 template <class Scalar>
 Scalar mean_along_middle(const SlippingEdge<Scalar>& side) {
   using std::sqrt;
@@ -340,7 +340,7 @@ inline WorkingTurnSlopes working_turn_slopes(const SlippingEdge<double>& side) {
   return {turn.slope[0] * inverse.value, turn.value * Vec3d{inverse.slope[0], inverse.slope[1], inverse.slope[2]}};
 }
 
-/// How far the surfaces have slipped from `start`, and the friction on that.
+/// Slip of the surfaces since `start`, and the friction on it.
 template <class Scalar>
 SlippingSurfaces<Scalar> slipping_surfaces(const FrictionSetting& f, const SlipStart<Scalar>& start,
                                            const Scalar (&unknown)[kContactUnknowns]) {

@@ -67,7 +67,7 @@ double speed_of_impact(const ContactProblem& problem, const Touching& t) {
   return std::max(t.approach, speed_in_step(problem, t));
 }
 
-/// Whether the step begins with contacts of the same bodies.
+/// True if the step begins with contacts of the same bodies.
 bool touches_already(const ContactProblem& problem, const ContactPair& pair) {
   const auto body = [&](int b) { return b < 0 ? b : problem.model().edge_rod[at(b)]; };
   return std::any_of(problem.start->contacts.begin(), problem.start->contacts.end(), [&](const ContactRecord& record) {
@@ -86,7 +86,7 @@ double curve_rate(const ContactProblem& problem, const ContactPair& pair, const 
   return rate;
 }
 
-/// Whether a rod rolls on or off a piece of its curve, which then tilts against the obstacle, and has not touched it
+/// True if a rod rolls on or off a piece of its curve, which then tilts against the obstacle, and has not touched it
 /// for longer than that takes. What such a piece takes the next one gives back: they do not come to rest.
 bool rolls(const ContactProblem& problem, const Touching& t) {
   const ContactPair& pair = t.pair;

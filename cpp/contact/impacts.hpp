@@ -10,25 +10,25 @@ namespace withe {
 /// Surfaces that meet more slowly rest on each other: as fast as a fall from the depth of contact ends, or as slip that
 /// counts as none [m/s].
 double rest_speed(const ContactProblem& problem, const ContactPair& pair);
-/// Of surfaces that near each other so slowly that they rest, if they do not fall on [m/s].
+/// Approach speed below which surfaces come to rest on each other, if they do not fall on [m/s].
 double least_approach(const ContactProblem& problem, const ContactPair& pair);
-/// Of centrelines as the step begins [m].
+/// Distance of centrelines as the step begins [m].
 double start_distance(const ContactProblem& problem, const ContactPair& pair);
 /// Rate at which surfaces near each other as the step begins; below zero where they part [m/s].
 double nearing(const ContactProblem& problem, const ContactPair& pair);
 inline double approach_speed(const ContactProblem& problem, const ContactPair& pair) {
   return std::max(0.0, nearing(problem, pair));
 }
-/// Whether an impact is still on its way in at the end of a step: it has not pressed surfaces together yet, nor turned
+/// True if an impact is still on its way in at the end of a step: it has not pressed surfaces together yet, nor turned
 /// them round within the tolerance, where what is light enough rests.
 bool comes_near(const ContactProblem& problem, const Touching& t);
-/// Whether surfaces meet in this step.
+/// True if surfaces meet in this step.
 bool meets(const ContactProblem& problem, const ContactPair& pair);
 /// That of an impact which the step begins; 0: none.
 double first_approach(const ContactProblem& problem, const ContactPair& pair);
 /// Half a period of an edge on its contact: as long as an impact lasts at least [s].
 double swing_time(const ContactProblem& problem, const Touching& t);
-/// Whether surfaces still behave otherwise for having met: in restitution for longer than in what presses elastically.
+/// True if surfaces still behave otherwise for having met: in restitution for longer than in what presses elastically.
 bool impact_lasts(const ContactProblem& problem, const Touching& t);
 /// Derivatives of how much presses elastically in a step, `PressingLaw::elastic`.
 struct ElasticShareSlopes {
@@ -43,7 +43,7 @@ ElasticShareSlopes elastic_share_slopes(const ContactProblem& problem, const Tou
 /// unknowns there and by their rates.
 void add_approach_slopes(const ContactProblem& problem, const Touching& touching, double by,
                          double (&start)[kContactUnknowns], double (&velocity)[kContactUnknowns]);
-/// Whether a step of dt would be too long for where surfaces that meet push each other, or for what an impact loses by
+/// True if a step of dt would be too long for where surfaces that meet push each other, or for what an impact loses by
 /// its restitution.
 bool unresolved(const ContactProblem& problem, const Touching& t, double dt);
 /// Sets the law by which surfaces press in a step, and the force at its end, of a contact with its stiffness and speed

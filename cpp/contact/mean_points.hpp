@@ -1,5 +1,5 @@
 #pragma once
-/// Where and which way two rods press on each other in a step.
+/// Points and direction by which two rods press on each other in a step.
 ///
 /// Let the points closest at its start be (s0, t0), D0 apart, and those at its end (s1, t1), D1 apart. Between them, a
 /// share b of the way, lie the points (s, t) whose ways d0 and d1 from b to a at the start and the end obey

@@ -56,7 +56,7 @@ PointDistance<Scalar> distance_to(const Obstacle& o, const Vec3<Scalar>& x, cons
   return out;
 }
 
-/// How the normal turns as the point moves by `change`: the second derivative of the distance, times it.
+/// Change of the normal as the point moves by `change`: the second derivative of the distance, times it.
 inline Vec3d normal_change(const Obstacle& o, const PointDistance<double>& p, const Vec3d& change) {
   if (o.kind == ObstacleKind::plane) return {};
   Vec3d across = change - dot(p.normal, change) * p.normal;

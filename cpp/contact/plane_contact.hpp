@@ -12,7 +12,7 @@
 
 namespace withe {
 
-/// Whether a contact is one: of a planar rod with a plane that does not turn, without friction of its own along the
+/// True if a contact is one: of a planar rod with a plane that does not turn, without friction of its own along the
 /// rod.
 bool beside_plane(const ContactProblem& problem, const Touching& t);
 

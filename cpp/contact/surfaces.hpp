@@ -1,5 +1,5 @@
 #pragma once
-/// What may touch what: radii, obstacles in the model's own axes, and pairs that are left out. Built once.
+/// Pairs that may touch: radii, obstacles in the model's own axes, and pairs that are left out. Built once.
 
 #include <algorithm>
 #include <vector>
@@ -78,11 +78,11 @@ class Surfaces {
   const std::vector<int>& edges() const { return edges_; }
   double radius(int edge) const { return radius_[static_cast<std::size_t>(edge)]; }
   double tolerance(int edge) const;
-  /// Whether two edges may touch: not neighbours along the rod nearer than (pi / 2) (2 h + delta), not ignored.
+  /// True if two edges may touch: not neighbours along the rod nearer than (pi / 2) (2 h + delta), not ignored.
   bool may_touch(int a, int b) const;
   ContactPair pair(int a, int b) const;
   double greatest_reach() const { return greatest_reach_; }
-  /// How they press and rub.
+  /// Coefficients of contact and friction.
   const SurfaceParameters& parameters() const { return parameters_; }
   /// Takes over parameters that are not those there are; whether there were any.
   bool set_parameters(const SurfaceParameters& parameters);
@@ -91,12 +91,12 @@ class Surfaces {
   /// Stiffness that is given to what a rod has with another, or an obstacle as -1 - index [N/m]; 0: none is.
   double given_stiffness(int rod, int other) const;
   FrictionOwner friction_owner(const ContactPair& pair) const;
-  /// Whether friction is there at all.
+  /// True if friction is there at all.
   bool frictional() const { return frictional_; }
   /// Unknowns of two surfaces, -1 where there is none; angles where there is friction.
   void unknowns(const ContactPair& pair, int (&dofs)[kContactUnknowns]) const;
   void unknowns(const ContactKey& key, int (&dofs)[kContactUnknowns]) const;
-  /// Of a piece of a planar curve, the two of each node; those that there are come first.
+  /// Unknowns of a piece of a planar curve, two per node; existing ones come first.
   void plane_unknowns(const ContactPair& pair, int (&dofs)[kPlaneUnknowns]) const;
 
  private:
@@ -106,7 +106,7 @@ class Surfaces {
   /// Pairs of an obstacle with straight edges, and with the pieces of curves between others.
   void add_edges(const ContactPair& prototype, const Obstacle& obstacle);
   void add_pieces(const ContactPair& prototype, const Obstacle& obstacle, int rod);
-  /// Whether an obstacle is large enough to be touched by a curve.
+  /// True if an obstacle is large enough to be touched by a curve.
   bool smooth(const Obstacle& obstacle, int edge) const;
   /// Coefficients of two bodies wherever they touch; and the place of their pair among those given, or -1.
   struct BodyFriction {
@@ -116,7 +116,7 @@ class Surfaces {
   BodyFriction friction_of(int rod, int other) const;
   /// Place of what touches in `ContactPairDescription::shares`.
   Eigen::Index place_along(const ContactPair& pair) const;
-  /// Whether two bodies may touch.
+  /// True if two bodies may touch.
   bool may_meet(int first, int second) const;
   void unknowns_of_edges(const ContactKey& key, int (&dofs)[kContactUnknowns]) const;
 
@@ -131,7 +131,7 @@ class Surfaces {
   bool frictional_ = false;
 };
 
-/// What stands at a node's first unknown, as a vector of three numbers in the axes of the unknowns.
+/// Values from a node's first unknown on, as a vector of three numbers in the axes of the unknowns.
 inline Vec3d local_vector(const Model& model, const VectorX& q, int dof) {
   return {q(dof), q(dof + 1), model.planar() ? 0.0 : q(dof + 2)};
 }

@@ -64,7 +64,7 @@ class RodProblem {
   void put_end(const Path& path, System& system) const;
 };
 
-/// Cuts no further apart than .6 Lgb, over which no error grows by more than twenty times up to a length of 50.
+/// Cuts no further apart than 0.6 Lgb, over which no error grows by more than twenty times up to a length of 50.
 std::vector<double> rod_cuts(double suspended);
 
 /// A point of a solved rod.

@@ -1,12 +1,12 @@
 #pragma once
-/// Whether a rod that is held at both ends can leave its equilibrium.
+/// Stability of the equilibrium of a rod that is held at both ends.
 
 #include "elastica/rod.hpp"
 
 namespace withe {
 
-/// Whether a solved shape is a minimum of the energy while position and rotation of both ends are held, out of every
-/// plane too. `twist_stiffness` is GJ [w Lgb^2]; the shape's points should be at most .15 Lgb apart.
+/// True if a solved shape is a minimum of the energy while position and rotation of both ends are held, out of every
+/// plane too. `twist_stiffness` is GJ [w Lgb^2]; the shape's points should be at most 0.15 Lgb apart.
 ///
 /// Turned by small rotation vectors f(s), with stretch eliminated, the energy and its constraint change by
 ///   1/2 f'.K f' - 1/2 m.(f x f') + (1 + e)/2 ((n.t) f.f - (n.f) (t.f)) - (f.(t x n) - c.t)^2 / (2 EA)

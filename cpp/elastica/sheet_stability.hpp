@@ -1,5 +1,5 @@
 #pragma once
-/// Whether an equilibrium of the suspended sheet is a minimum of its energy.
+/// Stability of an equilibrium of the suspended sheet: sign of the second variation of its energy.
 
 #include "elastica/sheet.hpp"
 

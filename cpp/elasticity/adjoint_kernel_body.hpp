@@ -1,5 +1,5 @@
-// What gradients ask of ordinary stencils in space, on packs: how strains change, the rates' part of an exact matrix,
-// and products of a matrix that nobody needs whole; included by stencil_kernels_body.hpp.
+// Kernels for gradients of ordinary stencils in space, on packs: changes of strains, the rates' part of an exact
+// matrix, and products of a matrix that nobody needs whole; included by stencil_kernels_body.hpp.
 
 #include "elasticity/momentum_kernel_body.hpp"
 

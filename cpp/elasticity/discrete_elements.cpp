@@ -17,12 +17,12 @@ void add_block(Local& out, int row, int column, double factor, const Mat3<double
     for (int j = 0; j < 3; ++j) out.hessian[row + i][column + j] += factor * m.row[i][j];
 }
 
-/// Where an edge's vector and angle are among the unknowns of a stencil in space: its head less its tail.
+/// Places of an edge's vector (head less tail) and angle among the unknowns of a stencil in space.
 struct EdgePlace {
   int tail, head, angle;
 };
 
-/// What an edge makes of a moment; `spin`: of its directors' transport.
+/// Force on an edge from a moment; `spin`: spin of the transport of its directors.
 Vec3d edge_force(const MovingEdge<double>& edge, const Vec3d& spin, const Vec3d& moment) {
   return edge.force(moment) + edge.torque(moment) * spin;
 }
@@ -38,7 +38,7 @@ void add_edge_forces(Local& out, const EdgePlace& e, const MovingEdge<double>& e
   out.gradient[e.angle] += edge.torque(moment);
 }
 
-/// What an edge makes of a moment that stays, and of its own change of it.
+/// Block of an edge: its force from a constant moment, and from its own change of the moment.
 void finish_block(const MovingEdge<double>& edge, const DiscreteStep& step, int index, const Vec3d& moment, bool own,
                   EdgeBlock<double>& block) {
   if (own) add_edge_geometry(edge, moment, block);
@@ -165,7 +165,7 @@ AttachedStep attached_frame(const Model& model, const DiscreteStep& step, int st
           row_of(step.end.half_strain, stencil), model.half[at(stencil)].frame_first};
 }
 
-/// How the moment `m` between an edge and a frame changes with the unknowns of a half stencil at the end: the frame
+/// Derivative of the moment `m` between an edge and a frame by the unknowns of a half stencil at the end: the frame
 /// turns there by J(w) dw, and by its hinge's angle about the hinge's `axis`.
 Eigen::Matrix<double, 3, 11> moment_columns(const EdgeColumns<double>& by_edge, const Mat3<double>& by_frame,
                                             const Vector3& w, const Vector3& axis) {

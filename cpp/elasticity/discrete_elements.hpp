@@ -14,12 +14,12 @@ struct DiscreteStep {
   const Configuration &start, &middle, &end;
   const VectorX& end_q;
   const VectorX& change;  ///< of the unknowns, from the start to the end
-  /// Whether torques leave nodes their part of the directors' transport; without, forces are those that change not when
+  /// True if torques act on nodes through the transport of the directors. If false, forces do not change when
   /// the start and the end are exchanged.
   bool transported = true;
 };
 
-/// How an edge's mean strain pulls.
+/// Force of an edge's mean strain.
 struct MeanStretch {
   double force;         ///< EA (eps0 + eps1) / 2 [N]
   double modulus;       ///< EA / L [N / m]
@@ -32,9 +32,9 @@ inline MeanStretch mean_stretch(const Model& model, const ElasticCoefficients& e
   return {axial_force(0.5 * sum, rest, EA, elastic.stretch_natural[edge]), EA / rest, 2.0 / sum};
 }
 
-/// How the torque on a hinge follows from the moment m on what it carries: m . arm. Behind a frame that turns by the
-/// Cayley vector w the hinge turns by `angle` about `axis`, and what both make of the carried frame is a rotation with
-/// the Cayley vector w + angle arm.
+/// Arm of a hinge: the torque on the hinge is m . arm for a moment m on the carried frame. Behind a frame that turns by
+/// the Cayley vector w the hinge turns by `angle` about `axis`, and what both make of the carried frame is a rotation
+/// with the Cayley vector w + angle arm.
 struct HingeArm {
   Vector3 arm;
   Matrix3 by_frame;  ///< by w
@@ -50,22 +50,22 @@ void discrete_bend_local(const Model& model, const TurnCoefficients& elastic, co
 void discrete_half_local(const Model& model, const TurnCoefficients& elastic, const DiscreteStep& step, int stencil,
                          bool with_matrix, Local& out);
 
-/// What an edge is attached to, at both ends of a step, and the strains between both.
+/// Frame that an edge is attached to, at both ends of a step, and the strains between edge and frame.
 struct AttachedStep {
   EdgeFrame<double> start, end;
   Vec3d start_strain, end_strain;
   bool first;  ///< whether the stencil goes from there to the edge
 };
 
-/// Of a half stencil whose frame is given, in the unknowns of its edge alone: tail, angle and head, or in a plane tail
-/// and head. Returns the moment on the frame, whose work is that over the Cayley vector of its turn.
+/// Force of a half stencil with a prescribed frame, in the unknowns of its edge alone: tail, angle and head, or in a
+/// plane tail and head. Returns the moment on the frame, whose work is that over the Cayley vector of its turn.
 Vector3 discrete_held_local(const Model& model, const TurnCoefficients& elastic, const DiscreteStep& step, int edge,
                             const AttachedStep& hold, bool with_matrix, Local& out);
-/// How these rows, of tail, angle and head, or in a plane of tail and head, change as what the edge is attached to
+/// Derivatives of these rows (tail, angle and head, or in a plane tail and head) as the frame of the edge
 /// turns at the end of the step, by a rotation vector [N/rad], [N m/rad].
 Eigen::Matrix<double, 7, 3> discrete_held_spin(const Model& model, const TurnCoefficients& elastic,
                                                const DiscreteStep& step, int edge, const AttachedStep& hold);
-/// Likewise, of the rows of a half stencil, as what is attached to its frame turns against it: no hinge's axis does.
+/// Derivatives of the rows of a half stencil as an attached part turns against its frame; hinge axes do not turn.
 /// In a plane tail, head and frame, by the normal.
 Eigen::Matrix<double, kMaxLocal, 3> discrete_half_spin(const Model& model, const TurnCoefficients& elastic,
                                                        const DiscreteStep& step, int stencil);

@@ -37,7 +37,7 @@ inline TurnOverSine<double> turn_over_sine(double x, double sine, double cosine)
   return {x / sine, (sine - x * cosine) / (sine * sine)};
 }
 
-/// How moments follow from strains: h_i with sum_i h_i D u_i = E1 - E0 for u = (kappa1, kappa2, tau), and d h_i / d u_j
+/// Moments from strains: h_i with sum_i h_i D u_i = E1 - E0 for u = (kappa1, kappa2, tau), and d h_i / d u_j
 /// at the end.
 template <class Scalar>
 struct DividedMoments {
@@ -211,7 +211,7 @@ void discrete_moment(const BendMeasure& measure, const EdgeFrame<Scalar>& a0, co
                        mb[2] = {inverse * (yb[0] - kb.x * vx), inverse * (yb[1] - kb.y * vx)};
     const Vec3<Scalar> twisting = c * vs - s * vc, mt = g * twisting;
     const Vec3<Scalar> bending = wa.x * ya[0] + wa.y * ya[1] + wb.x * yb[0] + wb.y * yb[1] + wx * vx;
-    // What wx changes by with the means of curvatures; those of the second frame turn with tau.
+    // Derivative of wx by the mean curvatures; curvatures in the second frame turn with tau.
     const Vec2<Scalar> by_curvature = Scalar(0.5) * (wa + half1.to_first(half1.to_first(wb)));
     const Scalar falling[3] = {by_curvature.x, by_curvature.y, 0.5 * (wb.x * v.y - wb.y * v.x)};
     for (int j = 0; j < 3; ++j) {
@@ -255,7 +255,7 @@ struct MovingEdge {
   Scalar torque(const Vec3<Scalar>& m) const { return dot(m, t); }
 };
 
-/// How a pair of frames' moment changes with an edge's vector and angle at the end: the derivatives by its spin, times
+/// Derivative of the moment of a pair of frames by an edge's vector and angle at the end: that by its spin, times
 /// the spin t1 x de / l1 + t1 (spin . de + d theta).
 template <class Scalar>
 struct EdgeColumns {
@@ -332,7 +332,7 @@ void add_transport(const EdgeFrame<Scalar>& middle, EdgeBlock<Scalar>& out) {
   add_outer(out.ee, Scalar(1.0), middle.spin, out.angle_e);
   out.e_angle += out.angle_angle * middle.spin;
 }
-/// How spin changes with the middle, which moves half as much as the end: d spin = -s x de / (l^2 (1 + s . t)) - spin
+/// Derivative of spin by the middle, which moves half as much as the end: d spin = -s x de / (l^2 (1 + s . t)) - spin
 /// (bow . de), s the tangent at the start.
 template <class Scalar>
 void add_spin_change(const MovingEdge<Scalar>& edge, const EdgeFrame<Scalar>& middle, const Scalar& torque,

@@ -75,7 +75,7 @@ struct PlanarMovingEdge {
     force = inverse_length * turned(t) + (stretch * cross(t0, t1)) * t;
   }
 
-  /// How a moment changes with the edge's vector at the end, of its change by a turn.
+  /// Derivative of a moment by the edge's vector at the end, from its derivative by a turn.
   Vec2<Scalar> column(const Scalar& by_turn) const { return (by_turn * inverse_length1) * turned(t1); }
 
   /// Adds, times `factor`, how the force of a moment that stays changes with the edge's vector at the end.

@@ -18,7 +18,7 @@ struct LocalOf {
   double gradient[size];
   double hessian[size][size];  ///< full
 };
-/// Of a stencil; the Hessian is symmetric.
+/// Energy, gradient and symmetric Hessian of a stencil.
 using Local = LocalOf<kMaxLocal>;
 
 /// Stiffnesses and natural strains of every stencil, as they act in one evaluation.

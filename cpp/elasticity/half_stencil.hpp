@@ -12,7 +12,7 @@
 
 namespace withe {
 
-/// How an attached end may turn.
+/// Rotations of an attached end.
 template <class Scalar>
 struct AttachedEnd {
   int slot;              ///< 0 where the stencil goes from the frame to the edge, else 1

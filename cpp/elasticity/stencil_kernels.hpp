@@ -39,7 +39,7 @@ struct StencilBatch {
   const double* edge_inertia;  ///< per edge, of theta [kg m^2]: likewise
 };
 
-/// What an energy-momentum step needs beside the middle, see discrete_elements.hpp. The batch's `force` is
+/// Data of an energy-momentum step besides its middle, see discrete_elements.hpp. The batch's `force` is
 /// then that of the mean strain, `frames` and `strain` are in the middle.
 struct MomentumBatch {
   const double *start_frames, *end_frames;  ///< tables like `frames`
@@ -49,8 +49,8 @@ struct MomentumBatch {
 struct StencilKernels {
   double (*bend)(const StencilBatch&);  ///< returns the energy of bending and twisting [J]
   double (*planar_bend)(const StencilBatch&);
-  /// Of an explicit step: the gradient alone, without the absolute sums, where edges' frames are measured from where
-  /// they are; with the couples of edges that spin and turn, see Equations::spin_couple.
+  /// Forces of an explicit step: the gradient alone, without the absolute sums, where edges' frames are measured from
+  /// where they are; with the couples of edges that spin and turn, see Equations::spin_couple.
   void (*bend_forces)(const StencilBatch&);
   void (*planar_bend_forces)(const StencilBatch&);
   /// Discrete gradients, see discrete_elements.hpp; of the lines above, whole ones are filled.
@@ -62,7 +62,7 @@ struct StencilKernels {
   void (*strain_changes)(const StencilBatch&, const double* change, double* out);
   /// Adds k g (g1 - g)^T to the matrix, g the gradients of strains and g1 those at the end: see add_rate_slopes.
   void (*rate_slopes)(const StencilBatch&, const MomentumBatch&);
-  /// Of the discrete gradient, where it leaves nodes nothing of the directors' transport: rows^T times its derivatives
+  /// Products of the discrete gradient without the transport of the directors: rows^T times its derivatives
   /// by K (mean strain - natural strain); three columns.
   void (*momentum_changes)(const StencilBatch&, const MomentumBatch&, const double* rows, double* out);
   /// Adds rows^T times its derivatives by the end; padded by kPadding.

@@ -124,7 +124,7 @@ void add_absolute(Pack* out, const Vec3<Pack>& v) {
   out[0] += absolute(v.x), out[1] += absolute(v.y), out[2] += absolute(v.z);
 }
 
-/// Whether the kLanes stencils from `first` follow one another.
+/// True if the kLanes stencils from `first` follow one another.
 bool are_inner(const StencilBatch& batch, int first) {
   const int last = first + kLanes - 1;
   if (last >= batch.count || batch.stencil[last] != batch.stencil[first] + kLanes - 1) return false;
@@ -134,7 +134,7 @@ bool are_inner(const StencilBatch& batch, int first) {
   return true;
 }
 
-/// What is wanted of a pack: forces of an explicit step; the gradient and its absolute sums; the matrix with them.
+/// Results of a pack: forces of an explicit step; the gradient and its absolute sums; the matrix with them.
 enum class Wanted { forces, gradient, matrix };
 
 /// Adds the gradient of a pack of stencils in space, with the axial forces of the edges that they own, and its absolute
@@ -165,7 +165,7 @@ void add_forces(const StencilBatch& batch, int first, int live, const BendTwistD
   add_vector<Block, 11>(batch, first, live, magnitude, batch.magnitude);
 }
 
-/// How the unknowns of two edges change, or at which rates.
+/// Changes, or rates, of the unknowns of two edges.
 struct EdgeChanges {
   Vec3<Pack> edge[2];
   Pack angle[2];

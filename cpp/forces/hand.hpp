@@ -23,7 +23,7 @@
 
 namespace withe {
 
-/// Of a point that slips beyond `limit` [N], with K u in the axes of what is grasped.
+/// Force of a point that slips beyond `limit` [N], with K u in the axes of what is grasped.
 struct CappedForce {
   Vector3 force = Vector3::Zero();  ///< [N]
   double share = 1.0;               ///< of K u that is left

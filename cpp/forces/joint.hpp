@@ -1,5 +1,5 @@
 #pragma once
-/// What drives a revolute joint and resists its turn, by the angle theta from how it is drawn [rad]: the torque
+/// Motor, spring and damper of a revolute joint, by its angle theta since the drawing [rad]: the torque
 ///   T = m - k (theta - theta0) - c dtheta/dt
 /// on what turns, and its opposite on what it turns against: a motor's moment m [N m], stiffness k [N m/rad] towards
 /// the rest angle theta0 [rad], damping c [N m s/rad]. A servo is a stiffness whose rest angle is moved.

@@ -38,7 +38,7 @@ struct Loads {
 /// Resolves the loads of a description: which node, edge or frame each acts on.
 Loads resolve_loads(const Model& model);
 
-/// Whether the forces of a piece and its like along the rod are minus the gradient of a potential.
+/// True if the forces of a piece and its like along the rod are minus the gradient of a potential.
 bool has_potential(const Model& model, const LoadPiece& piece);
 
 /// Unknowns of a piece in the order of its Local; -1 where there is none.

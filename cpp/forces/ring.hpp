@@ -52,7 +52,7 @@ Scalar ring_tension(const Ring& ring, const Scalar& u, const Scalar& arc_slope, 
     most = value_of(square) > 0.0 ? (ring.friction * ring.stiffness) * sqrt(square) : Scalar(0.0);
   }
   const Scalar limit = most * c.off_slope / (arc_slope * sqrt(dot(c.along, c.along)));
-  // Where nothing presses the limit is zero, and the sign of a u that is all rounding would decide what slips.
+  // Without pressure the limit is zero, and the sign of the rounding error of u would decide whether the rod slips.
   if (std::abs(value_of(elastic)) <= value_of(limit) + ring.stiffness * ring.rounding) return elastic;
   return value_of(elastic) > 0.0 ? limit : -1.0 * limit;
 }

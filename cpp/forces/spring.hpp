@@ -26,7 +26,7 @@ struct Spring {
 
 enum class SpringRule { end, middle, mean };
 
-/// Where a step comes from.
+/// State of a spring at the start of a step.
 template <class Scalar>
 struct SpringStart {
   SpringRule rule = SpringRule::end;

@@ -17,7 +17,7 @@ constexpr double kTolerance = 1e-9;  // of the velocity, relative
 constexpr int kEntry[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
 constexpr double kRough = 0.03;  // of a motion that is resisted much
 constexpr int kWait = 12;        // solutions until it is looked for again
-// Where edges are much shorter than the regularization, forces that differ from node to node do not move the fluid.
+// Shortest edge over the regularization: on shorter edges, forces that differ from node to node do not move the fluid.
 constexpr double kFinest = 1.0 / 3.0;
 
 std::size_t at(std::ptrdiff_t i) { return static_cast<std::size_t>(i); }
@@ -174,7 +174,7 @@ void StokesletFluid::place(const VectorX& q) {
   }
 }
 
-/// What unit forces on all nodes do to one, half of it to each of the two places that a block has in B + B^T.
+/// Velocity of one node by unit forces on all nodes, half of it to each of the two places that a block has in B + B^T.
 void StokesletFluid::add_row(int node) {
   const double x[3] = {position_[node], position_[line_ + node], position_[2 * line_ + node]};
   const auto column = [this](const VectorX& v, int k) { return v.data() + k * segments_; };

@@ -46,7 +46,8 @@ class StokesletFluid {
   void set_local_drag(double viscosity, MassMatrix& drag) const;
   /// A at q, three rows a node [1 / m]: 8 pi mu times velocity per force.
   Eigen::MatrixXd mobility(const VectorX& q);
-  /// What solutions leave for those to come: the last ones, to set out from, and where the parts of A were factorised.
+  /// Memory for later solutions: the last ones, as initial guesses, and the state at which the parts of A were
+  /// factorised.
   struct Memory {
     VectorX solution, past[2];  ///< the last one, and those before
     int known = 0;              ///< how many there are
@@ -62,7 +63,7 @@ class StokesletFluid {
   void recall(const Memory& memory);
   /// As it was before its first solution.
   void forget();
-  /// Of the last solution.
+  /// Iterations of the last solution.
   int iterations() const { return memory_.iterations; }
 
  private:

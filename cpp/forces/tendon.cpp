@@ -53,7 +53,7 @@ TurnSquare frame_curvature(const Model& model, const GuideSeat& seat, const Turn
   return out;
 }
 
-/// Of the arm and the tangent of a guide.
+/// Derivatives of the arm and the tangent of a guide.
 template <int width>
 Carried carried_by(const Segment& segment, int end, const Pull<width>& pull) {
   Carried out;
@@ -103,7 +103,7 @@ GuideSeat seat_of(const Model& model, const TendonGuide& guide, const Vector2& o
   return seat;
 }
 
-/// Whether a piece follows a rod; sets the signs of tangents.
+/// True if a piece follows a rod; sets the signs of tangents.
 bool follows(const Neighbours& neighbours, const Model& model, GuideSeat (&seat)[2]) {
   const auto middle = [](const GuideSeat& of) { return of.half < 0 && of.share == 0.5; };
   if (middle(seat[0]) && middle(seat[1])) {

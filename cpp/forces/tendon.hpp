@@ -32,7 +32,7 @@ namespace withe {
 constexpr int kTendonUnknowns = 14;
 using TendonLocal = LocalOf<kTendonUnknowns>;
 
-/// What a guide sits on.
+/// Seat of a guide: an edge, or a frame.
 struct GuideSeat {
   int edge = 0;
   double share = 0.5;  ///< along the edge, 0 at its tail
@@ -41,7 +41,7 @@ struct GuideSeat {
   Vector2 offset;      ///< along d1, d2; in a plane (normal x tangent, nothing) [m]
 };
 
-/// Where unknowns of what carries a guide are among those of its segment; -1: has none.
+/// Places of the unknowns of a guide's seat among those of its segment; -1: none.
 struct GuideUnknowns {
   int tail = -1, angle = -1, head = -1;   ///< of an edge
   int node = -1, frame = -1, hinge = -1;  ///< of what is attached to a frame
@@ -80,7 +80,7 @@ double segment_length(const Model& model, const TendonSegment& segment, const Ve
 /// Shortening of a segment by the bending of half an edge at a free end, per tension [m/N]: r^2 l / (2 EI), that of an
 /// arc of length l / 2 under the moment T r. The elastic energy has no stencil there, so that L does not contain it.
 double free_end_compliance(const Model& model, const Parameters& parameters, const TendonSegment& segment);
-/// Where the guides of a tendon are, in the axes of space [m].
+/// Positions of the guides of a tendon, in the axes of space [m].
 MatrixX3 guide_points(const Model& model, int tendon, const VectorX& q, const Configuration& c);
 
 }  // namespace withe

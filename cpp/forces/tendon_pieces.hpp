@@ -175,7 +175,7 @@ inline Matrix3 edge_turn(const EdgeFrame<double>& f) {
   return f.inverse_length * cross_matrix(t) + t * to_eigen(f.spin).transpose();
 }
 
-/// How what carries a guide turns.
+/// Rotation of a guide's seat.
 inline Turn turn_of(const Model& model, const TendonSegment& of, int k, const Guide& guide, const VectorX& q,
                     const Configuration& c) {
   Turn out = Turn::Zero();
@@ -192,7 +192,7 @@ inline Turn turn_of(const Model& model, const TendonSegment& of, int k, const Gu
   return out;
 }
 
-/// How a segment changes somewhere.
+/// Derivatives of a segment.
 template <int width>
 struct Changes {
   Turn turn[2], arm[2], tangent[2];
@@ -254,7 +254,7 @@ struct Pull {
     y = k * by_sum;
     axial = k * l;
     if (!by || b.length == 0.0) return;
-    // Of the second's |s|, p, B and A, and of L and T / L; then of means.
+    // Derivatives of the second's |s|, p, B and A, and of L and T / L; then of means.
     const Row<width> size = qb * (b.sum.transpose() * by->sum),
                      product = b.sum.transpose() * by->arms + b.arms.transpose() * by->sum,
                      along = qb * (product - b.along * size), stretched = 4.0 / 3.0 * along - product / 6.0,

@@ -15,7 +15,7 @@ Segment segment_at_start(const Model& model, const TendonSegment& segment, const
   return {model, segment, node, step.start};
 }
 
-/// What makes generalised forces of the moment m on what carries a guide, in an energy-momentum step, such that they
+/// Map from the moment m on a guide's seat to generalised forces, in an energy-momentum step, such that they
 /// work what the moment does over the finite turn; and their derivatives where the moment stays.
 struct WorkingTurn {
   Turn columns = Turn::Zero();

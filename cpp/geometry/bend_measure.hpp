@@ -1,5 +1,5 @@
 #pragma once
-/// How much a stencil is bent and twisted.
+/// Strains of bending and twisting of a stencil.
 ///
 /// Strains are f(|kappa|^2) (kappa1, kappa2, tau) with |kappa| = 2 tan(phi / 2) for a turn by phi, and
 ///   f(x) = (1 + a x) / (1 + b x).

@@ -7,7 +7,7 @@
 
 namespace withe {
 
-/// What a step's rotation by `angle` counts for where the middle of the step is that of a rotation: its Cayley vector.
+/// Cayley vector of a step's rotation by `angle`, for steps whose middle is the middle of a rotation.
 template <class Scalar>
 Scalar finite_turn(const Scalar& angle) {
   const double t = std::tan(0.5 * value_of(angle));

@@ -47,7 +47,7 @@ inline Vec3<Pack> three_unknowns(const double* q, const int (&index)[kLanes]) {
   return {number[1], number[2], number[3]};
 }
 
-/// Of kLanes edges, from a table.
+/// Frames of kLanes edges, from a table.
 inline EdgeFrame<Pack> frames_of(const double* frames, const int (&edge)[kLanes]) {
   const double* place[kLanes];
   for (int l = 0; l < kLanes; ++l) place[l] = frames + std::ptrdiff_t{kFrameNumbers} * edge[l];

@@ -27,7 +27,7 @@ struct SplinePiece {
   double high() const { return last() ? 0.5 : 1.0; }
 };
 
-/// Where on a curve: the piece, and a on it.
+/// Place on a curve: the piece, and a on it.
 struct SplinePlace {
   int piece = 0;
   double along = 0.5;
@@ -36,7 +36,7 @@ struct SplinePlace {
   bool operator==(const SplinePlace&) const = default;
 };
 
-/// What nodes weigh in c, in c' and in c''.
+/// Weights of the nodes in c, in c' and in c''.
 template <class Scalar>
 struct SplineWeights {
   Scalar value[3], slope[3];

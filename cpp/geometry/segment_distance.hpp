@@ -18,7 +18,7 @@ namespace withe {
 /// Weights A and B: this times the square of the smaller of a segment's length and of the contact distance.
 inline constexpr double kParallelWeight = 1e-3;
 
-/// Where two segments are closest.
+/// Closest points of two segments.
 struct ClosestPoints {
   double s = 0.5, t = 0.5;              ///< along a and b
   bool s_free = false, t_free = false;  ///< inside, not held at an end

@@ -1,5 +1,5 @@
 #pragma once
-/// What vec3.hpp is in space, in a plane.
+/// Vectors in a plane, as vec3.hpp in space.
 
 #include <type_traits>
 

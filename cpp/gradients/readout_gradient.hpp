@@ -20,13 +20,13 @@ struct ReadoutAdjoint {
   /// Throws std::invalid_argument where something has another size than the model.
   void check(const Model& model) const;
   bool has_reactions() const { return reactions.forces.size() != 0 || reactions.moments.size() != 0; }
-  /// Whether anything but reactions and velocities asks for where the state is, beyond positions of nodes.
+  /// True if anything but reactions and velocities asks for where the state is, beyond positions of nodes.
   bool needs_state() const {
     return directors.size() != 0 || curvatures.size() != 0 || twists.size() != 0 || tensions.size() != 0;
   }
 };
 
-/// Whether a scalar of a planar scene goes by what would leave the plane, which its unknowns do not have.
+/// True if a scalar of a planar scene goes by what would leave the plane, which its unknowns do not have.
 bool leaves_plane(const Model& model, const State& state, const ReadoutAdjoint& by);
 
 /// Adds what positions, velocities and spins say, which are unknowns.

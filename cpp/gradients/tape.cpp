@@ -305,7 +305,7 @@ class Tape::Moments {
   }
 
  private:
-  /// Whether axial forces after so many steps are read out in the middle of the last one.
+  /// True if axial forces after so many steps are read out in the middle of the last one.
   bool tensions_in_middle(long steps) const {
     return steps > 0 && tape_.steps_[static_cast<std::size_t>(steps - 1)].tensions_in_middle;
   }

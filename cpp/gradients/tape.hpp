@@ -80,12 +80,12 @@ class Tape {
   void cut(long count, const State& after, std::vector<SupportPose> hands);
   /// Says why no gradient goes through this run; the first reason stays.
   void refuse(const std::string& why);
-  /// Whether that is what the last step led to.
+  /// True if that is what the last step led to.
   bool continues(const State& state) const;
-  /// Whether these are as many loads as at the start.
+  /// True if these are as many loads as at the start.
   bool has_loads(const Parameters& parameters) const { return parameters.loads.rows() == acting_.load_rows(); }
 
-  /// Whether friction is there, or not, and pairs of bodies have their own, as at the start.
+  /// True if friction is there, or not, and pairs of bodies have their own, as at the start.
   bool has_friction(const ContactDescription& contact, bool frictional) const {
     return frictional == frictional_ && contact.pairs.size() == model_.description.contact.pairs.size();
   }

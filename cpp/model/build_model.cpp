@@ -29,7 +29,7 @@ struct Cluster {
   int merged_into = -1;  ///< of a plane that lets them turn by nothing: the one that has its passes now
 };
 
-/// Where a revolute link is, before frames have unknowns.
+/// Place of a revolute link, before frames have unknowns.
 struct LinkPlace {
   int parent, child;  ///< clusters, the latter of which turns; in space about the hinge
   double sign;        ///< of its unknown
@@ -186,7 +186,7 @@ class Builder {
                                 " are joined, join each of the rods to one of them");
   }
 
-  /// What a cluster on a hinge turns against.
+  /// Cluster that a cluster on a hinge turns against.
   int root_of(const Cluster& turning) const { return hinge_parent_[at(turning.hinge)]; }
 
   bool is_clamped(int cluster) const {

@@ -1,5 +1,5 @@
 #pragma once
-/// What the scene layer hands to the engine: plain arrays in SI units, one struct per thing that a user
+/// Description of a scene for the engine: plain arrays in SI units, one struct per kind of part that a user
 /// adds. Nodes that are joined already share one index here. Nothing in it changes after `build`.
 
 #include <array>
@@ -82,17 +82,17 @@ inline bool may_spin(SupportKind kind) {
   return kind == SupportKind::spinning_clamp || kind == SupportKind::spinning_edge;
 }
 
-/// What a hand holds: the rod from `at` - `length` / 2 to `at` + `length` / 2, as one piece of the shape that it has as
-/// it is grasped, or, where the hand yields, by a bed of springs as long; see forces/hand.hpp.
+/// Part of a rod that a hand holds: from `at` - `length` / 2 to `at` + `length` / 2, as one piece of the shape that it
+/// has as it is grasped, or, where the hand yields, by a bed of springs as long; see forces/hand.hpp.
 struct HandDescription {
   double at = 0, length = 0;  ///< arc length at rest [m]
-  /// Of the hand in the world as it grasps: where it is, and its axes as columns. Not posed: the rod's point and its
-  /// directors d1, d2, t.
+  /// Pose of the hand in the world as it grasps: its position, and its axes as columns. Not posed: the rod's point and
+  /// its directors d1, d2, t.
   bool posed = false;
   Vector3 position = Vector3::Zero();
   Matrix3 rotation = Matrix3::Identity();
   bool yields = false;
-  /// Where it yields: along d1, d2, t of what it holds [N/m], and about them [N m/rad].
+  /// Stiffness of a hand that yields: along d1, d2, t of the held rod [N/m], and about them [N m/rad].
   std::array<double, 6> stiffness{};
   double force_limit = std::numeric_limits<double>::infinity();  ///< beyond which it slips [N]
   /// A ring, see forces/ring.hpp: it yields, with stiffness[0] across the rod and along it.
@@ -120,7 +120,7 @@ enum class LoadKind {
   pressure,     ///< along a rod, value x tangent per present length [N/m]; pass.node is ignored
 };
 
-/// Whether the value of a load is an axis to turn about, and not a direction to push in.
+/// True if the value of a load is an axis to turn about, and not a direction to push in.
 inline bool is_axial(LoadKind kind) { return kind == LoadKind::moment || kind == LoadKind::pressure; }
 
 struct LoadDescription {
@@ -142,7 +142,7 @@ struct SpringDescription {
   double damping = 0;          ///< c [N s/m]
 };
 
-/// Where along an edge a guide of a tendon is. At the start or the end of a rod that is rigid with a joint or a clamp
+/// Place of a tendon's guide along an edge. At the start or the end of a rod that is rigid with a joint or a clamp
 /// there, it sits on that.
 enum class GuidePlace { start, middle, end };
 
@@ -162,7 +162,7 @@ struct TendonDescription {
 
 enum class ContactLaw { imcv2, imcv1, barrier, spillmann_teschner };
 
-/// How the stiffness of contact is found where no number is given.
+/// Rule for the contact stiffness if no number is given.
 enum class StiffnessRule {
   forces,  ///< each contact follows its force, so that surfaces are about a hundredth of the smaller radius deep
   source,  ///< one for all, the greatest force on a node in contact times 1e5 / m [Choi, dissertation, (5.17)]
@@ -175,7 +175,7 @@ enum class FrictionLaw {
   semi_explicit,  ///< normal force and direction of slip from the start of the step [Choi, dissertation, 4.5]
 };
 
-/// What to do with surfaces that are inside each other where the scene is drawn.
+/// Treatment of surfaces that are drawn inside each other.
 enum class Overlap {
   error,     ///< refuse the scene
   separate,  ///< move rods apart
@@ -195,7 +195,7 @@ struct ObstacleDescription {
   std::string name;
 };
 
-/// What a pair of bodies has of its own. Bodies are rods (their index) and obstacles (-1 - index).
+/// Coefficients of a pair of bodies. Bodies are rods (their index) and obstacles (-1 - index).
 struct ContactPairDescription {
   int first = 0, second = 0;
   bool ignored = false;
@@ -254,7 +254,8 @@ struct FluidDescription {
   double wavelength = 0;      ///< of waves along rods, for resistive-force theory [m]; 0: rods are straight
 };
 
-/// What bending strain is: the angle between two edges (nearly; see geometry/bend_measure.hpp), or 2 tan of its half.
+/// Measure of bending strain: the angle between two edges (nearly; see geometry/bend_measure.hpp), or 2 tan of its
+/// half.
 enum class Bending { angle, tangent };
 
 /// An end of a rod at a joint or a clamp whose end correction of bending (`Builder::share_bending`) was given up, as a
@@ -288,7 +289,7 @@ struct SceneDescription {
   FluidDescription fluid;
 };
 
-/// Where the rows of a load begin among those of all.
+/// First row of a load among the rows of all loads.
 inline Eigen::Index first_load_row(const SceneDescription& scene, std::size_t load) {
   Eigen::Index row = 0;
   for (std::size_t k = 0; k < load; ++k) row += scene.loads[k].values.rows();

@@ -48,7 +48,7 @@ inline Matrix3 drawn_frame(const FrameEdges& at, const Matrix3& before, const Ma
   return rotation_exp(at.share(l0, l1) * turn) * (at.place == FrameEdges::Place::end ? after : before);
 }
 
-/// How F turns, by a rotation vector: by turns of both edges' frames, and by their lengths [1/m].
+/// Rotation vector of F: by turns of both edges' frames, and by their lengths [1/m].
 struct DrawnFrameSlopes {
   Matrix3 before, after;
   Vector3 length0, length1;

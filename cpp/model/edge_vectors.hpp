@@ -6,7 +6,8 @@
 
 namespace withe {
 
-/// Of a node, in the axes of space: velocities, or what multiplies rows; in a plane positions are from its origin.
+/// Vector of a node, in the axes of space: velocities, or multipliers of rows; in a plane positions are from its
+/// origin.
 inline Vector3 node_vector(const Model& model, const VectorX& v, int node) {
   const int dof = model.node_dof[at(node)];
   if (!model.planar()) return v.segment<3>(dof);

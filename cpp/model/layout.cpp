@@ -6,7 +6,7 @@ namespace withe {
 
 namespace {
 
-/// What follows from where unknowns are.
+/// Indices that follow from the places of the unknowns.
 void note_places(Model& model) {
   const auto at = [](int i) { return static_cast<std::size_t>(i); };
   model.tail_dof.clear();

@@ -3,7 +3,7 @@
 namespace withe {
 namespace {
 
-/// What an edge of a density, or drag, per length couples its nodes by.
+/// Coupling of the nodes of each edge by a density, or drag, per length.
 void set_coupling(const Model& model, const Parameters& p, const VectorX& density, VectorX& coupling) {
   if (p.lumped)
     coupling.setZero(model.edge_count);

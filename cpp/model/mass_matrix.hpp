@@ -26,7 +26,7 @@
 
 namespace withe {
 
-/// Of an edge's rotary inertia, what a frame at its end carries.
+/// Share of an edge's rotary inertia that a frame at its end carries.
 inline constexpr double kFrameShare = 0.25;
 
 struct MassMatrix {

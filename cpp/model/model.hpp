@@ -57,13 +57,13 @@ struct JointAngle {
   int node = 0;
 
   bool turns() const { return turning >= 0; }
-  /// Of unknowns, or of their rates.
+  /// Angle of a joint from unknowns, or its rate from rates.
   double angle(const VectorX& q) const {
     return turns() ? sign * (q[turning] - (against < 0 ? 0.0 : q[against])) : 0.0;
   }
 };
 
-/// Where the curvature of a rod's stencil is: an ordinary stencil, or one or two halves at a frame.
+/// Place of the curvature of a rod's stencil: an ordinary stencil, or one or two halves at a frame.
 struct StencilPlace {
   int bend = -1;
   int half[2] = {-1, -1};
@@ -81,9 +81,9 @@ struct Constraint {
     own.head(size) = vector.segment(first, size);
     return own;
   }
-  /// What of them is held.
+  /// Held part of the constrained unknowns.
   Vector3 held(const VectorX& vector) const { return held_of(part(vector)); }
-  /// What is held of their change from one vector to another.
+  /// Held part of the change from one vector to another.
   Vector3 held_change(const VectorX& from, const VectorX& to) const { return held_of(part(to) - part(from)); }
 
   Vector3 held_of(const Vector3& own) const { return own - free * own; }
@@ -106,7 +106,7 @@ struct Support {
   int edge = -1;                       ///< hold_edge
   Vector3 tangent = Vector3::UnitX();  ///< drawn, of what is held: the rod at a frame, or an edge
   std::vector<int> nodes, edges;       ///< nodes whose places and edges whose angles it holds
-  // Of a hand:
+  // Data of a hand:
   std::vector<TouchedEdge> touched;  ///< in the order of the rod
   std::vector<int> span;             ///< nodes of these edges, in that order
   int at_edge = -1;                  ///< which of these edges has the point that it is at
@@ -118,7 +118,7 @@ struct Support {
   bool slides() const { return is_hand() && description.hand.slides; }
 };
 
-/// How surfaces that touch press and rub: between rods, on obstacles, and of pairs of bodies that have something of
+/// Coefficients of contact and friction: between rods, on obstacles, and of pairs of bodies with coefficients of
 /// their own.
 struct SurfaceParameters {
   double friction = 0;               ///< between rods [-]
@@ -242,7 +242,7 @@ Model build_model(const SceneDescription& description, std::optional<bool> plana
 void add_offsets(Model& model, std::size_t uncorrected_end, const Vector3& at_frame, const Vector3& at_next);
 /// Parameters as described, derived ones included.
 Parameters initial_parameters(const Model& model);
-/// How surfaces press and rub, as described; update_derived must follow.
+/// Set the coefficients of contact and friction from the description; update_derived must follow.
 void set_contact(const ContactDescription& contact, Parameters& parameters);
 /// Stiffnesses, densities, viscous time and drag of one rod, from one value an edge; update_derived must follow.
 void set_rod(const Model& model, int rod, const RodDescription& description, Parameters& parameters);
@@ -276,7 +276,7 @@ ArcOfStencil arc_of_half(const Model& model, Eigen::Index stencil);
 Vector2 discrete_curvature(const Vector2& smooth, double voronoi);
 /// Its inverse.
 Vector2 smooth_curvature(const Vector2& discrete, double voronoi);
-/// Of stencils, one a row [1/m].
+/// Curvatures of the smooth rod from discrete ones, one stencil a row [1/m].
 MatrixX2 smooth_curvatures(const MatrixX2& discrete, const VectorX& voronoi);
 /// Refuses smooth curvatures, a row a stencil or one for all, that turn a rod by pi or more at a node;
 /// std::invalid_argument says where, and of what: `owner`.

@@ -44,14 +44,14 @@ enum class ParameterKind {
   pair_contact_stiffness,
 };
 
-/// What a parameter has a row of numbers for: the scene; every node; every edge, or stencil, of a rod; every obstacle;
-/// every spring; every revolute joint; every tendon; every load, or each of its edges; every pair of bodies that has
-/// something of its own.
+/// Extent of a parameter, which has one row of numbers for: the scene; every node; every edge, or stencil, of a rod;
+/// every obstacle; every spring; every revolute joint; every tendon; every load, or each of its edges; every pair of
+/// bodies that has something of its own.
 enum class Extent { scene, node, edge, stencil, spring, joint, tendon, load, obstacle, pair };
 
 enum class Range { any, non_negative, positive };
 
-/// What derives from a parameter.
+/// Quantities that derive from a parameter.
 enum class Derived { nothing, masses, stiffness, viscous_times, natural_strains };
 
 struct ParameterInfo {
@@ -94,7 +94,7 @@ void check_setting(const Model& model, const ParameterSetting& setting);
 /// were any.
 bool set_parameters(const Model& model, std::span<const ParameterSetting> settings, Parameters& parameters);
 
-/// What derives from parameters, of a rod where they belong to one.
+/// Update the quantities that derive from parameters, for one rod if the parameters belong to it.
 void update_derived(const Model& model, Derived derived, int rod, Parameters& parameters);
 
 }  // namespace withe

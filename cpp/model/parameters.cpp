@@ -226,7 +226,7 @@ class NaturalStrain {
   std::optional<Vector2> plane_;
 };
 
-/// Of a stencil across two rods: each rod's nearest natural strain over its half of the length.
+/// Natural strain of a stencil across two rods: each rod's nearest natural strain over its half of the length.
 void update_natural_across(const Model& model, Parameters& p, int stencil) {
   p.bend_natural.row(stencil) = model.bend_offset.row(stencil);
   for (const int edge : model.bend[at(stencil)].edge) {
@@ -238,7 +238,7 @@ void update_natural_across(const Model& model, Parameters& p, int stencil) {
   }
 }
 
-/// What edges give their nodes, and frames that they are attached to.
+/// Masses that edges give to their nodes, and to the frames that they are attached to.
 void update_masses(const Model& model, Parameters& p) {
   p.node_mass = p.added_mass;
   p.node_drag = VectorX::Zero(model.node_count);

@@ -47,7 +47,7 @@ void collect_directions(const SceneDescription& scene, std::vector<Vector3>& dir
       for (const auto& value : load.values.rowwise()) add(value.transpose(), 0.0);
 }
 
-/// Whether an obstacle meets rods in a plane as its cut by the plane does: a plane that stands on it, a capsule whose
+/// True if an obstacle meets rods in a plane as its cut by the plane does: a plane that stands on it, a capsule whose
 /// axis lies in it or stands on it and goes through.
 bool fits(const ObstacleDescription& o, const Vector3& corner, const Vector3& normal) {
   if (o.kind == ObstacleKind::plane) return std::abs(o.other.dot(normal)) < 1e-9;
@@ -133,7 +133,7 @@ std::string why_off_plane(const SceneDescription& scene, const RodDescription& r
   return "";
 }
 
-/// Whether a direction is the plane's normal or lies in the plane, so that the mirror image of what belongs to it is
+/// True if a direction is the plane's normal or lies in the plane, so that the mirror image of what belongs to it is
 /// itself.
 bool is_mirrored(const Vector3& direction, const Vector3& normal) {
   constexpr double kAngle = 1e-9;
@@ -141,7 +141,7 @@ bool is_mirrored(const Vector3& direction, const Vector3& normal) {
          direction.cross(normal).norm() <= kAngle * direction.norm();
 }
 
-/// Whether something turns a revolute joint about an axis in the plane.
+/// True if something turns a revolute joint about an axis in the plane.
 bool turns_out(const RevoluteLink& link, const Vector3& normal) {
   return (link.moment != 0.0 || link.rest_angle != 0.0) && std::abs(link.axis.dot(normal)) < 0.5;
 }
@@ -152,7 +152,7 @@ Matrix3 hand_axes(const SceneDescription& scene, const SupportDescription& suppo
   return first_frame(scene, scene.rods[static_cast<std::size_t>(support.pass.rod)]);
 }
 
-/// Whether the springs of a hand push out of the plane what moves in it: not where the normal is an axis of both.
+/// True if the springs of a hand push out of the plane what moves in it: not where the normal is an axis of both.
 bool leans(const SceneDescription& scene, const SupportDescription& support, const Vector3& normal) {
   const HandDescription& hand = support.hand;
   if (support.kind != SupportKind::hand || !hand.yields || hand.slides) return false;

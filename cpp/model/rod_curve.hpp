@@ -19,7 +19,7 @@ struct RodCurve {
   int pieces() const { return static_cast<int>(nodes.size()); }
   /// Pieces of a closed rod go on for ever.
   SplinePiece piece(int i) const;
-  /// Where an arc length is [m].
+  /// Place of an arc length [m].
   SplinePlace place(double at) const;
   double arc_at(const SplinePlace& place) const { return spline_arc(piece(place.piece), place.along); }
   /// From one place to another: the difference in arc length [m], exact however small it is.
@@ -66,7 +66,7 @@ Vec3<double> way_between(const RodCurve& curve, const SplinePlace& from, const S
   }
 }
 
-/// Where r . c' of one piece vanishes, between two places on it where it has either sign.
+/// Zero of r . c' on one piece, between two places on it with opposite signs.
 inline double nearest_on_piece(const SplinePiece& piece, const Vec3<double> (&x)[3], double low, double high) {
   const auto off = [&](double a) { return spline_point(spline_weights(piece, a), x); };
   double a = 0.5 * (low + high);
@@ -84,8 +84,8 @@ inline double nearest_on_piece(const SplinePiece& piece, const Vec3<double> (&x)
   return a;
 }
 
-/// Where a curve is nearest to a point, as near to `start` as it gets without going away from it; at a place that is no
-/// number where a closed rod never is. `position`: of a node in space.
+/// Place of a curve that is nearest to a point, as near to `start` as it gets without going away from it; at a place
+/// that is no number where a closed rod never is. `position`: of a node in space.
 template <class Positions>
 SplinePlace nearest_place(const RodCurve& curve, SplinePlace start, const Positions& position, const Vector3& from) {
   start.beyond = false;

@@ -1,5 +1,5 @@
 #pragma once
-/// What changes while a scene runs.
+/// State of a scene: the values that change while it runs.
 
 #include <algorithm>
 #include <compare>
@@ -15,7 +15,7 @@ struct ContactKey {
   friend auto operator<=>(const ContactKey&, const ContactKey&) = default;
 };
 
-/// What a contact remembers from one step to the next.
+/// Memory of a contact from one step to the next.
 struct ContactRecord {
   ContactKey key;
   double force = 0;      ///< pressing the surfaces apart [N]
@@ -29,7 +29,7 @@ struct ContactRecord {
   bool sticking = false;
 };
 
-/// Where an obstacle is, in the axes of the unknowns (in a plane: its two, and zero).
+/// Place of an obstacle, in the axes of the unknowns (in a plane: its two, and zero).
 struct ObstaclePlace {
   Vec3d point{}, other{};  ///< of a plane: a point, and its normal; of a capsule: its ends [m]
   Vec3d turn{};            ///< about its own axis, since it was drawn; full turns count [rad]
@@ -67,7 +67,7 @@ auto find_record(Records& records, const ContactKey& key) -> decltype(records.da
   return find_record(records, key, lookup);
 }
 
-/// How a rod passes a ring; see forces/ring.hpp.
+/// Passage of a rod through a ring; see forces/ring.hpp.
 struct RingState {
   SplinePlace place;         ///< where
   double origin = 0;         ///< s0, arc length there at first [m]
@@ -75,14 +75,14 @@ struct RingState {
   bool left = false;         ///< whether the rod has: an end has passed
 };
 
-/// Where a hand is, and what it holds as it sees it.
+/// Pose of a hand, and the held rod in the axes of the hand.
 struct HandState {
   Vector3 position = Vector3::Zero();      ///< [m]
   Matrix3 rotation = Matrix3::Identity();  ///< columns: its axes
   /// As it was grasped, from the hand and in its axes: nodes that it spans, or points on edges where it yields [m].
   std::vector<Vector3> points;
   std::vector<Matrix3> edges;  ///< columns d1, d2, t of the edges that it touches
-  // Where it yields, per edge:
+  // Of a hand that yields, per edge:
   std::vector<Vector3> slip;  ///< along d1, d2, t of what was grasped [m]
   VectorX twist;              ///< of the edge against that, which fixes the branch of the angle [rad]
   RingState ring;             ///< where it slides
@@ -117,7 +117,7 @@ struct State {
 };
 
 State initial_state(const Model& model);
-/// Where an obstacle has gone from where it is drawn [m], and how it has turned [rad].
+/// Displacement [m] and rotation [rad] of an obstacle since the drawing.
 struct ObstacleWay {
   Vector3 shift = Vector3::Zero(), turn = Vector3::Zero();
 };

@@ -1,5 +1,5 @@
 #pragma once
-/// How the numbers of a stencil follow from those of its edges, on any scalar: doubles, or dual numbers for
+/// Coefficients of a stencil from those of its edges, on any scalar: doubles, or dual numbers for
 /// derivatives.
 
 #include <cmath>

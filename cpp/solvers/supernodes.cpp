@@ -97,7 +97,7 @@ struct Group {
   double stored() const { return columns * (0.5 * (columns + 1.0) + rest); }
 };
 
-/// Whether one that takes in a child is worth its zeros.
+/// True if one that takes in a child is worth its zeros.
 bool worth_merging(const Group& merged) {
   const double zeros = 1.0 - merged.entries / merged.stored();
   return zeros < (merged.columns <= 8 ? 0.3 : merged.columns <= 16 ? 0.2 : 0.1);

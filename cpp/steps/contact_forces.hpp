@@ -25,7 +25,7 @@ class ContactForces final : public Term {
                    StepAdjoint& adjoint) const override;
   void add_rounding(const StepProblem& problem, StepData& data) const override;
 
-  /// Whether anything touches at z.
+  /// True if anything touches at z.
   bool touches(const StepProblem& problem, const VectorX& z);
   /// How much of a step of z contact allows, from 0 to 1.
   double allowed(const StepProblem& problem, const VectorX& z, const VectorX& step);

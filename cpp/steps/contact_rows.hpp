@@ -20,7 +20,7 @@ class ContactRows {
     const ContactKey* known = lookup.find(keys_, key, std::identity{});
     return known ? static_cast<int>(known - keys_.data()) : -1;
   }
-  /// Whether all that touches has a row.
+  /// True if all that touches has a row.
   bool hold(const Contact& contact) const {
     OrderedLookup lookup;
     for (int i = 0; i < contact.count(); ++i)

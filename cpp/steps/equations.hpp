@@ -25,7 +25,7 @@ struct EquationOptions {
   StepRule rule = StepRule::midpoint;
   double static_duration = 0;  ///< in which slip happens in statics [s]
   SolverKind solver = SolverKind::automatic;
-  /// Whether matrices have every derivative, and those of held unknowns and by them: then not projected, often
+  /// True if matrices have every derivative, and those of held unknowns and by them: then not projected, often
   /// unsymmetric.
   bool exact = false;
 };
@@ -65,7 +65,7 @@ class Equations {
   HandForces* hands() { return terms_.hands; }
   /// How much of a step of z contact allows, from 0 to 1.
   double allowed(const VectorX& z, const VectorX& step);
-  /// Whether anything touches at z: what is evaluated next.
+  /// True if anything touches at z: what is evaluated next.
   bool touches(const VectorX& z);
   /// Predicts the friction of a step of Newton's method from the last evaluation, of which `kept` is left.
   void predict_friction(const VectorX& step, double kept, ContactLinearisation& linearisation);
@@ -75,7 +75,7 @@ class Equations {
   /// it. `held_acceleration`: of what supports hold, see StepProblem.
   void begin(const State& state, const Parameters& parameters, StepRule rule, double h,
              const Prescribed& prescribed = Prescribed::nothing(), const VectorX* held_acceleration = nullptr);
-  /// Whether Stokeslets act: then `begin_flow` follows `begin`, with velocities `v` at positions `q`. False where no
+  /// True if Stokeslets act: then `begin_flow` follows `begin`, with velocities `v` at positions `q`. False where no
   /// solution was found.
   bool flows() const { return terms_.stokeslets != nullptr; }
   bool begin_flow(const VectorX& q, const VectorX& v);
@@ -90,7 +90,7 @@ class Equations {
   /// residual alone. No contact, viscosity, drag or fluid.
   void evaluate_forces(const VectorX& v, StepData& data) const;
 
-  /// Whether anything but contact takes energy from the motion.
+  /// True if anything but contact takes energy from the motion.
   bool dissipates(const Parameters& parameters) const;
   /// What drag, viscosity, springs, joints and fluids take over `change`, with the forces of the last evaluation [J].
   double dissipated(const StepData& data, const VectorX& change) const;

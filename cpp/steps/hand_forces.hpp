@@ -39,7 +39,7 @@ class HandForces final : public Term {
                           const Vector3& by_moment, StepAdjoint& adjoint, VectorX& by_z) const;
   bool slips() const { return slips_; }
   const RingForces& rings() const { return rings_; }
-  /// Whether something slips where a state is, or would with any more force.
+  /// True if something slips where a state is, or would with any more force.
   bool at_limit(const State& state) const;
   /// What hands have done in a step that has just been evaluated [J].
   double work(const StepProblem& problem, const StepData& data, const VectorX& q1) const;

@@ -15,7 +15,7 @@ class RingForces {
 
   ElementTable& table() { return table_; }
   int count() const { return static_cast<int>(rings_.size()); }
-  /// Whether friction or a limit lets any slip along.
+  /// True if friction or a limit lets any slip along.
   bool slips() const { return slips_; }
 
   void add(const StepProblem& problem, StepData& data, std::span<double> values) const;

@@ -51,7 +51,7 @@ struct StepProblem {
   /// Of what supports hold, which acts on the edges next to it; meaningful where held. Empty: as the rest accelerates.
   VectorX held_acceleration;
 
-  /// Whether z is the middle of the step, and q1 = 2 z - q0.
+  /// True if z is the middle of the step, and q1 = 2 z - q0.
   bool in_middle() const { return rule == StepRule::midpoint || rule == StepRule::energy_momentum; }
   bool conserves_energy() const { return rule == StepRule::energy_momentum; }
   bool moves() const { return interval != 0.0; }

@@ -22,9 +22,9 @@ class Term {
 
   /// Adds the tables of its own elements: the assembler makes room for them in the matrix, before any step.
   virtual void declare(std::vector<ElementTable*>& /*tables*/) {}
-  /// Whether its forces are minus the gradient of a potential.
+  /// True if its forces are minus the gradient of a potential.
   virtual bool has_potential() const { return true; }
-  /// Whether it takes anything from the motion.
+  /// True if it takes anything from the motion.
   virtual bool dissipates(const Parameters&) const { return false; }
   /// A line for the plan; nothing where there is nothing to say.
   virtual std::string note() const { return {}; }

@@ -95,7 +95,7 @@ class PairSearch {
     used_[static_cast<std::size_t>(first)] = 0;
   }
 
-  /// Whether the two pairs of four branches separate each other, seen from their middle.
+  /// True if the two pairs of four branches separate each other, seen from their middle.
   bool interleaved() const {
     Vector2 middle = Vector2::Zero();
     for (const Branch& branch : branches_) middle += 0.25 * branch.point;

@@ -67,8 +67,8 @@ std::vector<Vector2> grow_end(const BitImage& mask, const Branch& tip) {
   };
   const double middle = mean_ahead(0.0, 0.3);
   if (middle >= limit - 1) return points;  // runs into something else
-  // Between .5 and .8 of the half width from the middle a half disc falls back by .24 half widths on average; the
-  // pixels of a straight cut by some .06.
+  // Between 0.5 and 0.8 of the half width from the middle a half disc falls back by 0.24 half widths on average; the
+  // pixels of a straight cut by some 0.06.
   const double fallen = (middle - mean_ahead(0.5, 0.8)) / half_width;
   // A few pixels decide, so the estimate stays away from either extreme: a wrong one costs less than a half width.
   const double roundness = std::clamp(0.2 + 0.6 * (fallen - 0.08) / 0.14, 0.2, 0.8);

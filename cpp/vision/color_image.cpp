@@ -21,7 +21,7 @@ constexpr std::array<int, 256> reciprocals(int scale) {
 constexpr std::array<int, 256> kSaturation = reciprocals(255);
 constexpr std::array<int, 256> kHue = reciprocals(30);
 
-/// Whether any of eight bytes is at least `level`, 1 <= level <= 128.
+/// True if any of eight bytes is at least `level`, 1 <= level <= 128.
 bool any_reaches(std::uint64_t bytes, int level) {
   constexpr std::uint64_t high = 0x8080808080808080ULL;
   const std::uint64_t add = 0x0101010101010101ULL * static_cast<std::uint64_t>(128 - level);

@@ -129,7 +129,7 @@ Branch measure_branch(const SkeletonGraph& graph, const SkeletonEdge& edge, int 
   return branch;
 }
 
-/// Whether a link splits at both ends like a fork with a narrow angle: two cables that lie on each other for a while.
+/// True if a link splits at both ends like a fork with a narrow angle: two cables that lie on each other for a while.
 bool is_forked(std::size_t link, const SkeletonGraph& graph, Union& sets, const std::vector<std::vector<int>>& leaving,
                const std::vector<Branch>& branches) {
   const SkeletonEdge& edge = graph.edges[link];
@@ -226,7 +226,7 @@ class ZoneFinder {
     return ends;
   }
 
-  /// Whether a link is wider than one cable, or as wide and forked at both ends.
+  /// True if a link is wider than one cable, or as wide and forked at both ends.
   bool is_wide(std::size_t link) {
     const SkeletonEdge& edge = graph_.edges[link];
     if (edge.length > options_.merged_link * 2 * inner_half_width(edge)) return false;

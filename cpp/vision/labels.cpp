@@ -174,7 +174,7 @@ void paint_labels(const BitImage& mask, const Tracing& tracing, std::int32_t* la
     const Cable& cable = tracing.cables[c];
     const std::ptrdiff_t n = cable.centreline.rows();
     const std::ptrdiff_t segments = cable.closed ? n : n - 1;
-    constexpr std::ptrdiff_t step = 4;  // rows; the arc of a tight bend rises less than .3 px over them
+    constexpr std::ptrdiff_t step = 4;  // rows; the arc of a tight bend rises less than 0.3 px over them
     for (std::ptrdiff_t row = 0; row < segments; row += step) {
       const std::ptrdiff_t end = std::min(row + step, segments);
       painter.paint_nearest(row_of(cable, row), row_of(cable, end), half_width_of(cable, (row + end) / 2),

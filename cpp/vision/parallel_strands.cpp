@@ -34,7 +34,7 @@ std::vector<std::pair<int, int>> find_waists(const SkeletonLine& line, double bo
   return waists;
 }
 
-/// Whether the strand on the left of the first end is that on the right of the second, by widths, or then by colours;
+/// True if the strand on the left of the first end is that on the right of the second, by widths, or then by colours;
 /// otherwise as `expected`.
 bool change_sides(const SkeletonGraph& graph, const std::array<HalfEdge, 2>& first,
                   const std::array<HalfEdge, 2>& second, const ColorImage* image, const std::vector<Branch>& branches,

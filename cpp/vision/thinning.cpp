@@ -43,7 +43,7 @@ constexpr std::array<int, 8> kOrder{1, 3, 5, 7, 0, 2, 4, 6};
 
 using Neighbours = std::array<std::uint64_t, 8>;
 
-/// Whether the table is constant once the first `Depth` neighbours of the order are `Code`: 0, 1, or -1 for neither.
+/// True if the table is constant once the first `Depth` neighbours of the order are `Code`: 0, 1, or -1 for neither.
 template <int Pass, int Depth, int Code>
 constexpr int constant() {
   int seen = -1;

@@ -31,7 +31,7 @@ BitImage smooth(const BitImage& mask) {
   return result;
 }
 
-/// Whether there is a square of four pixels: lines a single pixel wide are no cables.
+/// True if there is a square of four pixels: lines a single pixel wide are no cables.
 bool has_width(const BitImage& mask) {
   for (int y = 1; y < mask.height(); ++y) {
     const std::uint64_t* above = mask.row(y - 1);

@@ -175,7 +175,7 @@ TEST(Stokeslets, AStraightRodHasTheDragOfASlenderCylinder) {
 
 TEST(Stokeslets, ResistanceToWavesIsThatOfALongRod) {
   const int nodes = 801;
-  const double regularization = 0.0149;  // of edges of .005
+  const double regularization = 0.0149;  // of edges of 0.005
   SceneBuilder builder = rod_through(testing::line(Vector3::Zero(), Vector3(4, 0, 0), nodes));
   const Model model = build_model(in_stokeslets(builder, regularization), false);
   const MatrixX A = StokesletFluid(model).mobility(initial_state(model).q);

@@ -19,7 +19,7 @@ using testing::SceneBuilder;
 constexpr Integrator kDynamic[] = {Integrator::backward_euler, Integrator::implicit_midpoint,
                                    Integrator::energy_momentum, Integrator::fourth_order, Integrator::verlet};
 
-/// Whether a scene can run backwards, as parts of fourth-order steps do.
+/// True if a scene can run backwards, as parts of fourth-order steps do.
 bool reversible(const SceneDescription& scene) {
   for (const RodDescription& rod : scene.rods)
     if ((rod.viscous_time.array() > 0.0).any()) return false;
