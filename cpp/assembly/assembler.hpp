@@ -32,7 +32,7 @@ class ElementTable {
   /// True if a regular element's lines are rows.
   bool by_rows(int element) const { return offset(element, 0, 1) == offset(element, 0, 0) + 1; }
 
-  /// Where the entry of row i and column j of an element's square stands in the solver's values.
+  /// Place of the entry (i, j) of an element's square in the solver's values.
   std::ptrdiff_t offset(int element, int i, int j) const;
   /// residual += scale gradient, magnitude += |gradient|.
   void add_gradient(int element, const double* gradient, double scale, VectorX& residual, VectorX& magnitude) const;
@@ -53,7 +53,7 @@ class ElementTable {
   void add_dense_hessian(int element, const double* hessian, int stride, double scale, std::span<double> values) const;
   /// Offsets of an element: of the unknowns that are not left out, row after row, or of the lower triangle.
   const int* offsets(int element) const { return offsets_.data() + starts_[static_cast<std::size_t>(element)]; }
-  /// How many of an element's first unknowns are not left out.
+  /// Number of an element's first unknowns that are not left out.
   int present(int element, int before) const {
     const int* d = dofs(element);
     return before - static_cast<int>(std::count_if(d, d + before, [](int dof) { return dof < 0; }));
@@ -86,7 +86,7 @@ class Assembler {
   const SparsityPattern& pattern() const { return pattern_; }
   LinearSolver& solver() { return *solver_; }
   const LinearSolver& solver() const { return *solver_; }
-  /// Where the diagonal lives in the solver's values, per unknown.
+  /// Places of the diagonal in the solver's values, per unknown.
   const std::vector<std::ptrdiff_t>& diagonal_offsets() const { return diagonal_; }
   double diagonal(int dof) const {
     return solver_->values()[static_cast<std::size_t>(diagonal_[static_cast<std::size_t>(dof)])];
@@ -124,7 +124,7 @@ class Assembler {
   /// Takes out what supports hold: rows and columns are projected onto the free directions, and the held
   /// ones get a positive diagonal, so that the pattern stays and held increments vanish.
   void project_matrix();
-  /// Likewise, and back.
+  /// Project the matrix until it is restored, see above.
   void project_for_now();
   void take_back_projection();
   void project(VectorX& vector) const;

@@ -29,7 +29,7 @@ Quaternion product(const Quaternion& a, const Quaternion& b);
 
 constexpr double kRodBendStiffness = 2.0;  ///< EI [w Lgb^2]
 
-/// What is asked of the held end, and which two of the floor's three forces are unknown for it.
+/// Condition at the held end, and which two of the floor's three forces are unknown for it.
 enum class RodEnd {
   no_moment,    ///< a gripper that bends nothing; F along y and z
   plane_of_xz,  ///< position along x and z; F along x and z

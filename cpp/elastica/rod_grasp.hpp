@@ -10,7 +10,7 @@ namespace withe {
 
 using GraspProblem = RodProblem<RodEnd::no_moment>;
 
-/// What is asked. Lengths in Lgb, forces in w Lgb.
+/// Question about a grasp. Lengths in Lgb, forces in w Lgb.
 struct GraspQuestion {
   double suspended = 1, curvature = 0;  ///< of either sign
   double stretch_stiffness = 1e9;       ///< EA
@@ -20,7 +20,7 @@ struct GraspQuestion {
   double twist_stiffness = 4.0 / 3.0;  ///< GJ, by default that of a round rod of incompressible material
 };
 
-/// What a user sees of one grasp. Lengths in Lgb, forces in w Lgb.
+/// Result of one grasp. Lengths in Lgb, forces in w Lgb.
 struct RodGrasp {
   RodPoint tip{};  ///< its rotation with the twist
   RodVector floor_force{};

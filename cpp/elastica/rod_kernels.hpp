@@ -33,7 +33,7 @@ struct RodKernels {
   void (*turn)(const RodField& field, const RodBlock& block, ByRodSegment* states);
   void (*move)(const RodField& field, const RodBlock& block, ByRodSegment* states);
   void (*rotate)(const RodField& field, const RodBlock& block, ByRodSegment* states);
-  /// Of a block in one part: the state at the end, of each number its value and its slopes by the unknowns.
+  /// State at the end of a block in one part: the value of each number and its slopes by the unknowns.
   void (*linearise_turn)(const RodField& field, const RodBlock& block, ByRodSegment (*ends)[1 + kRodUnknowns]);
   void (*linearise_move)(const RodField& field, const RodBlock& block, ByRodSegment (*ends)[1 + kRodUnknowns]);
 };

@@ -23,7 +23,7 @@ struct SheetShape {
   double tip_moment = 0;  ///< [w Lgb^2]
 };
 
-/// What is asked of the tip besides its moment.
+/// Conditions at the tip besides its moment.
 enum class TipTarget {
   position,              ///< x = length - X and z = Z: the tip's way back and up from where it lay in the flat sheet
   length_and_angle,      ///< suspended length, and theta at the tip
@@ -56,14 +56,14 @@ class SheetProblem {
 /// States at the cuts of a path that is integrated from its start on.
 void set_nodes(const SheetShape& shape, SheetProblem::Path& path);
 
-/// Of what of a sheet of a length is not lifted [w Lgb].
+/// Weight of the part of a sheet that is not lifted [w Lgb].
 double lying_weight(const SheetWidth& width, const SheetProblem::Path& path, double sheet_length);
 
 inline double tip_back(const SheetProblem::Path& path) { return path.values[2] - path.nodes.back()[2]; }
 inline double tip_up(const SheetProblem::Path& path) { return path.nodes.back()[3]; }
 inline double tip_angle(const SheetProblem::Path& path) { return path.nodes.back()[0]; }
 
-/// What holds along a solved path. Lengths in Lgb, forces in w Lgb.
+/// Extremes along a solved path. Lengths in Lgb, forces in w Lgb.
 struct SheetExtremes {
   double largest_curvature = 0;  ///< of its absolute value
   double smallest_angle = 0;

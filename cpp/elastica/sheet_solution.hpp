@@ -1,5 +1,5 @@
 #pragma once
-/// What a user sees of one equilibrium of the suspended sheet.
+/// Result of one equilibrium of the suspended sheet.
 
 #include "elastica/sheet.hpp"
 

@@ -25,7 +25,7 @@ class SheetWidth {
   std::size_t piece_before(double t) const;
 
   double width_at(double t) const { return even() ? 1.0 : pieces_[piece_before(t)].width_at(t); }
-  /// Of the part from the tip to t [w Lgb].
+  /// Weight of the part from the tip to t [w Lgb].
   double weight_at(double t) const { return even() ? t : pieces_[piece_before(t)].weight_at(t); }
 
   /// 1 + share (scale b - 1): a way from an even sheet to this one.

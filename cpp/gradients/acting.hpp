@@ -24,12 +24,12 @@ class ActingNumbers {
   std::size_t count() const { return stretches_.size(); }
   /// The first step of a stretch. The first stretch is what was before any step, and may have none.
   std::size_t first(std::size_t stretch) const { return stretches_[stretch].first; }
-  /// What was before any step.
+  /// Parameters before any step.
   const Parameters& start() const { return *stretches_.front().base; }
-  /// Of the natural shapes that acted last.
+  /// Version of the natural shapes that acted last.
   long natural_version() const { return stretches_.back().natural_version; }
   Eigen::Index load_rows() const { return start().loads.rows(); }
-  /// What acts in a stretch, made of what `out` is of another one, or of nothing yet.
+  /// Parameters of a stretch, made from those of another stretch in `out`, or from nothing yet.
   struct Player {
     std::size_t stretch = 0;
     std::shared_ptr<const Parameters> base;

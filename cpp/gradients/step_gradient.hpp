@@ -28,7 +28,7 @@ struct StateAdjoint {
   MatrixX3 obstacles = {};  ///< by their places, per obstacle, in the axes of the unknowns [1/m]; empty: nothing
 };
 
-/// What is differentiated: a step from `start` to q1.
+/// Step that is differentiated, from `start` to q1.
 struct StepTaken {
   const State& start;
   const Parameters& parameters;
@@ -78,20 +78,20 @@ class StepGradient {
   /// Prepares for a step; what it refers to must outlive `pull_back`. Throws std::invalid_argument where no state
   /// follows from what acts.
   void begin(const StepTaken& step);
-  /// Of the last evaluation: greatest force out of balance, beyond rounding, over the greatest that there is [-].
+  /// Imbalance of the last evaluation: greatest residual force, beyond rounding, over the greatest force [-].
   double imbalance() const;
   /// Makes of the adjoint of the state at the end that of the state at the start, and adds what coefficients and held
   /// unknowns (at the end, in coordinates of the state) contribute. `reactions`, and `tensions` in the middle, per edge
   /// [1/N]: of this step, by which the scalar goes besides. Throws std::invalid_argument where no gradient is known.
   void pull_back(StateAdjoint& state, CoefficientAdjoint& by, HeldAdjoint& held,
                  const ReactionAdjoint* reactions = nullptr, const VectorX* tensions = nullptr);
-  /// Of the last evaluation [N], [N m].
+  /// Residual of the last evaluation [N], [N m].
   const VectorX& residual() const { return data_.residual; }
-  /// Of an equilibrium, forward mode, R_z dz = -dR: how the unknowns change where the residual, at fixed unknowns,
+  /// Change of the unknowns of an equilibrium, forward mode, R_z dz = -dR, if the residual, at fixed unknowns,
   /// changes by `residual`, and what supports hold by `held` (zero elsewhere). Throws std::invalid_argument where no
   /// state follows from what acts.
   VectorX respond(const VectorX& residual, const VectorX& held);
-  /// Of an equilibrium: adds the derivatives of the work of its residual over a motion.
+  /// Adds the derivatives of the work of an equilibrium's residual over a motion.
   void add_work_along(const VectorX& motion, CoefficientAdjoint& by, HeldAdjoint& held);
 
  private:

@@ -34,13 +34,13 @@ struct RunJacobian {
   std::vector<ParameterGradient> rows;
 };
 
-/// What a scalar depends on at a moment of a run, after so many steps; moments in the order of time.
+/// Derivatives of a scalar at a moment of a run, after a number of steps; moments in the order of time.
 struct MomentAdjoint {
   long steps = 0;
   ReadoutAdjoint by;
 };
 
-/// How far positions and rotations of supports, and positions of obstacles, have come from where they set out, from 0
+/// Share of the way that positions and rotations of supports, and positions of obstacles, have gone, from 0
 /// to 1; empty: all are there.
 struct Reached {
   MatrixX supports;
@@ -66,15 +66,15 @@ struct AcceptedStep {
 
 class Tape {
  public:
-  /// Of a run that begins so, with friction or not; these are kept. `hands`: see `AcceptedStep`.
+  /// Tape of a run that begins so, with friction or not; these are kept. `hands`: see `AcceptedStep`.
   Tape(const Model& model, EquationOptions options, State first, const Parameters& parameters, bool frictional,
        std::vector<SupportPose> hands);
 
   long count() const { return static_cast<long>(steps_.size()); }
   void record(const AcceptedStep& step);
-  /// What is read out now goes by these: natural shapes on their way, which act in the middle of steps.
+  /// Notes the natural shapes by which read-outs go now: ramps act in the middle of steps.
   void note_moment(const Parameters& now);
-  /// What acts from here on is to be told apart from what acted before.
+  /// Begins a new stretch of parameters.
   void divide() { acting_.divide(); }
   /// Forgets all but so many.
   void cut(long count, const State& after, std::vector<SupportPose> hands);
@@ -94,7 +94,7 @@ class Tape {
   /// `visit_poses` may be empty.
   InitialGradient gradient(const std::vector<MomentAdjoint>& moments, const ParameterVisitor& visit,
                            const PoseVisitor& visit_poses) const;
-  /// Likewise, of a run in which nothing was set; costs a solve of each step for every row.
+  /// Jacobian of a run in which nothing was set; costs a solve of each step for every row.
   RunJacobian jacobian() const;
 
  private:
@@ -120,7 +120,7 @@ class Tape {
   };
   class Player;
   class Moments;
-  /// Where hands are after so many steps.
+  /// Poses of hands after a number of steps.
   std::vector<SupportPose> hands_after(long steps) const;
   std::vector<SupportPose> moved_hands(const std::vector<SupportPose>& hands);
   std::vector<ObstaclePlace> moved_obstacles(const std::vector<ObstaclePlace>& obstacles);

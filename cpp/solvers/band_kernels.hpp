@@ -46,7 +46,7 @@ struct BandKernels {
 /// Numbers a column of a symmetric matrix.
 constexpr int band_column_stride(int half_bandwidth) { return (half_bandwidth + 3) / 2 * 2; }
 
-/// Where rounding of the factors, a multiple of it, would cost more than two digits.
+/// Greatest growth of the factors: above it, their rounding would cost more than two digits.
 constexpr double kGreatestGrowth = 100.0;
 
 /// Those of the narrowest band that holds this one: 5 (a rod in a plane), 10 (in space), 16, 24; none of a wider.

@@ -49,9 +49,9 @@ struct Row {
 
   Pack at[packs];
 
-  /// Of the first column, less the phase.
+  /// Place of the first column, less the phase.
   static int first_column(int i) { return i - width - phase; }
-  /// Of that column of row i, in another row.
+  /// Place of that column of row i, in another row.
   template <class Numbers>
   static Numbers* place(Numbers* rows, int row, int i) {
     return rows + static_cast<std::ptrdiff_t>(row) * stride + first_column(i);
@@ -202,7 +202,7 @@ template <int width, class Start, class Entry, class Finish>
   }
 }
 
-/// What the sweeps read and do.
+/// Steps of the sweeps.
 template <int width>
 struct Sweeps {
   static constexpr std::ptrdiff_t kStride = band_stride(width);

@@ -47,10 +47,10 @@ class LinearSolver {
   virtual Symmetry symmetry() const = 0;
   /// "band LDLT (half bandwidth 10)", "sparse LDLT", "band LU", "sparse LU": for `plan`.
   virtual std::string name() const = 0;
-  /// Where entry (row, column) lives in values(). Symmetric: only row >= column may be asked for.
+  /// Place of entry (row, column) in values(). Symmetric: only row >= column may be asked for.
   /// Throws std::invalid_argument outside the pattern.
   virtual std::ptrdiff_t offset(int row, int column) const = 0;
-  /// Where either of the two entries lives that are one where the matrix is symmetric.
+  /// Place of an entry or its mirror image, which are one in a symmetric matrix.
   std::ptrdiff_t place(int row, int column) const {
     return symmetry() == Symmetry::symmetric && column > row ? offset(column, row) : offset(row, column);
   }

@@ -1,5 +1,5 @@
 #pragma once
-/// What every solver asks of its pattern and of its callers; private to this room.
+/// Checks and look-ups that every solver needs; private to this room.
 
 #include <cstddef>
 #include <span>

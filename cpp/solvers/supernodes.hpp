@@ -1,5 +1,6 @@
 #pragma once
-/// How a symmetric sparse matrix is eliminated, found once from its pattern: in which order, and which columns at once.
+/// Elimination of a symmetric sparse matrix, found once from its pattern: its order, and the columns eliminated at
+/// once.
 
 #include <vector>
 

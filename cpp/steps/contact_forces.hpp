@@ -27,12 +27,12 @@ class ContactForces final : public Term {
 
   /// True if anything touches at z.
   bool touches(const StepProblem& problem, const VectorX& z);
-  /// How much of a step of z contact allows, from 0 to 1.
+  /// Share of a step of z that contact allows, from 0 to 1.
   double allowed(const StepProblem& problem, const VectorX& z, const VectorX& step);
   /// Predicts the friction of a step of Newton's method from the last evaluation, of which `kept` is left.
   void predict_friction(const StepProblem& problem, const VectorX& step, double kept,
                         ContactLinearisation& linearisation);
-  /// What contact takes from the motion over `change`, and from obstacles that move, and does not store [J].
+  /// Energy that contact removes from the motion over `change`, and from moving obstacles, without storing it [J].
   double loss(const StepData& data, const VectorX& change, double obstacle_work) const;
 
  private:

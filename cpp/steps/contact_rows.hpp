@@ -13,7 +13,7 @@ class ContactRows {
  public:
   /// Sorted.
   const std::vector<ContactKey>& keys() const { return keys_; }
-  /// Of all rows, one after the other.
+  /// Unknowns of all rows, one after the other.
   const std::vector<int>& unknowns() const { return unknowns_; }
   /// -1: none.
   int row(const ContactKey& key, OrderedLookup& lookup) const {

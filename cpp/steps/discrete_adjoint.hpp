@@ -11,9 +11,9 @@
 
 namespace withe {
 
-/// Of discrete gradients. They are functions of the two ends of a step alone, but for what torques leave nodes of the
-/// directors' transport, spin times the torque; and those which exchange the ends leave alone. So derivatives by the
-/// start are those by the end of the step backwards.
+/// Adjoint of discrete gradients. They are functions of the two ends of a step alone, but for what torques leave nodes
+/// of the directors' transport, spin times the torque; and those which exchange the ends leave alone. So derivatives by
+/// the start are those by the end of the step backwards.
 class DiscreteAdjoint {
  public:
   DiscreteAdjoint(const StepProblem& problem, const StepData& data, const VectorX& rows, StepAdjoint& adjoint)
@@ -121,8 +121,8 @@ class DiscreteAdjoint {
     return {start, end};
   }
 
-  /// Of ordinary stencils in space, all at once, with the coefficients that act; `axial` and `modulus` per edge, see
-  /// StencilBatch. Returns what rows^T makes of a unit moment on each of the mean strains.
+  /// Derivatives of ordinary stencils in space, all at once, with the coefficients that act; `axial` and `modulus` per
+  /// edge, see StencilBatch. Returns what rows^T makes of a unit moment on each of the mean strains.
   Columns3 add_regular(const Assembler& assembler, const ElasticCoefficients& k, const VectorX& axial,
                        const VectorX& modulus) {
     const Model& model = problem_.model;

@@ -58,7 +58,7 @@ void for_each_single_bend(const Model& model, const Assembler& assembler, const 
 /// Largest angle by which an edge turns on the way from q0 to q1 [rad], > pi/2 where it ends pointing back.
 double largest_turn(const Model& model, const VectorX& q0, const VectorX& q1);
 
-/// What acts in an evaluation: elasticity, with viscosity where the rule takes both as one.
+/// Coefficients of an evaluation: elasticity, with viscosity where the rule takes both as one.
 const ElasticCoefficients& acting_coefficients(const StepProblem& problem, const StepData& data);
 
 /// Axial forces [N] as the mixed method wants them: linearly extrapolated from the last evaluation by a

@@ -10,7 +10,7 @@
 
 namespace withe {
 
-/// What solves leave for those to come.
+/// Memory for later solves.
 struct EquationsMemory {
   /// Contacts whose unknowns the order of elimination was found for, and those in the matrix; sorted.
   std::vector<ContactKey> ordered, coupled;
@@ -20,7 +20,7 @@ struct EquationsMemory {
   StokesletFluid::Memory fluid;
 };
 
-/// What decides about the form of the equations.
+/// Options that determine the form of the equations.
 struct EquationOptions {
   StepRule rule = StepRule::midpoint;
   double static_duration = 0;  ///< in which slip happens in statics [s]
@@ -48,11 +48,11 @@ class Equations {
   const ElasticCoefficients& elastic() const { return problem_.elastic; }
   /// In words, what makes the Jacobian unsymmetric.
   const std::vector<std::string>& asymmetries() const { return asymmetries_; }
-  /// What terms have to say for the plan.
+  /// Notes of the terms for the plan.
   std::vector<std::string> notes() const;
   /// True where statics minimise a potential.
   bool has_potential() const { return has_potential_; }
-  /// Likewise as long as what touches at the last evaluation is all that does: nothing rubs there.
+  /// True if there is a potential with the contacts of the last evaluation: none of them has friction.
   bool has_potential_here() const;
 
   const std::vector<std::unique_ptr<Term>>& terms() const { return terms_.all; }
@@ -63,7 +63,7 @@ class Equations {
   void forget_contacts();
   /// Nothing where no hand yields.
   HandForces* hands() { return terms_.hands; }
-  /// How much of a step of z contact allows, from 0 to 1.
+  /// Share of a step of z that contact allows, from 0 to 1.
   double allowed(const VectorX& z, const VectorX& step);
   /// True if anything touches at z: what is evaluated next.
   bool touches(const VectorX& z);
@@ -92,24 +92,25 @@ class Equations {
 
   /// True if anything but contact takes energy from the motion.
   bool dissipates(const Parameters& parameters) const;
-  /// What drag, viscosity, springs, joints and fluids take over `change`, with the forces of the last evaluation [J].
+  /// Energy that drag, viscosity, springs, joints and fluids dissipate over `change`, with the forces of the last
+  /// evaluation [J].
   double dissipated(const StepData& data, const VectorX& change) const;
   bool loaded() const {
     return !loads().pieces.empty() || terms_.custom != nullptr ||
            (problem_.parameters->joint_moment.array() != 0.0).any() ||
            (problem_.parameters->tendon_tension.array() != 0.0).any();
   }
-  /// Of loads, motors of joints, tendons and custom forces in the last evaluation, per unknown.
+  /// Force of loads, motors of joints, tendons and custom forces in the last evaluation, per unknown.
   void load_force(const StepData& data, VectorX& out) const;
 
-  /// What solves left for those to come; the matrix where its factorisation may serve again.
+  /// Memory of solves for later ones, with the matrix if its factorisation may serve again.
   EquationsMemory memory(bool with_matrix) const;
   /// Goes on from there, but for the factorisation. False where there is no matrix to factorise.
   bool recall(const EquationsMemory& memory);
   /// From here on what would be lost of that is kept, until the next mark: copied once, when it is about to change.
   void mark() { mark_ = Mark::set; }
   bool marked() const { return mark_ != Mark::none; }
-  /// What it was at the mark; nothing where it has not changed since.
+  /// Memory at the mark; nothing if it has not changed since.
   const EquationsMemory* since_mark() const { return mark_ == Mark::passed ? &at_mark_ : nullptr; }
 
  private:

@@ -41,7 +41,7 @@ class HandForces final : public Term {
   const RingForces& rings() const { return rings_; }
   /// True if something slips where a state is, or would with any more force.
   bool at_limit(const State& state) const;
-  /// What hands have done in a step that has just been evaluated [J].
+  /// Work of hands in a step that has just been evaluated [J].
   double work(const StepProblem& problem, const StepData& data, const VectorX& q1) const;
   /// Takes a state whose q is that of the end of a step there: supports are at `end`, and hands slip where the force is
   /// too great. `c`: of that q; not used in a plane. Returns what stays with rings that rods have left [J].
@@ -54,7 +54,7 @@ class HandForces final : public Term {
   struct Piece;
   struct Grip;
   struct Turn;
-  /// Where forces act, and where it is at the end of the step.
+  /// Pose of a hand at which its forces act, and at the end of the step.
   SupportPose pose_of(const StepProblem& problem, int support) const;
   SupportPose end_pose(const StepProblem& problem, int support) const;
   Piece piece(const StepProblem& problem, const StepData& data, int element) const;
@@ -90,10 +90,10 @@ class HandForces final : public Term {
   std::vector<SupportPose> now_;  ///< where forces act
 };
 
-/// What hands that yield have stored, or only one support of them [J].
+/// Energy of hands that yield, or of only one of them [J].
 double hand_energy(const Model& model, const BendMeasure& measure, const State& state, const Configuration& c,
                    int only = -1);
-/// How far what a hand holds has gone, in the hand's axes.
+/// Displacement of the held part of the rod, in the hand's axes.
 struct HandDeflection {
   Vector3 shift = Vector3::Zero(), turn = Vector3::Zero(), slip = Vector3::Zero();
 };

@@ -1,5 +1,5 @@
 #pragma once
-/// What a hand that yields does to one edge that it holds: what its forces and their derivatives are made of.
+/// Forces of a hand that yields on one held edge, and their derivatives.
 
 #include "elasticity/bend_twist.hpp"
 #include "elasticity/discrete_elements.hpp"
@@ -20,7 +20,7 @@ inline EdgeFrame<double> frame_of(const Matrix3& grip) {
   return {to_vec3(grip.col(2)), to_vec3(grip.col(0)), to_vec3(grip.col(1)), 1.0, {}, {}};
 }
 
-/// How an edge is displaced from what a hand has grasped.
+/// Displacement of an edge from its pose when it was grasped.
 struct Shift {
   Matrix3 grip;       ///< G
   Vector3 point, by;  ///< x [m]; u, in the axes of G [m]
@@ -90,7 +90,7 @@ struct HandForces::Piece {
   Matrix3 by;           ///< d(-f) / dx
 };
 
-/// What such an edge is attached to over an energy-momentum step.
+/// Attachment of such an edge over an energy-momentum step.
 struct HandForces::Grip {
   AttachedStep attached;
   TurnCoefficients elastic;

@@ -30,14 +30,14 @@ void add_mass_matrix(const StepProblem& problem, const MassMatrix& mass, double 
 /// Adds to the gradient the couple of an edge that spins and turns with velocities v.
 void add_explicit_spin_couple(const StepProblem& problem, StepData& data, int edge, const VectorX& v);
 
-/// Of all angles of an energy-momentum step; its equations hold for less than half a turn [rad].
+/// Greatest change of an angle in an energy-momentum step, whose equations hold for less than half a turn [rad].
 double farthest_turn(const Model& model, const VectorX& q0, const VectorX& q1);
-/// Of an energy-momentum step that changes the unknowns by `change`: the velocities of angles at its end.
+/// Velocities of angles at the end of an energy-momentum step that changes the unknowns by `change`.
 void set_turning_velocities(const Model& model, const VectorX& v0, const VectorX& change, double dt, VectorX& v1);
-/// How those change with `change`, per unknown: 2 / dt where it turns nothing.
+/// Derivatives of these velocities by `change`, per unknown: 2 / dt where it turns nothing.
 void set_velocity_rates(const Model& model, const VectorX& change, double dt, VectorX& rates);
-/// What forces of an energy-momentum step do their work over: its change of the unknowns, but for angles and frames,
-/// whose torques and moments are those about where they are in the middle.
+/// Displacement over which forces of an energy-momentum step do work: its change of the unknowns, but for angles and
+/// frames, whose torques and moments are those about where they are in the middle.
 void set_working_change(const StepProblem& problem, const StepData& data, const VectorX& change, VectorX& working);
 /// Work of elastic torques on what supports hold over the working change, less that over `change` itself [J].
 double finite_turn_work(const StepProblem& problem, const StepData& data, const VectorX& change,

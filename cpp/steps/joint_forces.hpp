@@ -26,11 +26,11 @@ class JointForces final : public Term {
   ElementTable table_;
 };
 
-/// What drives a joint and resists it.
+/// Torque of the motor, spring and damper of a joint.
 JointTorque joint_torque(const Parameters& parameters, const ElasticCoefficients& elastic, int joint);
-/// What the stiffness of all joints stores at a configuration [J].
+/// Energy of the springs of all joints at a configuration [J].
 double joint_energy(const Model& model, const ElasticCoefficients& elastic, const VectorX& q);
-/// Of one.
+/// Energy of the spring of one joint [J].
 double joint_energy(const Model& model, const ElasticCoefficients& elastic, const VectorX& q, int joint);
 
 }  // namespace withe

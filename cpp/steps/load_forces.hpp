@@ -18,7 +18,7 @@ class LoadForces final : public Term {
   void add_applied(const StepProblem& problem, const StepData& data, const Assembler& assembler,
                    VectorX& force) const override;
 
-  /// Of one element each, per piece.
+  /// Tables of one element each, per piece.
   const std::vector<ElementTable>& tables() const { return tables_; }
 
  private:
@@ -26,7 +26,7 @@ class LoadForces final : public Term {
   bool has_potential_;
 };
 
-/// What a piece is a piece of.
+/// Value of the load of a piece.
 inline Vector3 value_of(const Parameters& parameters, const AppliedForces& custom, const LoadPiece& piece) {
   if (piece.load >= 0) return parameters.loads.row(piece.load);
   return custom.moments[static_cast<std::size_t>(piece.node)];

@@ -1,5 +1,5 @@
 #pragma once
-/// What derivatives of elastic forces are taken with: ordinary stencils for the kernels, and where angles are.
+/// Data for derivatives of elastic forces: ordinary stencils for the kernels, and places of angles.
 
 #include "elasticity/stencil_kernels.hpp"
 #include "geometry/rotation.hpp"
@@ -7,7 +7,7 @@
 
 namespace withe {
 
-/// Where angles are among a stencil's unknowns, and of which edges.
+/// Places of angles among a stencil's unknowns, and their edges.
 struct Angles {
   int count = 0, place[2] = {}, edge[2] = {};
 };

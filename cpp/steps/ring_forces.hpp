@@ -20,9 +20,9 @@ class RingForces {
 
   void add(const StepProblem& problem, StepData& data, std::span<double> values) const;
   void add_rounding(const StepProblem& problem, StepData& data) const;
-  /// What slip takes in a step whose forces act at `z` [J].
+  /// Energy that slip dissipates in a step whose forces act at `z` [J].
   double dissipated(const StepProblem& problem, const VectorX& z) const;
-  /// What rings and their drives do in a step that ends at `q1` [J].
+  /// Work of rings and their drives in a step that ends at `q1` [J].
   double work(const StepProblem& problem, const VectorX& q1) const;
   /// Takes a state there whose hands are where they go to. Returns what stays with rings that rods have left [J].
   double accept(State& state) const;
@@ -38,7 +38,7 @@ class RingForces {
   bool slips_ = false;
 };
 
-/// How a rod passes a ring.
+/// Passage of a rod through a ring.
 struct Passage {
   SplinePlace place;
   Vector3 across = Vector3::Zero();  ///< r [m]

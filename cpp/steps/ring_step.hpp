@@ -1,5 +1,5 @@
 #pragma once
-/// What a ring does over one step, see forces/ring.hpp, with its derivatives by the nodes around it.
+/// Force of a ring over one step, see forces/ring.hpp, with its derivatives by the nodes around it.
 ///
 /// In an energy-momentum step forces are those in the middle z, and along the displacements d_i of nodes relative to
 /// the ring besides, b |w_i| d_i, so that their work is what the energy changes by [Gonzalez 1996, J. Nonlinear Sci. 6,
@@ -16,7 +16,7 @@
 
 namespace withe {
 
-/// Where nodes are in space: in a configuration, or between two and beyond.
+/// Positions of nodes in space: in a configuration, or between two and beyond.
 struct NodePlaces {
   const Model& model;
   const VectorX& q;
@@ -82,7 +82,7 @@ Vec3<Dual<Size>> unknown(const typename RingFound<Size>::Axes& axes, int i, doub
   return v;
 }
 
-/// Where forces act: nodes from the ring, and a.
+/// Place where forces act: nodes from the ring, and a.
 template <int Size>
 struct Middle {
   SplinePiece piece;
@@ -149,7 +149,7 @@ void conserve(const typename RingFound<Size>::Axes& axes, const StepProblem& pro
     weight[i] = w.value[i].value < 0.0 ? -1.0 * w.value[i] : w.value[i];
     span += weight[i] * dot(d[i], d[i]);
   }
-  // What rounding leaves of the places along the rod is no work.
+  // Rounding error of places along the rod, which does no work.
   constexpr double kUnsure = 32.0 * std::numeric_limits<double>::epsilon();
   const double edge = step.curve.length.front();
   if (std::abs(excess.value) <= kUnsure * edge * (out.across + std::abs(out.tension)) || span.value == 0.0) return;
@@ -158,7 +158,7 @@ void conserve(const typename RingFound<Size>::Axes& axes, const StepProblem& pro
 
 }  // namespace ring_detail
 
-/// What acts at the end of a step, or in its middle, with nodes at `z`: there the place is no number where the rod
+/// Forces at the end of a step, or in its middle, with nodes at `z`: the place is not a number if the rod
 /// never is near the ring.
 template <int Size>
 RingFound<Size> ring_found(const typename RingFound<Size>::Axes& axes, const StepProblem& problem, const RingStep& step,

@@ -1,5 +1,5 @@
 #pragma once
-/// What rounding leaves of a residual.
+/// Rounding error bounds of a residual.
 
 #include <limits>
 
@@ -7,7 +7,7 @@
 
 namespace withe {
 
-/// Of a number that some operations lead to, relative to it.
+/// Relative rounding error of a number after some operations.
 inline constexpr double kRounding = 4.0 * std::numeric_limits<double>::epsilon();
 
 /// Finds the bounds of a problem, at the configuration of `data`.

@@ -25,9 +25,9 @@ class SpringForces final : public Term {
   ElementTable table_;
 };
 
-/// Of all springs at a configuration [J].
+/// Energy of all springs at a configuration [J].
 double spring_energy(const Model& model, const VectorX& stiffness, const VectorX& rest_length, const VectorX& q);
-/// Of one.
+/// Energy of one spring [J].
 double spring_energy(const Model& model, const VectorX& stiffness, const VectorX& rest_length, const VectorX& q,
                      int spring);
 /// n of one spring, with velocities v [N].

@@ -106,7 +106,7 @@ using ApproachAdjoint = std::map<ContactKey, double>;
 /// rows^T times the derivatives of a step's residual, at fixed z. An edge's frame and a joint's are functions of the
 /// start: they are taken by how they turn, in the configuration that they are part of.
 struct StepAdjoint {
-  /// What the residual is multiplied by; of frames in space, where a step's rows are moments, what their J^T moment is.
+  /// Multipliers of the residual; of frames in space, where a step's rows are moments, those of their J^T moment.
   const VectorX& rows;
   VectorX start, velocity;                     ///< by q0 (its angles: of directors) and v0
   VectorX acceleration;                        ///< by the acceleration of what supports hold; meaningful where held

@@ -36,19 +36,19 @@ struct StepProblem {
   bool exact = false;    ///< whether the matrix has every derivative; else what is small and unsymmetric is left out
   long number = 0;       ///< of problems so far: tells one from another
 
-  /// Of the parameters, of these versions.
+  /// Versions of the parameters.
   long version = -1, natural_version = -1;
   MassMatrix mass, drag;  ///< [kg], [N s/m]
   VectorX gravity;        ///< force per unknown [N]
   ElasticCoefficients elastic;
 
-  /// Of the start, where viscosity or the rule need it.
+  /// Configuration at the start, if viscosity or the rule needs it.
   Configuration start_configuration;
   ElasticCoefficients viscous;  ///< viscosity alone, over h, from the start's strains
   ElasticCoefficients damped;   ///< elasticity and viscosity as one
 
   Loads loads;  ///< whose values are among the parameters
-  /// Of what supports hold, which acts on the edges next to it; meaningful where held. Empty: as the rest accelerates.
+  /// Acceleration of held unknowns, which acts on the edges next to them. Empty: as the rest accelerates.
   VectorX held_acceleration;
 
   /// True if z is the middle of the step, and q1 = 2 z - q0.
@@ -58,7 +58,7 @@ struct StepProblem {
   /// True if forces that resist rates act: viscosity, drag, dampers.
   bool resists() const { return moves() && rule != StepRule::settling; }
   bool viscous_acts() const { return parameters->viscous && resists(); }
-  /// Of the whole step [s].
+  /// Duration of the whole step [s].
   double duration() const { return in_middle() ? 2.0 * interval : interval; }
   /// q1 that goes with z, and by how much it changes with z.
   void set_end(const VectorX& z, VectorX& end) const {
@@ -70,7 +70,7 @@ struct StepProblem {
   double end_rate() const { return in_middle() ? 2.0 : 1.0; }
 };
 
-/// What rounding leaves of a residual, which no iteration removes; see rounding.cpp.
+/// Rounding error bounds of a residual, which no iteration removes; see rounding.cpp.
 struct RoundingBounds {
   long number = -1;     ///< of the problem that they belong to
   VectorX rows;         ///< of bending, twisting and inertia
@@ -99,7 +99,7 @@ struct TurningForces {
   Vec3d at_head(int edge) const { return {head[3 * edge], head[3 * edge + 1], head[3 * edge + 2]}; }
 };
 
-/// What an evaluation of a problem finds; owned by who asks for it.
+/// Result of an evaluation of a problem, owned by the caller.
 struct StepData {
   VectorX residual;       ///< projected onto free directions
   VectorX full_residual;  ///< before projection: minus the reactions
@@ -115,7 +115,7 @@ struct StepData {
   Configuration end_configuration;      ///< at q1, where viscosity or the rule need it
   RoundingBounds rounding;
 
-  /// What terms leave for each other and for read-outs.
+  /// Values that terms share with each other and with read-outs.
   VectorX gradient, row_magnitude;      ///< forces and their absolute values so far; padded by kPadding
   ElasticCoefficients viscous, damped;  ///< of a step whose middle is z
   VectorX force, modulus;               ///< per edge: EA eps [N], EA / L [N / m]

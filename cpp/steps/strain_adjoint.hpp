@@ -1,5 +1,5 @@
 #pragma once
-/// What derivatives of elastic and viscous forces have in common, of ordinary and of discrete gradients: those by the
+/// Derivatives that ordinary and discrete gradients of elastic and viscous forces have in common: those by the
 /// numbers of a stencil, and by the strains at the start of the step.
 
 #include "steps/regular_stencils.hpp"
@@ -94,7 +94,7 @@ class StencilAdjoint {
 /// space.
 inline VectorX strain_forces(const Model& model, const Assembler& assembler, const BendMeasure& measure,
                              const Configuration& c, const Columns3& strain, const Columns3& factors) {
-  // Of the energy k (s - n)^2 / 2 with s - n = 1.
+  // Derivatives of the energy k (s - n)^2 / 2 with s - n = 1.
   const Columns3 natural = strain.array() - 1.0;
   const VectorX none = VectorX::Zero(model.edge_count);
   VectorX out = VectorX::Zero(model.dof_count + kPadding), magnitude = out;

@@ -37,7 +37,7 @@ struct Curvature {
   double rounding = 0;  ///< a bound on what rounding makes of it
 };
 
-/// Of the potential along a direction w, at the state with which the problem has begun.
+/// Curvature of the potential along a direction w, at the state with which the problem has begun.
 Curvature curvature_along(Equations& system, const State& state, const VectorX& direction, StepData& scratch);
 
 }  // namespace withe

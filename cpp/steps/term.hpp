@@ -43,7 +43,7 @@ class Term {
   }
   /// Adds what rounding alone leaves of its rows in the last evaluation, beyond that of their magnitude, to data.floor.
   virtual void add_rounding(const StepProblem&, StepData&) const {}
-  /// What is taken from the motion over `change` with the forces of the last evaluation [J].
+  /// Energy dissipated over `change` with the forces of the last evaluation [J].
   virtual double dissipated(const StepProblem&, const StepData&, const Assembler&, const VectorX& /*change*/) const {
     return 0.0;
   }
@@ -71,7 +71,7 @@ inline double work_of(const ElementTable& table, int element, const Local& local
   return work;
 }
 
-/// What multiplies the rows of one element.
+/// Multipliers of the rows of one element.
 template <int size>
 void gather(const ElementTable& table, int element, const VectorX& rows, double (&out)[size]) {
   const int* dofs = table.dofs(element);

@@ -18,7 +18,7 @@ struct TurningEdge {
   Scalar start_rate;                ///< [rad/s]
 };
 
-/// What is added to the rows: of the head (and taken from those of the tail) and of the angle.
+/// Contribution to the rows of the head (and minus it to those of the tail) and of the angle.
 template <class Scalar>
 struct TurningForce {
   Vec3<Scalar> head;
@@ -33,8 +33,8 @@ Vec3<Scalar> spin_couple(const Number& inertia, const Scalar& omega, const Vec3<
   return (inertia * omega * inverse_length * inverse_length) * cross(rate, tangent);
 }
 
-/// Of a step of backward Euler over h. psi = theta + spin . e is what turns: the edge's inertia acts on the nodes as
-/// its elastic torque does. It does no work either, since spin is normal to the edge before and now.
+/// Inertia of a step of backward Euler over h. psi = theta + spin . e is what turns: the edge's inertia acts on the
+/// nodes as its elastic torque does. It does no work either, since spin is normal to the edge before and now.
 template <class Scalar, class Number>
 [[gnu::always_inline]] inline TurningForce<Scalar> euler_turning(const Number& inertia, double interval,
                                                                  const TurningEdge<Scalar>& edge,
@@ -46,8 +46,8 @@ template <class Scalar, class Number>
           torque};
 }
 
-/// Of a step under the midpoint rules over dt, such that angular momentum is kept exactly. The spin's part of it,
-/// I omega t, changes in a step by dt m, m = I (omega1 t1 - omega0 t0) / dt: nodes and angle of the edge take that
+/// Inertia of a step under the midpoint rules over dt, such that angular momentum is kept exactly. The spin's part of
+/// it, I omega t, changes in a step by dt m, m = I (omega1 t1 - omega0 t0) / dt: nodes and angle of the edge take that
 /// moment like any other, about where the edge is in the middle. In energy-momentum steps omega is 2 tan(D theta / 2) /
 /// dt, as in a rigid rotation of the whole, and an axial force that vanishes with the square of the step makes the work
 /// of m what kinetic energy changes by.

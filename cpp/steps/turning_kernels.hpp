@@ -22,7 +22,7 @@ struct TurningKernels {
   void (*euler)(const TurningBatch&);
   void (*midpoint)(const TurningBatch&);
   void (*energy_momentum)(const TurningBatch&);
-  /// Of changes of angles, by their places: see finite_turn.
+  /// Finite turns of changes of angles, by their places: see finite_turn.
   void (*finite_turns)(int count, const int* angle, const double* change, double* turn);
 };
 

@@ -1,5 +1,5 @@
 #pragma once
-/// How the inertia of an edge about itself (turning_inertia.hpp) changes with the edge and with the start of a step.
+/// Derivatives of the inertia of an edge about itself (turning_inertia.hpp) by the edge and by the start of a step.
 
 #include "common/types.hpp"
 #include "steps/step_problem.hpp"

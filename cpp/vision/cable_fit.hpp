@@ -17,7 +17,7 @@ struct HiddenStretch {
   int last = 0;  ///< of a ring beyond its last row, where it goes on over its first
 };
 
-/// What a cable is fitted to: points in order, with their half widths; a gap before a point is marked by its zone.
+/// Data for the fit of a cable: points in order, with their half widths; a gap before a point is marked by its zone.
 class CableOutline {
  public:
   CableOutline(const SkeletonGraph& graph, const Continuations& links, const CablePath& path);
@@ -34,7 +34,7 @@ class CableOutline {
   Cable fit(const BitImage& mask, const TraceOptions& options, int number, std::vector<HiddenStretch>& stretches) const;
 
  private:
-  /// Where two cables cross, one flank of each shows before the crossing and the other one behind it.
+  /// Flank of a cable: where two cables cross, one flank of each shows before the crossing and the other one behind it.
   enum class Flank { unknown, left, right };
   struct Point {
     Vector2 position;

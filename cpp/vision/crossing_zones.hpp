@@ -1,6 +1,6 @@
 #pragma once
-/// Where cables meet: zones of the skeleton that say nothing about single cables, and the pairs of branches that
-/// continue each other through them with the least bending energy.
+/// Crossing zones, where cables meet: zones of the skeleton that say nothing about single cables, and the pairs of
+/// branches that continue each other through them with the least bending energy.
 
 #include <array>
 #include <vector>
@@ -54,7 +54,7 @@ struct ZoneOptions {
   double similar_energies = 0.2;  ///< two matchings closer than this are ambiguous, relative
 };
 
-/// What continues what.
+/// Pairs of branches that continue each other.
 struct Continuations {
   std::vector<Zone> zones;
   std::vector<Branch> branches;   ///< by half-edge

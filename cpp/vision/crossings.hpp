@@ -1,5 +1,5 @@
 #pragma once
-/// Where the fitted cables cross, and where one ends on the flank of another.
+/// Crossings of the fitted cables, and ends of cables on the flank of another.
 
 #include <vector>
 
@@ -11,7 +11,7 @@ namespace withe {
 /// Crossings of cables inside zones. Two cables that meet an even number of times within one zone only touch there.
 std::vector<Crossing> find_crossings(const std::vector<Cable>& cables, const std::vector<HiddenStretch>& stretches);
 
-/// Where a ray first meets one of the stretches; `row` is -1 where it meets none within `longest`.
+/// First hit of a ray on one of the stretches; `row` is -1 where it meets none within `longest`.
 struct RayHit {
   CableRow through;
   double distance = 0;

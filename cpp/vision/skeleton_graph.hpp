@@ -26,7 +26,7 @@ struct SkeletonEdge {
   bool removed = false;
 };
 
-/// Where lines meet (a cluster of skeleton pixels) or one line ends (its last pixel).
+/// Node where lines meet (a cluster of skeleton pixels) or one line ends (its last pixel).
 struct SkeletonNode {
   Vector2 position = Vector2::Zero();
   double half_width = 0;

@@ -9,11 +9,11 @@
 
 namespace withe {
 
-/// Where the hue changes across a run, as fractions of its width from the left. It has to along all of it: a stripe of
+/// Changes of hue across a run, as fractions of its width from the left. It has to along all of it: a stripe of
 /// light on a cable has its hue, and a rope's twisted threads are on either side in turn.
 std::vector<double> hue_borders(const ColorImage& image, const SkeletonLine& line, const WidthRun& run);
 
-/// How much of the brightness across a run is not that of `count` equal strands, from 0 for strands that look alike to
+/// Share of the brightness across a run that does not fit `count` equal strands, from 0 for strands that look alike to
 /// about 1 for a single round cable; none where it is too flat to tell.
 std::optional<double> shading_misfit(const ColorImage& image, const SkeletonLine& line, const WidthRun& run, int count);
 

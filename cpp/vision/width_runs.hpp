@@ -23,7 +23,7 @@ std::vector<WidthRun> find_width_runs(const SkeletonGraph& graph, const BitImage
 /// runs are about one, two, ... times as wide as it. Otherwise 0.
 double narrower_cable(const std::vector<WidthRun>& runs, double width);
 
-/// How many cables of a width lie side by side in another one; 0 where it is no multiple.
+/// Number of cables of a width that lie side by side in another one; 0 if it is not a multiple.
 int count_strands(double width, double single);
 
 }  // namespace withe
