@@ -10,10 +10,6 @@
 namespace withe {
 namespace {
 
-// After so many iterations, steps that are still too long to be taken whole and a residual that has grown by so much
-// lead nowhere in time.
-constexpr int kFirstIterations = 4;
-constexpr double kMostGrowth = 1e3;
 // Steps that are within the tolerance, while so many in a row have not halved the residual, end at a jump of forces. In
 // time a shorter interval leads past it; a solve at rest has nothing better than to go on.
 constexpr int kMostStalls = 4;
@@ -154,10 +150,6 @@ class Newton::Solve {
     if (uses(Heuristic::reject_stagnation) && how_.interval != 0.0 && stagnation_.stalls() >= kMostStalls &&
         reuse_.at_end())
       return Verdict::failed;
-    if (result_.iterations == 0) first_residual_ = result_.residual;
-    if (uses(Heuristic::reject_growing) && how_.interval != 0.0 && result_.iterations >= kFirstIterations &&
-        std::isinf(reuse_.step()) && std::isinf(reuse_.last_step()) && result_.residual > kMostGrowth * first_residual_)
-      return Verdict::failed;
     if (reuse_.fresh() && near_end) evaluate(true);
     return Verdict::go_on;
   }
@@ -243,7 +235,6 @@ class Newton::Solve {
   NewtonResult result_;
   Balance balance_;
   Stagnation stagnation_;
-  double first_residual_ = 0.0;
 };
 
 NewtonResult Newton::solve(Equations& equations, VectorX& z, const SolveOptions& how, NewtonWorkspace& work) const {
