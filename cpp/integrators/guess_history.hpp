@@ -22,7 +22,6 @@ struct GuessRecord {
 
 struct GuessHistory {
   std::array<GuessRecord, 5> records{};  ///< per `Guess`
-  GuessRecord cut;                       ///< of those whose first step surfaces cut short
   int plain_solves = 0;                  ///< still to come before the mixed method is tried again
 };
 

@@ -12,7 +12,6 @@ enum class Heuristic : unsigned {
   forget_contraction,
   late_matrix,
   matrix_worth,
-  reject_cut,
   reject_stagnation,
   surface_search,
   search_descent,

@@ -168,17 +168,12 @@ class InnerSolve {
   NewtonResult solve_from(Guess guess) {
     guess_at(guess);
     if (guess == Guess::continuation) return solve_by_continuation();
-    // Guesses that surfaces cut short soon converge in one scene, and lead nowhere in another.
     const bool trial = on_trial(guess) && uses(Heuristic::few_iterations);
-    const NewtonResult found =
-        newton_.solve(equations_, work_.z,
-                      {.max_iterations = trial ? std::min(kFew, options_.max_iterations) : options_.max_iterations,
-                       .mixed = mixed(guess),
-                       .interval = h_,
-                       .give_up_if_cut = trial && history_.cut.waits > 0},
-                      work_.newton);
-    if (trial && found.cut && !history_.cut.skipped()) history_.cut.note(found.converged);
-    return found;
+    return newton_.solve(equations_, work_.z,
+                         {.max_iterations = trial ? std::min(kFew, options_.max_iterations) : options_.max_iterations,
+                          .mixed = mixed(guess),
+                          .interval = h_},
+                         work_.newton);
   }
 
   /// Where surfaces stop or turn round, friction jumps within a slip far smaller than an iteration, and Newton's method

@@ -13,8 +13,6 @@ namespace {
 // Steps that are within the tolerance, while so many in a row have not halved the residual, end at a jump of forces. In
 // time a shorter interval leads past it; a solve at rest has nothing better than to go on.
 constexpr int kMostStalls = 4;
-// A first step of which less is kept counts as cut.
-constexpr double kCut = 0.5;
 
 // Corrections of a prediction must shrink by this factor, while they are longer than this share of the prediction, and
 // than this, over the tolerance.
@@ -183,8 +181,6 @@ class Newton::Solve {
     axial_known_ = mixed_;
     if (contact_ && uses(Heuristic::surface_search) && !leaves_surfaces_alone() && !step_between_surfaces(shorten))
       return false;
-    if (result_.iterations == 0) result_.cut = contact_ && shorten < kCut;
-    if (how_.give_up_if_cut && result_.cut && uses(Heuristic::reject_cut)) return false;
     if (line_search_) {
       const double alpha = line_search(system_, z_, work_.step);
       work_.step *= alpha;

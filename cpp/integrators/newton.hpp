@@ -14,8 +14,7 @@ struct NewtonResult {
   int iterations = 0;
   double residual = 0;  ///< greatest force out of balance [N]
   int worst_row = -1;
-  double step = 0;   ///< greatest displacement of the last iteration [m]
-  bool cut = false;  ///< less than half of the first step was kept, beside surfaces
+  double step = 0;  ///< greatest displacement of the last iteration [m]
 };
 
 /// How small the residuals are.
@@ -68,7 +67,6 @@ struct SolveOptions {
   double interval = 0;  ///< of a time step [s], whose matrix may serve several iterations and the steps to come; the
                         ///< mixed method then sets out from work.axial_force. 0: a new matrix every iteration
   bool hold_neutral = false;              ///< keeps neutral motions from going anywhere by rounding; slows fine rods
-  bool give_up_if_cut = false;            ///< where the first step is `cut`
   double regularisation = 1;              ///< by which friction's slip tolerance is greater, in a continuation
   const Prediction* predicted = nullptr;  ///< how z was found, if it was from another solution
 };

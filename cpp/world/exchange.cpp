@@ -218,9 +218,9 @@ void exchange(Archive& io, MatrixHistory& history) {
 
 template <class Archive>
 void exchange(Archive& io, GuessHistory& history) {
-  auto& [records, cut, plain_solves] = history;
+  auto& [records, plain_solves] = history;
   for (auto& [misses, waits] : records) io(misses), io(waits);
-  io(cut.misses), io(cut.waits), io(plain_solves);
+  io(plain_solves);
 }
 
 }  // namespace

@@ -14,14 +14,13 @@ constexpr Words<Integrator, 6> kIntegrators{{{"static", Integrator::statics},
                                              {"verlet", Integrator::verlet}}};
 constexpr Words<LineSearch, 2> kLineSearches{
     {{"automatic", LineSearch::automatic}, {"goldstein_price", LineSearch::goldstein_price}}};
-constexpr Words<Heuristic, 24> kHeuristics{{{"reuse_across_steps", Heuristic::reuse_across_steps},
+constexpr Words<Heuristic, 23> kHeuristics{{{"reuse_across_steps", Heuristic::reuse_across_steps},
                                             {"reuse_within_step", Heuristic::reuse_within_step},
                                             {"rest_from_reuse", Heuristic::rest_from_reuse},
                                             {"refresh_after_slow", Heuristic::refresh_after_slow},
                                             {"forget_contraction", Heuristic::forget_contraction},
                                             {"late_matrix", Heuristic::late_matrix},
                                             {"matrix_worth", Heuristic::matrix_worth},
-                                            {"reject_cut", Heuristic::reject_cut},
                                             {"reject_stagnation", Heuristic::reject_stagnation},
                                             {"surface_search", Heuristic::surface_search},
                                             {"search_descent", Heuristic::search_descent},

@@ -511,7 +511,6 @@ class Options:
         "forget_contraction",
         "late_matrix",
         "matrix_worth",
-        "reject_cut",
         "reject_stagnation",
         "surface_search",
         "search_descent",

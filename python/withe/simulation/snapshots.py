@@ -26,7 +26,7 @@ __all__ = ["Snapshot", "adopt", "check_fits", "matched", "restore"]
 
 FloatArray = npt.NDArray[np.float64]
 
-_FILE_VERSION = 7
+_FILE_VERSION = 8
 
 
 class Snapshot:
