@@ -21,7 +21,7 @@ struct GuessRecord {
 };
 
 struct GuessHistory {
-  std::array<GuessRecord, 5> records{};  ///< per `Guess`
+  std::array<GuessRecord, 4> records{};  ///< per `Guess`
   int plain_solves = 0;                  ///< still to come before the mixed method is tried again
 };
 

@@ -17,7 +17,6 @@ enum class Heuristic : unsigned {
   search_descent,
   drop_geometric,
   start_accelerated,
-  start_steady,
   start_other_method,
   start_continuation,
   start_record,

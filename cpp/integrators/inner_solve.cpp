@@ -9,10 +9,10 @@
 namespace withe {
 namespace {
 
-/// Initial guesses: the extrapolated motion; a steady one; rest; a steady one with the other of the mixed and the plain
-/// method; rest, and continuation in friction's regularisation.
-enum class Guess : std::size_t { accelerated, steady, rest, other_method, continuation };
-using Guesses = std::array<Guess, 5>;
+/// Initial guesses: the extrapolated motion; rest; a steady motion with the other of the mixed and the plain method;
+/// rest, and continuation in friction's regularisation.
+enum class Guess : std::size_t { accelerated, rest, other_method, continuation };
+using Guesses = std::array<Guess, 4>;
 
 // Iterations of guesses that may be wrong.
 constexpr int kFew = 12;
@@ -86,8 +86,7 @@ class InnerSolve {
         frictional_(equations.contact() && equations.contact()->frictional()),
         regularised_(frictional_ && equations.contact()->regularises()),
         energy_momentum_(plan.rule == StepRule::energy_momentum),
-        mixed_(!energy_momentum_ || history_.plain_solves == 0),
-        steady_(predictor.steady(plan.slot)) {
+        mixed_(!energy_momentum_ || history_.plain_solves == 0) {
     if (energy_momentum_ && !mixed_) --history_.plain_solves;
   }
 
@@ -112,23 +111,17 @@ class InnerSolve {
   }
 
  private:
-  /// Where surfaces stick, a motion that lets them slip leads far off, and from rest Newton's method finds its way
-  /// soon, or else mostly within a shorter step.
   Guesses order() const {
-    if (!uses(Heuristic::friction_order))
-      return {Guess::accelerated, Guess::steady, Guess::rest, Guess::other_method, Guess::continuation};
-    if (regularised_) return {Guess::accelerated, Guess::rest, Guess::continuation, Guess::steady, Guess::other_method};
-    if (frictional_) return {Guess::accelerated, Guess::rest, Guess::steady, Guess::other_method, Guess::continuation};
-    return {Guess::accelerated, Guess::steady, Guess::rest, Guess::other_method, Guess::continuation};
+    if (regularised_ && uses(Heuristic::friction_order))
+      return {Guess::accelerated, Guess::rest, Guess::continuation, Guess::other_method};
+    return {Guess::accelerated, Guess::rest, Guess::other_method, Guess::continuation};
   }
 
   bool applies(Guess guess) const {
     if (guess == Guess::accelerated && !uses(Heuristic::start_accelerated)) return false;
-    if (guess == Guess::steady && !uses(Heuristic::start_steady)) return false;
     if (guess == Guess::other_method && !uses(Heuristic::start_other_method)) return false;
     if (guess == Guess::continuation && !uses(Heuristic::start_continuation)) return false;
-    if (guess == Guess::continuation) return regularised_;
-    return guess != Guess::accelerated || !steady_;
+    return guess != Guess::continuation || regularised_;
   }
 
   /// What is always tried: rest, and where friction does not let surfaces jump all but the extrapolated motion. Others
@@ -141,8 +134,7 @@ class InnerSolve {
   /// Initial guesses that need not lead to the solution are rejected early. Where edges turn by a radian in an
   /// energy-momentum step, the mixed method may circle for ever: then the plain one comes first for a while.
   bool on_trial(Guess guess) const {
-    const bool moving = guess == Guess::steady || guess == Guess::other_method;
-    return guess == Guess::accelerated || (energy_momentum_ && moving && mixed(guess));
+    return guess == Guess::accelerated || (energy_momentum_ && guess == Guess::other_method && mixed(guess));
   }
 
   bool mixed(Guess guess) const { return (guess == Guess::other_method) != mixed_; }
@@ -155,7 +147,7 @@ class InnerSolve {
       predictor_.predict({state_.time + 0.5 * plan_.dt, h_, plan_.dt, plan_.slot}, state_.v, work_.mean);
       work_.move = h_ * work_.mean;
     } else {
-      work_.move = (guess == Guess::rest || guess == Guess::continuation ? 0.0 : h_) * state_.v;
+      work_.move = (guess == Guess::other_method ? h_ : 0.0) * state_.v;
     }
     equations_.assembler().project(work_.move);
     work_.move *= newton_.norms().cap(work_.move);
@@ -216,7 +208,6 @@ class InnerSolve {
   bool frictional_;
   bool regularised_;  ///< whether friction's regularisation is what Newton's method may fail on
   bool energy_momentum_, mixed_;
-  bool steady_;  ///< whether nothing predicts better than a steady motion
 };
 
 }  // namespace

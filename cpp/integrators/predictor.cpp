@@ -12,8 +12,6 @@ void Predictor::extrapolated(double time, const History& history, int points, co
   const auto& [a, b, c, d] = history;
   const auto& [wa, wb, wc, wd] = weight;
   switch (points) {
-    case 0:
-      return use(VectorX::Zero(a.size()));
     case 1:
       return use(wa * a);
     case 2:
@@ -27,7 +25,9 @@ void Predictor::extrapolated(double time, const History& history, int points, co
 
 template <class Use>
 void Predictor::predicted(const Step& step, const VectorX& v0, Choice choice, const Use& use) const {
-  if (choice.velocities)
+  if (choice.points == 0)
+    use(v0);
+  else if (choice.velocities)
     extrapolated(step.middle, velocity_, choice.points, use);
   else
     extrapolated(step.middle, acceleration_, choice.points, [&](const auto& a) { use(v0 + step.h * a); });

@@ -40,8 +40,6 @@ class Predictor {
     const Choice best = best_[static_cast<std::size_t>(slot)];
     return {best.velocities && count_ > 0, std::min(best.points, count_)};
   }
-  /// Whether the coming step is expected to go on as it starts, for nothing else is better.
-  bool steady(int slot) const { return choice(slot).points == 0; }
   /// Mean velocity expected of a step that starts with `v0`.
   void predict(const Step& step, const VectorX& v0, VectorX& out) const;
   /// Takes in a step from velocity `v0`; `weight` per unknown says how much an error there matters.

@@ -14,7 +14,7 @@ constexpr Words<Integrator, 6> kIntegrators{{{"static", Integrator::statics},
                                              {"verlet", Integrator::verlet}}};
 constexpr Words<LineSearch, 2> kLineSearches{
     {{"automatic", LineSearch::automatic}, {"goldstein_price", LineSearch::goldstein_price}}};
-constexpr Words<Heuristic, 23> kHeuristics{{{"reuse_across_steps", Heuristic::reuse_across_steps},
+constexpr Words<Heuristic, 22> kHeuristics{{{"reuse_across_steps", Heuristic::reuse_across_steps},
                                             {"reuse_within_step", Heuristic::reuse_within_step},
                                             {"rest_from_reuse", Heuristic::rest_from_reuse},
                                             {"refresh_after_slow", Heuristic::refresh_after_slow},
@@ -26,7 +26,6 @@ constexpr Words<Heuristic, 23> kHeuristics{{{"reuse_across_steps", Heuristic::re
                                             {"search_descent", Heuristic::search_descent},
                                             {"drop_geometric", Heuristic::drop_geometric},
                                             {"start_accelerated", Heuristic::start_accelerated},
-                                            {"start_steady", Heuristic::start_steady},
                                             {"start_other_method", Heuristic::start_other_method},
                                             {"start_continuation", Heuristic::start_continuation},
                                             {"start_record", Heuristic::start_record},

@@ -516,7 +516,6 @@ class Options:
         "search_descent",
         "drop_geometric",
         "start_accelerated",
-        "start_steady",
         "start_other_method",
         "start_continuation",
         "start_record",
