@@ -21,7 +21,6 @@ enum class Heuristic : unsigned {
   start_continuation,
   start_record,
   remember_plain,
-  friction_order,
   few_iterations,
   hold_sticking,
   predict_friction,

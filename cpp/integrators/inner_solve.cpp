@@ -9,10 +9,10 @@
 namespace withe {
 namespace {
 
-/// Initial guesses: the extrapolated motion; rest; a steady motion with the other of the mixed and the plain method;
-/// rest, and continuation in friction's regularisation.
-enum class Guess : std::size_t { accelerated, rest, other_method, continuation };
-using Guesses = std::array<Guess, 4>;
+/// Initial guesses: the extrapolated motion; rest; rest, and continuation in friction's regularisation; a steady motion
+/// with the other of the mixed and the plain method.
+enum class Guess : std::size_t { accelerated, rest, continuation, other_method };
+constexpr std::array kGuesses{Guess::accelerated, Guess::rest, Guess::continuation, Guess::other_method};
 
 // Iterations of guesses that may be wrong.
 constexpr int kFew = 12;
@@ -93,7 +93,7 @@ class InnerSolve {
   NewtonResult run() {
     NewtonResult found;
     int spent = 0;
-    for (Guess guess : order()) {
+    for (Guess guess : kGuesses) {
       if (!applies(guess)) continue;
       GuessRecord& record = history_.records[static_cast<std::size_t>(guess)];
       const bool sure = certain(guess);
@@ -111,12 +111,6 @@ class InnerSolve {
   }
 
  private:
-  Guesses order() const {
-    if (regularised_ && uses(Heuristic::friction_order))
-      return {Guess::accelerated, Guess::rest, Guess::continuation, Guess::other_method};
-    return {Guess::accelerated, Guess::rest, Guess::other_method, Guess::continuation};
-  }
-
   bool applies(Guess guess) const {
     if (guess == Guess::accelerated && !uses(Heuristic::start_accelerated)) return false;
     if (guess == Guess::other_method && !uses(Heuristic::start_other_method)) return false;

@@ -520,7 +520,6 @@ class Options:
         "start_continuation",
         "start_record",
         "remember_plain",
-        "friction_order",
         "few_iterations",
         "hold_sticking",
         "predict_friction",
