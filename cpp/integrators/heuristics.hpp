@@ -25,7 +25,6 @@ enum class Heuristic : unsigned {
   hold_sticking,
   predict_friction,
   supports_linear,
-  continuation_secant,
 };
 
 /// A set of heuristics that are switched off.

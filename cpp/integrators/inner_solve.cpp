@@ -167,21 +167,11 @@ class InnerSolve {
   /// sticks slips in proportion to it, which leads from one solution to the next.
   NewtonResult solve_by_continuation() {
     NewtonResult found;
-    VectorX& last = work_.velocity;
     int spent = 0;
-    for (std::size_t k = 0; k < kRegularisation.size(); ++k) {
-      if (k > 1 && uses(Heuristic::continuation_secant)) {
-        const double share =
-            (kRegularisation[k] - kRegularisation[k - 1]) / (kRegularisation[k - 1] - kRegularisation[k - 2]);
-        work_.move = share * (work_.z - last);
-        last = work_.z;
-        work_.z += equations_.allowed(work_.z, work_.move) * work_.move;
-      } else {
-        last = work_.z;
-      }
+    for (const double regularisation : kRegularisation) {
       found = newton_.solve(
           equations_, work_.z,
-          {.max_iterations = kMostOfEach, .mixed = mixed_, .interval = h_, .regularisation = kRegularisation[k]},
+          {.max_iterations = kMostOfEach, .mixed = mixed_, .interval = h_, .regularisation = regularisation},
           work_.newton);
       spent += found.iterations;
       if (!found.converged) break;

@@ -14,7 +14,7 @@ constexpr Words<Integrator, 6> kIntegrators{{{"static", Integrator::statics},
                                              {"verlet", Integrator::verlet}}};
 constexpr Words<LineSearch, 2> kLineSearches{
     {{"automatic", LineSearch::automatic}, {"goldstein_price", LineSearch::goldstein_price}}};
-constexpr Words<Heuristic, 21> kHeuristics{{{"reuse_across_steps", Heuristic::reuse_across_steps},
+constexpr Words<Heuristic, 20> kHeuristics{{{"reuse_across_steps", Heuristic::reuse_across_steps},
                                             {"reuse_within_step", Heuristic::reuse_within_step},
                                             {"rest_from_reuse", Heuristic::rest_from_reuse},
                                             {"refresh_after_slow", Heuristic::refresh_after_slow},
@@ -33,8 +33,7 @@ constexpr Words<Heuristic, 21> kHeuristics{{{"reuse_across_steps", Heuristic::re
                                             {"few_iterations", Heuristic::few_iterations},
                                             {"hold_sticking", Heuristic::hold_sticking},
                                             {"predict_friction", Heuristic::predict_friction},
-                                            {"supports_linear", Heuristic::supports_linear},
-                                            {"continuation_secant", Heuristic::continuation_secant}}};
+                                            {"supports_linear", Heuristic::supports_linear}}};
 constexpr Words<SolverKind, 3> kSolvers{
     {{"automatic", SolverKind::automatic}, {"band", SolverKind::band}, {"sparse", SolverKind::sparse}}};
 

@@ -524,7 +524,6 @@ class Options:
         "hold_sticking",
         "predict_friction",
         "supports_linear",
-        "continuation_secant",
     )
     adaptive: bool
     integrator: str
