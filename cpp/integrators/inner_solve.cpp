@@ -10,14 +10,12 @@ namespace withe {
 namespace {
 
 /// Initial guesses: the extrapolated motion; rest; rest, and continuation in friction's regularisation; a steady motion
-/// with the other of the mixed and the plain method.
-enum class Guess : std::size_t { accelerated, rest, continuation, other_method };
-constexpr std::array kGuesses{Guess::accelerated, Guess::rest, Guess::continuation, Guess::other_method};
+/// without axial forces as unknowns.
+enum class Guess : std::size_t { accelerated, rest, continuation, plain };
+constexpr std::array kGuesses{Guess::accelerated, Guess::rest, Guess::continuation, Guess::plain};
 
 // Iterations of guesses that may be wrong.
 constexpr int kFew = 12;
-// Steps without the mixed method after it has gone round in circles.
-constexpr int kPlainSolves = 16;
 // The slip over which friction grows, over that of the scene, and iterations at each.
 constexpr std::array<double, 7> kRegularisation{8192.0, 4096.0, 512.0, 64.0, 16.0, 4.0, 1.0};
 constexpr int kMostOfEach = 20;
@@ -82,29 +80,22 @@ class InnerSolve {
         state_(state),
         predictor_(predictor),
         work_(work),
-        history_(work.newton.guesses),
+        records_(work.newton.guesses),
         frictional_(equations.contact() && equations.contact()->frictional()),
-        regularised_(frictional_ && equations.contact()->regularises()),
-        energy_momentum_(plan.rule == StepRule::energy_momentum),
-        mixed_(!energy_momentum_ || history_.plain_solves == 0) {
-    if (energy_momentum_ && !mixed_) --history_.plain_solves;
-  }
+        regularised_(frictional_ && equations.contact()->regularises()) {}
 
   NewtonResult run() {
     NewtonResult found;
     int spent = 0;
     for (Guess guess : kGuesses) {
       if (!applies(guess)) continue;
-      GuessRecord& record = history_.records[static_cast<std::size_t>(guess)];
+      GuessRecord& record = records_[static_cast<std::size_t>(guess)];
       const bool sure = certain(guess);
       if (!sure && uses(Heuristic::start_record) && record.skipped()) continue;
       found = solve_from(guess);
       spent += found.iterations;
       if (!sure) record.note(found.converged);
-      if (!found.converged) continue;
-      if (energy_momentum_ && mixed_ && guess == Guess::other_method && uses(Heuristic::remember_plain))
-        history_.plain_solves = kPlainSolves;
-      break;
+      if (found.converged) break;
     }
     found.iterations = spent;
     return found;
@@ -113,7 +104,7 @@ class InnerSolve {
  private:
   bool applies(Guess guess) const {
     if (guess == Guess::accelerated && !uses(Heuristic::start_accelerated)) return false;
-    if (guess == Guess::other_method && !uses(Heuristic::start_other_method)) return false;
+    if (guess == Guess::plain && !uses(Heuristic::start_plain)) return false;
     if (guess == Guess::continuation && !uses(Heuristic::start_continuation)) return false;
     return guess != Guess::continuation || regularised_;
   }
@@ -125,14 +116,6 @@ class InnerSolve {
     return guess != Guess::accelerated && !(frictional_ && options_.adaptive);
   }
 
-  /// Initial guesses that need not lead to the solution are rejected early. Where edges turn by a radian in an
-  /// energy-momentum step, the mixed method may circle for ever: then the plain one comes first for a while.
-  bool on_trial(Guess guess) const {
-    return guess == Guess::accelerated || (energy_momentum_ && guess == Guess::other_method && mixed(guess));
-  }
-
-  bool mixed(Guess guess) const { return (guess == Guess::other_method) != mixed_; }
-
   bool uses(Heuristic h) const { return options_.heuristics.uses(h); }
 
   /// Puts the guess into `work.z`.
@@ -141,7 +124,7 @@ class InnerSolve {
       predictor_.predict({state_.time + 0.5 * plan_.dt, h_, plan_.dt, plan_.slot}, state_.v, work_.mean);
       work_.move = h_ * work_.mean;
     } else {
-      work_.move = (guess == Guess::other_method ? h_ : 0.0) * state_.v;
+      work_.move = (guess == Guess::plain ? h_ : 0.0) * state_.v;
     }
     equations_.assembler().project(work_.move);
     work_.move *= newton_.norms().cap(work_.move);
@@ -154,10 +137,11 @@ class InnerSolve {
   NewtonResult solve_from(Guess guess) {
     guess_at(guess);
     if (guess == Guess::continuation) return solve_by_continuation();
-    const bool trial = on_trial(guess) && uses(Heuristic::few_iterations);
+    // The extrapolated motion need not lead to the solution, and is rejected early.
+    const bool trial = guess == Guess::accelerated && uses(Heuristic::few_iterations);
     return newton_.solve(equations_, work_.z,
                          {.max_iterations = trial ? std::min(kFew, options_.max_iterations) : options_.max_iterations,
-                          .mixed = mixed(guess),
+                          .mixed = guess != Guess::plain,
                           .interval = h_},
                          work_.newton);
   }
@@ -169,10 +153,9 @@ class InnerSolve {
     NewtonResult found;
     int spent = 0;
     for (const double regularisation : kRegularisation) {
-      found = newton_.solve(
-          equations_, work_.z,
-          {.max_iterations = kMostOfEach, .mixed = mixed_, .interval = h_, .regularisation = regularisation},
-          work_.newton);
+      found = newton_.solve(equations_, work_.z,
+                            {.max_iterations = kMostOfEach, .interval = h_, .regularisation = regularisation},
+                            work_.newton);
       spent += found.iterations;
       if (!found.converged) break;
     }
@@ -188,10 +171,9 @@ class InnerSolve {
   const State& state_;
   const Predictor& predictor_;
   StepWorkspace& work_;
-  GuessHistory& history_;
+  GuessRecords& records_;
   bool frictional_;
   bool regularised_;  ///< whether friction's regularisation is what Newton's method may fail on
-  bool energy_momentum_, mixed_;
 };
 
 }  // namespace

@@ -4,7 +4,7 @@
 #include <functional>
 #include <limits>
 
-#include "integrators/guess_history.hpp"
+#include "integrators/guess_record.hpp"
 #include "integrators/matrix_reuse.hpp"
 #include "steps/equations.hpp"
 
@@ -21,7 +21,7 @@ struct NewtonWorkspace {
   VectorX step, axial_force, trial, next_step;
   ContactLinearisation contact;
   MatrixRecord matrix;
-  GuessHistory guesses;
+  GuessRecords guesses;
   double finest = INFINITY;  ///< [m], a step tolerance that error control wants; that of the options is an upper bound
   Counters counters;
   std::function<void()> poll = [] {};  ///< asked once an iteration; what it throws ends the solve

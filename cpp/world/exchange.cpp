@@ -217,10 +217,8 @@ void exchange(Archive& io, MatrixHistory& history) {
 }
 
 template <class Archive>
-void exchange(Archive& io, GuessHistory& history) {
-  auto& [records, plain_solves] = history;
+void exchange(Archive& io, GuessRecords& records) {
   for (auto& [misses, waits] : records) io(misses), io(waits);
-  io(plain_solves);
 }
 
 }  // namespace

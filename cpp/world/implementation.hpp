@@ -67,7 +67,7 @@ struct World::Implementation : Running {
   EnergyCoefficients before_settings;
   bool newly_set = false;
   MatrixRecord marked_matrix;
-  GuessHistory marked_guesses;
+  GuessRecords marked_guesses;
   StepHistory marked_history;
   Division division;                   ///< of the present time step
   Moving kept;                         ///< at the start of a step that may be taken back

@@ -103,7 +103,7 @@ void World::Implementation::forget_contacts() {
 
 void World::Implementation::forget_matrix() {
   work.newton.matrix = MatrixRecord{};
-  work.newton.guesses = GuessHistory{};
+  work.newton.guesses = GuessRecords{};
   for (const System which : kSystems)
     if (Equations* known = system(which)) known->forget_flow();
 }

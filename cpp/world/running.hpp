@@ -153,7 +153,7 @@ inline constexpr std::array<System, 2> kSystems{System::scheme, System::statics}
 /// What solves leave for those to come: with it, a copy goes on with the same bits.
 struct Lagged {
   MatrixHistory matrix;
-  GuessHistory guesses;
+  GuessRecords guesses;
   std::optional<System> owner;  ///< of the factorisation that may serve again
   std::array<std::optional<EquationsMemory>, kSystems.size()> systems;
 };

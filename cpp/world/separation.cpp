@@ -43,7 +43,7 @@ class Separation {
       predictor_.clear();
       prescribed_.held.q = state_.q;
       work_.newton.matrix = MatrixRecord{};
-      work_.newton.guesses = GuessHistory{};
+      work_.newton.guesses = GuessRecords{};
       const bool done = implicit_step(equations_, newton_, options_, parameters_, prescribed_,
                                       {StepRule::backward_euler, dt, 0}, state_, predictor_, work_)
                             .accepted;

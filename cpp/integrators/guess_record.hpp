@@ -20,9 +20,6 @@ struct GuessRecord {
   }
 };
 
-struct GuessHistory {
-  std::array<GuessRecord, 4> records{};  ///< per `Guess`
-  int plain_solves = 0;                  ///< still to come before the mixed method is tried again
-};
+using GuessRecords = std::array<GuessRecord, 4>;  ///< per `Guess` of inner_solve.cpp
 
 }  // namespace withe
