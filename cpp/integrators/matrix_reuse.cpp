@@ -19,15 +19,15 @@ std::size_t at(MatrixAge age) { return static_cast<std::size_t>(age); }
 
 }  // namespace
 
-MatrixReuse::MatrixReuse(MatrixRecord& record, Equations& equations, double interval, bool allowed, double tolerance,
+MatrixReuse::MatrixReuse(MatrixRecord& record, Equations& equations, double interval, double tolerance,
                          const Without& heuristics)
     : record_(record),
       equations_(equations),
       interval_(std::abs(interval)),
-      allowed_(allowed),
+      allowed_(interval != 0.0),
       tolerance_(tolerance),
       heuristics_(heuristics) {
-  if (!allowed)
+  if (!allowed_)
     drop();
   else if (record.belongs_to(equations, interval) && record.generation == equations.assembler().generation()) {
     const bool badly = record.contraction[at(MatrixAge::across)] > kSlow && heuristics.uses(Heuristic::rest_from_reuse);

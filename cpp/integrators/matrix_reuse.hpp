@@ -35,10 +35,9 @@ struct MatrixRecord : MatrixHistory {
 /// One solve's decisions about its matrices, and its estimate of the distance from the solution.
 class MatrixReuse {
  public:
-  /// `interval`: of a time step, after whose end the matrix may serve again. `allowed`: whether old ones may serve at
-  /// all. `tolerance`: of the solution [m].
-  MatrixReuse(MatrixRecord& record, Equations& equations, double interval, bool allowed, double tolerance,
-              const Without& heuristics);
+  /// `interval`: of a time step [s], after whose end the matrix may serve again; 0: each matrix serves one iteration.
+  /// `tolerance`: of the solution [m].
+  MatrixReuse(MatrixRecord& record, Equations& equations, double interval, double tolerance, const Without& heuristics);
 
   /// Whether the coming iteration makes a matrix.
   bool fresh() const { return fresh_; }

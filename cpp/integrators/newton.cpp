@@ -29,29 +29,6 @@ bool loses_path(const Prediction& predicted, const MatrixReuse& reuse, bool firs
 /// In packs: what is not finite is none times zero either.
 bool is_finite(const VectorX& x) { return (0.0 * x).sum() == 0.0; }
 
-/// [Choi, dissertation, Algorithm 4], with the sign of q + alpha dq and the bounds it leaves unset: Goldstein-Price on
-/// |F|^2 / 2.
-double line_search(const NewtonSystem& system, const VectorX& z, const VectorX& step) {
-  NewtonWorkspace& work = system.work;
-  const double before = 0.5 * work.data.residual.squaredNorm();
-  const double slope = -2.0 * before;  // F^T (dF/dq) dq, with dq = -J^-1 F
-  double low = 0.0, high = 2.0, alpha = 1.0;
-  for (int n = 0; n < 20; ++n) {
-    work.trial = z + alpha * step;
-    system.evaluate(work.trial, false);
-    const double change = 0.5 * work.data.residual.squaredNorm() - before;
-    if (!(change <= 0.1 * alpha * slope))
-      high = alpha;
-    else if (alpha < 1.0 && change < 0.9 * alpha * slope)
-      low = alpha;
-    else
-      break;
-    if (high - low < 1e-3) break;
-    alpha = 0.5 * (low + high);
-  }
-  return alpha;
-}
-
 /// A user's force tolerance is that of a whole step.
 Options options_of_parts(Options options) {
   if (options.integrator == Integrator::fourth_order) options.force_tolerance /= kFourthOrderWay;
@@ -96,9 +73,8 @@ class Newton::Solve {
         contact_(equations.contact()),
         system_{equations, how.target, work, how.hold_neutral},
         search_(newton.norms_, system_, newton.options_.heuristics),
-        line_search_(newton.options_.line_search == LineSearch::goldstein_price),
         mixed_(how.mixed && newton.options_.mixed),
-        reuse_(work.matrix, equations, how.interval, how.interval != 0.0 && !line_search_,
+        reuse_(work.matrix, equations, how.interval,
                std::min(newton.options_.step_tolerance * newton.model_.length_scale, work.finest),
                newton.options_.heuristics),
         axial_known_(mixed_ && (how.interval != 0.0 || (how.predicted && how.predicted->forces))) {
@@ -181,13 +157,6 @@ class Newton::Solve {
     axial_known_ = mixed_;
     if (contact_ && uses(Heuristic::surface_search) && !leaves_surfaces_alone() && !step_between_surfaces(shorten))
       return false;
-    if (line_search_) {
-      const double alpha = line_search(system_, z_, work_.step);
-      work_.step *= alpha;
-      shorten *= alpha;
-      axial_known_ = axial_known_ && alpha == 1.0;
-      search_.forget();
-    }
     if (search_.evaluated())
       z_.swap(work_.trial);
     else
@@ -223,7 +192,7 @@ class Newton::Solve {
   Contact* contact_;
   NewtonSystem system_;
   SurfaceSearch search_;
-  bool line_search_, mixed_;
+  bool mixed_;
   MatrixReuse reuse_;
   bool axial_known_;
   bool spare_matrix_ = false;  ///< made since the last factorisation

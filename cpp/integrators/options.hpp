@@ -10,11 +10,6 @@ namespace withe {
 
 enum class Integrator { statics, backward_euler, implicit_midpoint, energy_momentum, fourth_order, verlet };
 
-enum class LineSearch {
-  automatic,        ///< full steps with a cap, and between surfaces as far as `SurfaceSearch` finds
-  goldstein_price,  ///< [Choi, dissertation, Algorithm 4] on |F|^2 / 2
-};
-
 /// Choice of the static solver at an equilibrium that is not stable: leave it for a stable one, or return it.
 enum class Saddles { leave, keep };
 
@@ -26,7 +21,6 @@ struct Options {
   std::optional<double> duration;   ///< [s], over which `tolerance` holds; else 1 s
   std::optional<bool> planar;       ///< nothing: decide
   SolverKind solver = SolverKind::automatic;
-  LineSearch line_search = LineSearch::automatic;
   bool mixed = true;              ///< Newton with the axial force as its own unknown
   double step_tolerance = 1e-9;   ///< Newton step, relative to the length of the scene
   double force_tolerance = 1e-8;  ///< residual, relative to the forces in the scene

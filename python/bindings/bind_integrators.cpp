@@ -12,8 +12,6 @@ constexpr Words<Integrator, 6> kIntegrators{{{"static", Integrator::statics},
                                              {"energy_momentum", Integrator::energy_momentum},
                                              {"fourth_order", Integrator::fourth_order},
                                              {"verlet", Integrator::verlet}}};
-constexpr Words<LineSearch, 2> kLineSearches{
-    {{"automatic", LineSearch::automatic}, {"goldstein_price", LineSearch::goldstein_price}}};
 constexpr Words<Heuristic, 19> kHeuristics{{{"reuse_across_steps", Heuristic::reuse_across_steps},
                                             {"reuse_within_step", Heuristic::reuse_within_step},
                                             {"rest_from_reuse", Heuristic::rest_from_reuse},
@@ -54,7 +52,6 @@ void register_integrators(py::module_& module) {
       .def_readwrite("max_steps", &Options::max_steps);
   def_word(options, "integrator", &Options::integrator, kIntegrators);
   def_word(options, "solver", &Options::solver, kSolvers);
-  def_word(options, "line_search", &Options::line_search, kLineSearches);
   options.def("switch_off",
               [](Options& self, const std::string& word) { self.heuristics.switch_off(from_word(kHeuristics, word)); });
   std::vector<std::string> heuristics;

@@ -526,7 +526,6 @@ class Options:
     )
     adaptive: bool
     integrator: str
-    line_search: str
     mixed: bool
     planar: bool | None
     solver: str

@@ -8,10 +8,9 @@ from typing import Literal, get_args
 from withe import _core
 from withe.common import validation
 
-__all__ = ["Bending", "BuildOptions", "Integrator", "LineSearch", "Solver", "check_tolerances"]
+__all__ = ["Bending", "BuildOptions", "Integrator", "Solver", "check_tolerances"]
 
 Integrator = Literal["implicit_midpoint", "backward_euler", "energy_momentum", "fourth_order", "verlet", "static"]
-LineSearch = Literal["automatic", "goldstein_price"]
 Solver = Literal["automatic", "band", "sparse"]
 Bending = Literal["angle", "tangent"]
 
@@ -28,7 +27,6 @@ class BuildOptions:
     duration: float | None
     bending: Bending
     solver: Solver
-    line_search: LineSearch
     mixed: bool
     step_tolerance: float
     force_tolerance: float
@@ -44,7 +42,7 @@ class BuildOptions:
         ValueError
             An option out of range, or tolerance with a scheme that takes none.
         """
-        words = {"integrator": Integrator, "solver": Solver, "line_search": LineSearch, "bending": Bending}
+        words = {"integrator": Integrator, "solver": Solver, "bending": Bending}
         for name, literal in words.items():
             validation.choice(getattr(self, name), name, get_args(literal))
         checked = replace(

@@ -17,7 +17,7 @@ from withe.parts.directory import Directory
 from withe.parts.handles import Joint, Load, NodeHandle, Rod, RodPlace, parse_place
 from withe.parts.kinds import JoinKind, JointForm, LoadPart, RodPart
 from withe.parts.materials import Material, Section, Stiffness
-from withe.parts.options import Bending, BuildOptions, Integrator, LineSearch, Solver
+from withe.parts.options import Bending, BuildOptions, Integrator, Solver
 from withe.parts.rods import Natural, make_rod
 from withe.scene.contacts import Contacts
 from withe.scene.joints import JoinedNodes
@@ -328,7 +328,6 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         duration: float | None = None,
         bending: Bending = "angle",
         solver: Solver = "automatic",
-        line_search: LineSearch = "automatic",
         mixed: bool = True,
         step_tolerance: float = 1e-9,
         force_tolerance: float = 1e-8,
@@ -376,8 +375,6 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
             [Bergou et al. 2008], which is too stiff on coarse meshes and does not model the arcs of edges.
         solver : {"automatic", "band", "sparse"}
             Solver of the linear equations.
-        line_search : {"automatic", "goldstein_price"}
-            Line search of Newton's method.
         mixed : bool
             True to solve for axial forces as separate unknowns in Newton's method.
         step_tolerance : float
@@ -412,7 +409,6 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
             duration=duration,
             bending=bending,
             solver=solver,
-            line_search=line_search,
             mixed=mixed,
             step_tolerance=step_tolerance,
             force_tolerance=force_tolerance,
