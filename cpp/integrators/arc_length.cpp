@@ -10,15 +10,15 @@ namespace withe {
 namespace {
 
 // Points on the way from the first factor to the last one, at least.
-constexpr double kLeastPoints = 20.0;
-// Iterations of a point, and those after which the next arc may be longer.
-constexpr int kMostIterations = 12, kEasy = 5;
-// Shortest arc, over the longest that turns allow.
-constexpr double kShortest = 1e-5;
-// Arcs tried to find where something happens between two points, and the share of the way of factors that then counts
-// as none.
-constexpr int kMostTries = 30;
-constexpr double kNoWay = 1e-9;
+constexpr double kMinPoints = 20.0;
+// Iterations of a point after which the next arc may be twice as long.
+constexpr int kMaxEasyIterations = 5;
+// Arc over the longest that turns allow; the path has ended where no longer arc leads to a point.
+constexpr double kMinArc = 1e-5;
+// Arcs tried to find where a value changes its sign between two points.
+constexpr int kMaxTries = 30;
+// Error of a factor found so, over the way of factors.
+constexpr double kMaxFactorError = 1e-9;
 
 class ArcLength {
  public:
@@ -54,15 +54,15 @@ class ArcLength {
     report();
     double longest = INFINITY;
     for (int count = 1; count < arc_.most_points;) {
-      const double most = std::min(arc_.turn / turn_, std::abs(span_) / (kLeastPoints * std::abs(rate_)));
+      const double most = std::min(arc_.turn / turn_, std::abs(span_) / (kMinPoints * std::abs(rate_)));
       double arc = std::min(most, longest);
       start_ = {state_, factor_, rate_, tangent_};
       int taken = 0;
       while (!(taken = go(arc))) {
         arc *= 0.5;
-        if (arc < kShortest * most) return result_;
+        if (arc < kMinArc * most) return result_;
       }
-      longest = taken <= kEasy ? 2.0 * arc : arc;
+      longest = taken <= kMaxEasyIterations ? 2.0 * arc : arc;
       const bool ends = (start_.factor - arc_.end) * (factor_ - arc_.end) <= 0.0 && start_.factor != arc_.end;
       // Just behind a limit point the rate is that of rounding: the next one is as far as an arc away.
       const bool turns = start_.rate * rate_ < 0.0 && !(point_.limit);
@@ -114,7 +114,7 @@ class ArcLength {
     NewtonResult& newton = result_.newton;
     Stagnation stagnation;
     const double tolerance = options_.step_tolerance * equations_.model().length_scale;
-    for (int k = 0; k <= kMostIterations; ++k) {
+    for (int k = 0; k <= kMaxPathIterations; ++k) {
       work_.poll();
       path_.go_to(factor);
       if (!path_.hold(factor, z)) break;
@@ -151,8 +151,7 @@ class ArcLength {
       step_ += change * pull_;
       if (!step_.allFinite() || newton_.norms().cap(step_) < 1.0) break;
       const double size = newton_.norms().displacement(step_);
-      // What is not drawn in fast may lead to another path.
-      if (size > std::max(0.05 * length, 1e4 * tolerance) && size > (k == 0 ? length : 0.5 * last)) break;
+      if (leaves_path(size, k == 0 ? length : kMaxContraction * last, length, tolerance)) break;
       last = size;
       predict_axial_force(equations_.problem(), work_.data, step_, work_.axial_force);
       z += step_;
@@ -180,14 +179,14 @@ class ArcLength {
     double high = arc, at_high = value();
     back();
     double low = 0.0, at_low = value();
-    for (int k = 0; k < kMostTries && at_low != 0.0; ++k) {
+    for (int k = 0; k < kMaxTries && at_low != 0.0; ++k) {
       const double middle = (low * at_high - high * at_low) / (at_high - at_low), way = high - low;
       back();
       if (!go(middle)) return false;
       const double found = value();
       // The factor moves by no more than its greatest rate allows.
-      if (std::abs(rate_) * way <= kNoWay * std::abs(span_) ||
-          std::abs(factor_ - arc_.end) <= kNoWay * std::abs(span_) || way <= 1e-6 * arc)
+      if (std::abs(rate_) * way <= kMaxFactorError * std::abs(span_) ||
+          std::abs(factor_ - arc_.end) <= kMaxFactorError * std::abs(span_) || way <= 1e-6 * arc)
         return true;
       if ((found > 0.0) == (at_high > 0.0)) {
         if (found * last_value_ > 0.0) at_low *= 0.5;
@@ -208,7 +207,7 @@ class ArcLength {
     if (!path_.hold(arc_.end, z)) return;
     do {
       const NewtonResult r =
-          newton_.solve(equations_, z, {.target = &path_.target(), .max_iterations = kMostIterations}, work_);
+          newton_.solve(equations_, z, {.target = &path_.target(), .max_iterations = kMaxPathIterations}, work_);
       result_.newton.iterations += r.iterations;
       if (!r.converged) return;
     } while (path_.stiffen_deep(z));

@@ -15,8 +15,9 @@
 namespace withe {
 namespace {
 
-// Over a step, the time since the middle of the one before where that was much longer.
-constexpr double kMuchLonger = 2.0;
+// Time since the middle of the step before, over the step, up to which the step before counts as no longer: 1
+// for equal steps, 2 where the step before was three times as long.
+constexpr double kMaxUsualTime = 2.0;
 
 /// How far a force that acts over a step moves things [m]: filtered by (M / h^2 + K)^-1, so that modes which the step
 /// does not resolve, and which it therefore leaves bounded, count for as little as they move [Hosea and Shampine 1996].
@@ -65,8 +66,9 @@ double estimated_error(Equations& equations, const Newton& newton, const Options
     constant = kFourthOrderError;
     whole = &work.whole_acceleration;
   }
-  constexpr double kCaution = 2.0;  // fast modes are taken to shift so much further
-  const double cut = std::pow(kCaution * 2.0 * dt / (constant * options.duration.value_or(1.0)), 1.0 / (order + 1));
+  constexpr double kSafetyFactor = 2.0;  // of the shift in phase of fast modes
+  const double cut =
+      std::pow(kSafetyFactor * 2.0 * dt / (constant * options.duration.value_or(1.0)), 1.0 / (order + 1));
   predictor.differentiate(order - 1, -std::expm1(-cut), dt, *whole, work.difference);
   const double h = 0.5 * plan.dt;
   work.difference *= constant * std::pow(dt, order + 1) / (h * h);
@@ -94,7 +96,7 @@ void find_held_velocity(const Model& model, const HeldTarget& held, const StepPl
 double held_time(const StepPlan& plan, const State& state) {
   if (plan.rule != StepRule::backward_euler || state.motion.known == 0) return plan.dt;
   const double between = state.time + 0.5 * plan.dt - state.motion.time[0];
-  return between > kMuchLonger * plan.dt ? between : plan.dt;
+  return between > kMaxUsualTime * plan.dt ? between : plan.dt;
 }
 
 /// Finds the fluid's force for a step of dt: that on velocities as they are taken to be within the step, to the order

@@ -14,8 +14,8 @@ struct GuessRecord {
 
   bool skipped() { return waits > 0 && waits-- > 0; }
   void note(bool converged) {
-    constexpr int kMostMisses = 6;
-    misses = converged ? 0 : std::min(misses + 1, kMostMisses);
+    constexpr int kMaxMisses = 6;  // a guess that always misses is tried once in 64 solves
+    misses = converged ? 0 : std::min(misses + 1, kMaxMisses);
     waits = (1 << misses) - 1;
   }
 };

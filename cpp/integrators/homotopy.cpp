@@ -2,19 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <span>
 
 namespace withe {
 namespace {
 
-// Edges turn by so much in the difference that stands for a derivative [rad]: what it leaves out and what rounding adds
-// are then both below a millionth.
-constexpr double kLittleTurn = 1e-6;
-// A factor of that kind for hands that yield.
-constexpr double kLittleFactor = 1e-6;
-// Places of supports at rest, found twice, differ by no more than this, over the farthest coordinate.
-constexpr double kRounding = 64.0 * std::numeric_limits<double>::epsilon();
+// Turn of edges in the difference that stands for a derivative [rad], and the factor of it where hands yield. A forward
+// difference by d has a truncation error of about d and a rounding error of about epsilon / d: both are below 1e-6.
+constexpr double kDifference = 1e-6;
 
 bool turns(const LoadPiece& piece) { return piece.shape != LoadShape::dead_node && piece.load >= 0; }
 
@@ -107,26 +102,27 @@ void Homotopy::accept(const VectorX& q) {
 }
 
 void Homotopy::find_pull(const VectorX& z, VectorX& pull, VectorX& held) {
-  double little = boundary_.move ? kLittleFactor : 1.0;
+  double part = boundary_.move ? kDifference : 1.0;
   for (int tries = 0; tries < 20; ++tries) {
     moved_ = z;
-    const bool reached = boundary_.hold(present_, factor_ + little, moved_);
+    const bool reached = boundary_.hold(present_, factor_ + part, moved_);
     held = moved_ - z;
     const double turn = reached ? newton_.norms().turn(held) : INFINITY;
-    if (turn <= kLittleTurn) break;
-    little *= std::isfinite(turn) ? 0.9 * kLittleTurn / turn : 1e-3;
+    if (turn <= kDifference) break;
+    part *= std::isfinite(turn) ? 0.9 * kDifference / turn : 1e-3;
   }
   const double farthest = z.cwiseProduct(newton_.norms().coordinates()).lpNorm<Eigen::Infinity>();
-  const bool any_moves = newton_.norms().displacement(held) > kRounding * farthest;
+  // Places of supports at rest, found twice, differ by rounding alone.
+  const bool any_moves = newton_.norms().displacement(held) > kMaxRounding * farthest;
   if (!any_moves) moved_ = z;
-  held = any_moves ? (held / little).eval() : VectorX::Zero(z.size());
+  held = any_moves ? (held / part).eval() : VectorX::Zero(z.size());
   moves_ = boundary_.move || any_moves;
   equations_.evaluate(z, false, nullptr, work_.data);
   pull = work_.data.residual;
-  apply(factor_ + little);
+  apply(factor_ + part);
   equations_.evaluate(moved_, false, nullptr, work_.data);
   apply(factor_);
-  pull = (pull - work_.data.residual) / little - imbalance_;
+  pull = (pull - work_.data.residual) / part - imbalance_;
 }
 
 void Homotopy::find_tangent(Tangent& out) {
@@ -135,7 +131,7 @@ void Homotopy::find_tangent(Tangent& out) {
   LinearSolver& solver = equations_.assembler().solver();
   ++work_.counters.iterations;
   ++work_.counters.factorizations;
-  if (hold_neutral_) shift_ = neutral_shift(equations_, kRounded);
+  if (hold_neutral_) shift_ = neutral_shift(equations_, kEpsilon);
   out.factorization = solver.factorize({shift_.data(), static_cast<std::size_t>(shift_.size())});
   out.found = out.factorization.status == FactorStatus::ok || factorize(equations_, work_);
   if (!out.found) return;

@@ -14,11 +14,10 @@ namespace {
 enum class Guess : std::size_t { accelerated, rest, continuation, plain };
 constexpr std::array kGuesses{Guess::accelerated, Guess::rest, Guess::continuation, Guess::plain};
 
-// Iterations of guesses that may be wrong.
-constexpr int kFew = 12;
-// The slip over which friction grows, over that of the scene, and iterations at each.
+// Iterations from the extrapolated motion, which may lead nowhere.
+constexpr int kMaxTrialIterations = 12;
+// Slip over which friction grows, over that of the scene, in the steps of the continuation.
 constexpr std::array<double, 7> kRegularisation{8192.0, 4096.0, 512.0, 64.0, 16.0, 4.0, 1.0};
-constexpr int kMostOfEach = 20;
 
 /// Axial forces at the start of a step [N]: where the mixed method sets out from, for those of an extrapolated motion,
 /// whose edges turn along straight lines and so stretch, mean nothing.
@@ -139,11 +138,12 @@ class InnerSolve {
     if (guess == Guess::continuation) return solve_by_continuation();
     // The extrapolated motion need not lead to the solution, and is rejected early.
     const bool trial = guess == Guess::accelerated && uses(Heuristic::few_iterations);
-    return newton_.solve(equations_, work_.z,
-                         {.max_iterations = trial ? std::min(kFew, options_.max_iterations) : options_.max_iterations,
-                          .mixed = guess != Guess::plain,
-                          .interval = h_},
-                         work_.newton);
+    return newton_.solve(
+        equations_, work_.z,
+        {.max_iterations = trial ? std::min(kMaxTrialIterations, options_.max_iterations) : options_.max_iterations,
+         .mixed = guess != Guess::plain,
+         .interval = h_},
+        work_.newton);
   }
 
   /// Where surfaces stop or turn round, friction jumps within a slip far smaller than an iteration, and Newton's method
@@ -154,7 +154,7 @@ class InnerSolve {
     int spent = 0;
     for (const double regularisation : kRegularisation) {
       found = newton_.solve(equations_, work_.z,
-                            {.max_iterations = kMostOfEach, .interval = h_, .regularisation = regularisation},
+                            {.max_iterations = kMaxPathIterations, .interval = h_, .regularisation = regularisation},
                             work_.newton);
       spent += found.iterations;
       if (!found.converged) break;

@@ -5,15 +5,17 @@
 namespace withe {
 namespace {
 
-// A lagged Jacobian of an earlier time step whose contraction rate is above this is tried again after so many steps.
-constexpr double kSlow = 0.15;
-constexpr int kWait = 16;
-// A step, of the contraction rate within a step: where it has asked for new matrices alone, it is measured no more.
-constexpr double kForgetting = 0.96;
-// So many iterations cost as much as a new matrix.
-constexpr int kCostOfMatrix = 3;
-// An iteration with an old matrix costs about a quarter of one with a new one.
-constexpr double kWorth = 2.5;
+// Contraction rate up to which a Jacobian of an earlier time step serves the next one.
+constexpr double kMaxContractionAcross = 0.15;
+// Steps after which one is tried again whose contraction rate was greater.
+constexpr int kStepsUntilTrial = 16;
+// Decay of the known contraction rate within a step, in one step: a rate that only asks for new matrices is measured no
+// more, and would stay.
+constexpr double kRateDecay = 0.96;
+// Chord iterations that cost as much as a new matrix: see FACTORISATION of benchmarks/ablation.py.
+constexpr int kIterationsPerMatrix = 3;
+// Chord iterations to the solution from which on a new matrix is worth its cost.
+constexpr double kMaxIterationsLeft = 2.5;
 
 std::size_t at(MatrixAge age) { return static_cast<std::size_t>(age); }
 
@@ -30,13 +32,15 @@ MatrixReuse::MatrixReuse(MatrixRecord& record, Equations& equations, double inte
   if (!allowed_)
     drop();
   else if (record.belongs_to(equations, interval) && record.generation == equations.assembler().generation()) {
-    const bool badly = record.contraction[at(MatrixAge::across)] > kSlow && heuristics.uses(Heuristic::rest_from_reuse);
+    const bool badly = record.contraction[at(MatrixAge::across)] > kMaxContractionAcross &&
+                       heuristics.uses(Heuristic::rest_from_reuse);
     fresh_ = !heuristics.uses(Heuristic::reuse_across_steps) ||
-             (record.slow && heuristics.uses(Heuristic::refresh_after_slow)) || (badly && ++record.waited < kWait);
+             (record.slow && heuristics.uses(Heuristic::refresh_after_slow)) ||
+             (badly && ++record.waited < kStepsUntilTrial);
     if (!fresh_) record.waited = 0;
   }
   record.slow = false;
-  if (heuristics.uses(Heuristic::forget_contraction)) record.contraction[at(MatrixAge::within)] *= kForgetting;
+  if (heuristics.uses(Heuristic::forget_contraction)) record.contraction[at(MatrixAge::within)] *= kRateDecay;
 }
 
 bool MatrixReuse::near_end() const { return at_end() && heuristics_.uses(Heuristic::late_matrix); }
@@ -54,7 +58,9 @@ void MatrixReuse::note_spare_matrix() {
   record_.factorized = false;
 }
 
-void MatrixReuse::note_end(int iterations) { record_.slow = age_ == MatrixAge::across && iterations >= kCostOfMatrix; }
+void MatrixReuse::note_end(int iterations) {
+  record_.slow = age_ == MatrixAge::across && iterations >= kIterationsPerMatrix;
+}
 
 void MatrixReuse::note_step(double length) {
   last_step_ = step_;
@@ -74,7 +80,7 @@ void MatrixReuse::note_step(double length) {
   const double next = record_.contraction[at(age_ == MatrixAge::across ? MatrixAge::across : MatrixAge::within)];
   fresh_ = !std::isfinite(step_) || next > 0.5 || (!heuristics_.uses(Heuristic::reuse_within_step) && made_here_) ||
            (heuristics_.uses(Heuristic::matrix_worth) && distance_ > tolerance_ &&
-            std::log(distance_ / tolerance_) > kWorth * std::log(1.0 / next));
+            std::log(distance_ / tolerance_) > kMaxIterationsLeft * std::log(1.0 / next));
 }
 
 }  // namespace withe

@@ -12,18 +12,18 @@ namespace {
 
 // Steps that are within the tolerance, while so many in a row have not halved the residual, end at a jump of forces. In
 // time a shorter interval leads past it; a solve at rest has nothing better than to go on.
-constexpr int kMostStalls = 4;
+constexpr int kMaxStalls = 4;
 
-// Corrections of a prediction must shrink by this factor, while they are longer than this share of the prediction, and
-// than this, over the tolerance.
-constexpr double kMostContraction = 0.5, kNear = 0.05, kUnsettled = 1e4;
+// Corrections, over the prediction, and over the tolerance, up to which they need not shrink: so near to the path a
+// kink, or rounding, may stop that, and no other path is.
+constexpr double kMaxSettledShare = 0.05, kMaxSettledTolerances = 1e4;
 
 /// Whether corrections of a prediction are too long, or do not shrink, for what they lead to to lie on the same path.
 bool loses_path(const Prediction& predicted, const MatrixReuse& reuse, bool first, double length) {
-  const double unsettled = kUnsettled * reuse.tolerance();
-  if (!predicted.strict) return predicted.length > 0.0 && length > std::max(predicted.length, unsettled);
-  if (reuse.step() <= std::max(kNear * predicted.length, unsettled)) return false;
-  return first ? !(reuse.step() <= predicted.length) : !(reuse.step() <= kMostContraction * reuse.last_step());
+  if (predicted.strict)
+    return leaves_path(reuse.step(), first ? predicted.length : kMaxContraction * reuse.last_step(), predicted.length,
+                       reuse.tolerance());
+  return predicted.length > 0.0 && length > std::max(predicted.length, kMaxSettledTolerances * reuse.tolerance());
 }
 
 /// In packs: what is not finite is none times zero either.
@@ -39,6 +39,10 @@ Options options_of_parts(Options options) {
 
 Newton::Newton(const Model& model, const Options& options)
     : model_(model), options_(options_of_parts(options)), norms_(model) {}
+
+bool leaves_path(double correction, double bound, double predicted, double tolerance) {
+  return !(correction <= std::max({bound, kMaxSettledShare * predicted, kMaxSettledTolerances * tolerance}));
+}
 
 Balance Newton::balance(const StepData& e, NewtonResult& result) const {
   Balance balance;
@@ -121,7 +125,7 @@ class Newton::Solve {
     stagnation_.note(result_.residual, reuse_.step());
     if (converged()) return Verdict::converged;
     if (result_.iterations == how_.max_iterations + std::min(whole_steps_, how_.free_steps)) return Verdict::failed;
-    if (uses(Heuristic::reject_stagnation) && how_.interval != 0.0 && stagnation_.stalls() >= kMostStalls &&
+    if (uses(Heuristic::reject_stagnation) && how_.interval != 0.0 && stagnation_.stalls() >= kMaxStalls &&
         reuse_.at_end())
       return Verdict::failed;
     if (reuse_.fresh() && near_end) evaluate(true);

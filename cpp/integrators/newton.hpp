@@ -47,6 +47,18 @@ class Stagnation {
   bool reached_ = false;
 };
 
+/// Iterations for a solution that is near a known one: a point of a path of equilibria, an interval on the way to one,
+/// a step of a continuation. Where surfaces rub, Newton's method may wander, and rounding errors grow by some factor
+/// each iteration: after 25 to 40 of them they decide where it ends.
+inline constexpr int kMaxPathIterations = 20;
+
+/// Contraction of corrections on a path: Newton's method converges where they halve [Deuflhard 2011, section 5.1].
+inline constexpr double kMaxContraction = 0.5;
+
+/// True if a correction of a prediction is too long for what it leads to to lie on the same path [m]. `bound`: the
+/// prediction for the first correction, kMaxContraction times the one before for others.
+bool leaves_path(double correction, double bound, double predicted, double tolerance);
+
 /// A solution predicted from another one on the same path, with its axial forces in work.axial_force if it has them. A
 /// guess that is near enough is drawn in fast: where the first correction is longer than the prediction, or the
 /// corrections do not halve, the path is lost, or another one not far [Deuflhard 2011, section 5.1].

@@ -15,7 +15,7 @@ bool factorize(Equations& equations, NewtonWorkspace& work, bool hold_neutral) {
            FactorStatus::ok;
   };
   if (hold_neutral) {
-    work.trial = neutral_shift(equations, kRounded);
+    work.trial = neutral_shift(equations, kEpsilon);
     if (shifted()) return true;
   } else if (solver.factorize().status == FactorStatus::ok) {
     return true;

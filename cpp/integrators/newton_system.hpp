@@ -27,11 +27,13 @@ struct NewtonWorkspace {
   std::function<void()> poll = [] {};  ///< asked once an iteration; what it throws ends the solve
 };
 
-/// This share of the diagonal of a stiffness, per row: added to it, it keeps what is neutral (a free body, a rod that
-/// may spin about its axis) from going anywhere by rounding; kDoubtful: taken off it leaves what is surely not neutral.
-/// Needs the matrix of the last evaluation.
+/// Rounding error of a number, over it; and the bound of what the rounding errors of a sum over many of them may reach:
+/// larger numbers are surely not zero.
+inline constexpr double kEpsilon = std::numeric_limits<double>::epsilon(), kMaxRounding = 64.0 * kEpsilon;
+/// This share of the diagonal of a stiffness, per row. kEpsilon, added to it, keeps neutral motions (of a free body, of
+/// a rod that may spin about its axis) from going anywhere by rounding. kMaxRounding, taken off it, leaves motions
+/// positive that are surely not neutral. Needs the matrix of the last evaluation.
 VectorX neutral_shift(const Equations& equations, double share);
-inline constexpr double kRounded = std::numeric_limits<double>::epsilon(), kDoubtful = 64.0 * kRounded;
 
 /// Factorises the matrix as it is, `hold_neutral` with what keeps neutral modes from going anywhere by rounding; one
 /// that is singular is held by a shift far below every stiffness.

@@ -8,15 +8,14 @@
 namespace withe {
 namespace {
 
-/// Of a distance's slope, what may lie on free unknowns where none of them can relieve it: the curve of a rod passes a
-/// little beside its nodes.
-constexpr double kFree = 0.05;
-/// The same where a warning is all that follows: beside the middle of an edge, normals of the curve are a little
-/// aslant.
-constexpr double kNearlyFree = 0.2;
+/// Slope of a distance on free unknowns, over the whole slope, where no free unknown can relieve the contact: the curve
+/// of a rod passes a little beside its nodes.
+constexpr double kMaxFreeSlope = 0.05;
+/// The same where only a warning follows: beside the middle of an edge, normals of the curve are oblique by up to that.
+constexpr double kMaxFreeSlopeOfWarning = 0.2;
 
-/// Depth at which surfaces are drawn touching, to rounding, over the smaller radius.
-constexpr double kTouching = 1e-4;
+/// Depth over the smaller radius: surfaces that are drawn touching are less deep in each other, by rounding in files.
+constexpr double kMaxDrawnDepth = 1e-4;
 
 /// Depth of two surfaces in each other beyond `allowed`, a share of the smaller radius [m].
 double excess(const Touching& t, double allowed) {
@@ -66,8 +65,8 @@ Squeezed squeezed_contact(const Equations& equations, VectorX& slope, VectorX& o
     const Touching& t = contact->contacts()[i];
     if (t.lagged >= 0 || !(excess(t, kDeepest) > 0.0)) continue;
     const double all = free_slope(equations, i, slope);
-    if (slope.norm() <= kFree * all) return {i};
-    if (const int against = opposite_contact(equations, i, kDeepest, kFree, slope, other); against >= 0)
+    if (slope.norm() <= kMaxFreeSlope * all) return {i};
+    if (const int against = opposite_contact(equations, i, kDeepest, kMaxFreeSlope, slope, other); against >= 0)
       return {i, against};
   }
   return {};
@@ -82,10 +81,11 @@ Squeezed opposite_contacts(const Equations& equations, VectorX& slope, VectorX& 
   if (set.count() == 0 || std::none_of(set.begin(), set.end(), is_other)) return {};
   for (int i = 0; i < set.count(); ++i) {
     const Touching& t = set[i];
-    if (t.lagged >= 0 || obstacle(t) == 0 || contact->has_given_stiffness(t.pair) || !(excess(t, kTouching) > 0.0))
+    if (t.lagged >= 0 || obstacle(t) == 0 || contact->has_given_stiffness(t.pair) || !(excess(t, kMaxDrawnDepth) > 0.0))
       continue;
     if (free_slope(equations, i, slope); slope.norm() == 0.0) continue;
-    if (const int against = opposite_contact(equations, i, kTouching, kNearlyFree, slope, other); against >= 0)
+    if (const int against = opposite_contact(equations, i, kMaxDrawnDepth, kMaxFreeSlopeOfWarning, slope, other);
+        against >= 0)
       return {i, against};
   }
   return {};

@@ -20,39 +20,38 @@ bool turned_too_far(const State& state, const Configuration& c, bool planar) {
   return false;
 }
 
-// Corrections of points on the way may be this long, over the length of the scene: Newton's method leaves their square.
-constexpr double kOnTheWay = 1e-6;
-// Edges turn by no more than this between two points of a path, by the linear solution [rad].
-constexpr double kFarthestTurn = 1.0;
-// Stiffnesses that a whole load would turn edges so far by are rounding [rad].
-constexpr double kSingular = 1e9;
-// What has to be cut below this share of that leads to no point of the path: it has ended.
-constexpr double kShortest = 1.0 / 64.0;
-// Where no edge turns, the path ends after so many cuts.
-constexpr int kMostCuts = 6, kMostCutsOfFriction = 12;
-// Most iterations for a point of the path or an interval, beyond those of the border of slip. Where surfaces rub,
-// Newton's method may wander before it converges: rounding errors grow by some factor each iteration, and after 25 to
-// 40 of them decide where it ends.
-constexpr int kMostIterations = 20;
-// Corrections of a point that a ring may spoil: its rod sticks, slips, or slips the other way.
-constexpr int kKinks = 2;
-// A path has no more points than this: what a scene is torn along by a support that goes a thousand lengths away is
-// found by settling there.
-constexpr int kMostPoints = 1000;
-// Times that a path may end and be taken up again.
-constexpr int kMostJumps = 20;
-// Where a path has ended, the scene goes on from so many steps behind the last one that was tried.
-constexpr double kBeyond = 4.0;
-// A turn that is greater than this between two points of a path is a jump [rad].
-constexpr double kJump = 0.25 * kFarthestTurn;
-// What moves by less than this in an interval, over the length of the scene, is slow; by less than that, is taken to
-// its equilibrium; where that fails, again when it moves by less than this share of what it did.
-constexpr double kSlow = 1e-4, kNear = 1e-7, kCloser = 0.1;
-// Intervals in which a scene settles; and where loads without a potential drive it round, after how many they may be
-// twice as long.
-constexpr int kMostIntervals = 400, kTurns = 50;
-// Potentials on the two sides of a saddle that differ by less of what they fall by are alike.
-constexpr double kAlike = 1e-6;
+// Correction after which a point on the way needs no other, over the length of the scene: Newton's method leaves an
+// error of about its square, 1e-12.
+constexpr double kMaxWaypointCorrection = 1e-6;
+// Turn of edges between two points of a path, by the linear solution [rad]. Their frames are known up to a right angle.
+constexpr double kMaxPointTurn = 1.0;
+// Turn of edges that a whole load would cause by the linear solution, from which on the stiffness is rounding [rad].
+constexpr double kMinSingularTurn = 1e9;
+// Increment over the whole path, or over that which turns edges by kMaxPointTurn, whichever is shorter. The path has
+// ended where a point beyond a shorter increment is not found: after six tries.
+constexpr double kMinIncrement = 1.0 / 64.0;
+// Corrections of a point that one ring may spoil: its rod sticks, slips, or slips the other way.
+constexpr int kMaxKinksOfRing = 2;
+// Points of a path. A support that goes a thousand lengths away tears the scene along: settling there finds it.
+constexpr int kMaxPoints = 1000;
+// Jumps between branches on the way to one equilibrium.
+constexpr int kMaxJumps = 20;
+// Increments from the end of a path to where the scene goes on, of the length of the last one tried.
+constexpr double kJumpIncrements = 4.0;
+// Turn in a jump from which on the branch has changed [rad].
+constexpr double kMinJumpTurn = 0.25 * kMaxPointTurn;
+// Displacement in an interval over the length of the scene, below which the scene is slow, and below which Newton's
+// method without inertia takes it to its equilibrium.
+constexpr double kMaxSlowMove = 1e-4, kMaxNearMove = 1e-7;
+// Displacement over that of the last failure of Newton's method without inertia, from which on it is tried again.
+constexpr double kMaxRetryMove = 0.1;
+// Intervals in which a scene settles.
+constexpr int kMaxIntervals = 400;
+// Intervals after which they may be twice as long, where loads without a potential drive the scene round.
+constexpr int kIntervalsPerDoubling = 50;
+// Difference of the gains on the two sides of a saddle, over the gain, up to which the sides are alike but for
+// rounding.
+constexpr double kMaxGainDifference = 1e-6;
 
 class Statics {
  public:
@@ -115,12 +114,11 @@ class Statics {
     neutral_ = signs_.neutral(state_, work_.data);
     if (neutral_) path_.hold_neutral();
     NewtonResult& last = result.newton;
-    const int most_cuts = equations_.has_potential() ? kMostCuts : kMostCutsOfFriction;
     double reached = 0.0, longest = 1.0;
     bool was_stable = false;
     for (int cuts = 0, jumps = 0, points = 0; reached < 1.0;) {
       if (cuts == 0) {
-        if (++points > kMostPoints) return false;
+        if (++points > kMaxPoints) return false;
         path_.go_to(reached);
         path_.find_tangent(tangent_);
         ++last.iterations;
@@ -141,9 +139,9 @@ class Statics {
         was_stable = firm();
       }
       // Of a mechanism, which nothing holds, the tangent is rounding: its path ends where it begins.
-      const bool singular = tangent_.found && tangent_.turn > kSingular;
+      const bool singular = tangent_.found && tangent_.turn > kMinSingularTurn;
       tangent_.found = tangent_.found && !singular;
-      const double by_turn = tangent_.found ? kFarthestTurn / tangent_.turn : 1.0;
+      const double by_turn = tangent_.found ? kMaxPointTurn / tangent_.turn : 1.0;
       const double increment = std::min({1.0 - reached, longest, by_turn});
       const double next = increment == 1.0 - reached ? 1.0 : reached + increment;
       if (!singular && reach(next, next - reached, last)) {
@@ -154,19 +152,19 @@ class Statics {
       }
       longest = increment * (cuts == 0 ? 0.25 : 0.5);
       ++cuts;
-      if (!singular && cuts <= most_cuts && increment > kShortest * std::min(by_turn, 1.0)) continue;
-      if (++jumps > kMostJumps) return false;
+      if (!singular && increment > kMinIncrement * std::min(by_turn, 1.0)) continue;
+      if (++jumps > kMaxJumps) return false;
       const double beyond = beyond_jump(reached, increment);
       if (!jump(beyond, beyond - reached, result)) return false;
       reached = beyond;
-      longest = kBeyond * increment;
+      longest = kJumpIncrements * increment;
       cuts = 0;
     }
     last.converged = true;
     return true;
   }
 
-  int most_iterations() const { return std::min(kMostIterations, options_.max_iterations); }
+  int most_iterations() const { return std::min(kMaxPathIterations, options_.max_iterations); }
 
   /// Where Coulomb's friction holds a limp rod, the border of what slips goes on by a contact an iteration, and the
   /// solution follows when it has arrived: so many iterations are no sign that there is none.
@@ -185,10 +183,10 @@ class Statics {
     // Signs of pivots are known of symmetric matrices only.
     if (!equations_.has_potential_here() || (equations_.has_potential() && firm()) || !tangent_.found) return false;
     if (equations_.contact() && equations_.contact()->contacts().depth() > kDeepest) return false;
-    return newton_.norms().displacement(tangent_.rate) > kNear * equations_.model().length_scale && !stable(0.0);
+    return newton_.norms().displacement(tangent_.rate) > kMaxNearMove * equations_.model().length_scale && !stable(0.0);
   }
   bool let_fall(double& reached, StaticResult& result) {
-    const double beyond = beyond_jump(reached, kShortest);
+    const double beyond = beyond_jump(reached, kMinIncrement);
     if (!jump(beyond, 0.0, result)) return false;
     reached = beyond;
     return true;
@@ -196,7 +194,7 @@ class Statics {
 
   /// Forces may come all at once to a scene that goes on dynamically; supports may not.
   double beyond_jump(double reached, double increment) const {
-    return path_.supports_move() ? std::min(1.0, reached + kBeyond * increment) : 1.0;
+    return path_.supports_move() ? std::min(1.0, reached + kJumpIncrements * increment) : 1.0;
   }
 
   /// The point of the path at the factor `next`, predicted along the tangent.
@@ -206,12 +204,13 @@ class Statics {
     // what slides without friction would go off. Rings have kinks.
     const bool touching = equations_.contact() && equations_.contact()->count() > 0;
     const int rings = equations_.hands() ? equations_.hands()->rings().count() : 0;
-    Prediction prediction{.length = 0.0, .strict = !touching, .kinks = kKinks * rings};
+    Prediction prediction{.length = 0.0, .strict = !touching, .kinks = kMaxKinksOfRing * rings};
     bool predicted = tangent_.found;
     if (predicted) {
       step_ = increment * tangent_.rate;
       prediction.length = newton_.norms().displacement(step_);
-      if (next < 1.0 && !touching && rings == 0) prediction.enough = kOnTheWay * equations_.model().length_scale;
+      if (next < 1.0 && !touching && rings == 0)
+        prediction.enough = kMaxWaypointCorrection * equations_.model().length_scale;
       // Axial forces by the linear solution: those of the prediction are of edges that stretch as they turn.
       equations_.evaluate(state_.q, false, nullptr, work_.data);
       predict_axial_force(equations_.problem(), work_.data, step_, work_.axial_force);
@@ -265,7 +264,7 @@ class Statics {
     if (!settle(next, result)) return false;
     VectorX change = state_.q - before;
     for (int dof : equations_.model().frame_dof) change.segment(dof, equations_.model().frame_size()).setZero();
-    if (newton_.norms().turn(change) > kJump) result.branch_changed = true;
+    if (newton_.norms().turn(change) > kMinJumpTurn) result.branch_changed = true;
     return true;
   }
 
@@ -275,8 +274,8 @@ class Statics {
   /// is not drawn back to a saddle, nor across it. Mixed Newton keeps slender rods from crawling. Where next to nothing
   /// moves any more, Newton's method without inertia ends it, unless it leads away, as back to a saddle.
   /// Loads without a potential drive the scene round its equilibria, if not for ever: what is monotone where the
-  /// interval begins takes the place of what is convex, only until the scene is slow, and after every kTurns intervals
-  /// they may be twice as long as that, as longer ones damp more.
+  /// interval begins takes the place of what is convex, only until the scene is slow, and after every
+  /// kIntervalsPerDoubling intervals they may be twice as long as that, as longer ones damp more.
   bool settle(double factor, StaticResult& result) {
     const bool conservative = equations_.has_potential();
     evaluate(factor);
@@ -285,14 +284,14 @@ class Statics {
     energy_scale_ = std::max(energy_scale_, std::abs(potential));
     double h = 1e2 / std::sqrt(stiffness), moved = INFINITY;
     const double longest = 1e12 * h, shortest = 1e-6 * h, of_waves = 1e4 * h,
-                 slow = kSlow * equations_.model().length_scale;
-    double near = kNear * equations_.model().length_scale;
-    for (int k = 0; k < kMostIntervals && h > shortest; ++k) {
+                 slow = kMaxSlowMove * equations_.model().length_scale;
+    double near = kMaxNearMove * equations_.model().length_scale;
+    for (int k = 0; k < kMaxIntervals && h > shortest; ++k) {
       state_.v.setZero();
       // What is neutral keeps intervals from growing further.
       const bool still = neutral_ && h >= of_waves && moved < near;
       const bool at_rest = h >= longest || (still && (!conservative || stable(factor)));
-      const double beyond = conservative ? 1.0 : std::exp2(k / kTurns);
+      const double beyond = conservative ? 1.0 : std::exp2(k / kIntervalsPerDoubling);
       if (!at_rest && (conservative || moved >= slow)) h = beyond * definite_interval(factor, h / beyond, shortest);
       const int border = border_iterations();
       const NewtonResult r = solve_interval(at_rest ? 0.0 : h, border, result.newton);
@@ -309,7 +308,7 @@ class Statics {
         potential = found;
         h = std::min(longest, h * (r.iterations <= 4 + border ? 10.0 : r.iterations <= 8 + border ? 3.0 : 1.0));
       } else if (at_rest) {
-        near = kCloser * moved;
+        near = kMaxRetryMove * moved;
         h = std::min(h, 0.25 * longest);
       } else {
         h *= 0.25;
@@ -323,10 +322,12 @@ class Statics {
   NewtonResult solve_interval(double h, int border, NewtonResult& last) {
     equations_.begin(state_, parameters_, h > 0.0 ? StepRule::settling : StepRule::statics, h, path_.prescribed());
     z_ = state_.q;
-    NewtonResult r = newton_.solve(
-        equations_, z_,
-        {.target = &path_.target(), .max_iterations = kMostIterations, .free_steps = border, .hold_neutral = neutral_},
-        work_);
+    NewtonResult r = newton_.solve(equations_, z_,
+                                   {.target = &path_.target(),
+                                    .max_iterations = kMaxPathIterations,
+                                    .free_steps = border,
+                                    .hold_neutral = neutral_},
+                                   work_);
     note(r, last);
     r.converged = r.converged && !turned_too_far(state_, work_.data.configuration, equations_.model().planar());
     return r;
@@ -438,7 +439,8 @@ class Statics {
       return work_.data.potential - here;
     };
     const double gain_ahead = gain(ahead), gain_behind = gain(behind);
-    const bool falls_ahead = gain_ahead - gain_behind <= kAlike * std::abs(gain_ahead), first = tries % 2 == 0;
+    const bool falls_ahead = gain_ahead - gain_behind <= kMaxGainDifference * std::abs(gain_ahead),
+               first = tries % 2 == 0;
     path_.accept(falls_ahead == first ? ahead : behind);
   }
 

@@ -6,8 +6,9 @@
 namespace withe {
 namespace {
 
-// A step is cut where a node moves by more than this share of the scene, an angle or an edge turns by more [rad].
-constexpr double kFarthest = 0.5, kGreatestAngle = 1.5, kGreatestEdgeTurn = 1.0;
+// Displacement of a node in one iteration, over the length of the scene; change of an angle, and turn of an edge [rad].
+// Longer steps are shortened: beyond a right angle the linear solution has no meaning.
+constexpr double kMaxMove = 0.5, kMaxAngle = 1.5, kMaxEdgeTurn = 1.0;
 
 /// Greatest square of vectors of so many unknowns.
 template <int Size>
@@ -54,11 +55,11 @@ double StepNorms::greatest_edge_turn(const VectorX& step) const {
 double StepNorms::cap(const VectorX& step) const {
   const double move = farthest_node(step), turn = greatest_angle(step);
   double factor = 1.0;
-  if (move > kFarthest * model_.length_scale) factor = kFarthest * model_.length_scale / move;
-  if (turn * factor > kGreatestAngle) factor = kGreatestAngle / turn;
+  if (move > kMaxMove * model_.length_scale) factor = kMaxMove * model_.length_scale / move;
+  if (turn * factor > kMaxAngle) factor = kMaxAngle / turn;
   if (leaves_edges_alone(move)) return factor;
   const double edge_turn = greatest_edge_turn(step);
-  if (edge_turn * factor > kGreatestEdgeTurn) factor = kGreatestEdgeTurn / edge_turn;
+  if (edge_turn * factor > kMaxEdgeTurn) factor = kMaxEdgeTurn / edge_turn;
   return factor;
 }
 
@@ -71,10 +72,10 @@ double StepNorms::displacement(const VectorX& step) const {
 }
 
 bool StepNorms::leaves_alone(double most) const {
-  return leaves_edges_alone(most) && most <= std::min(kFarthest * model_.length_scale, kGreatestAngle);
+  return leaves_edges_alone(most) && most <= std::min(kMaxMove * model_.length_scale, kMaxAngle);
 }
 
 /// Both ends of an edge may move by it, in opposite directions.
-bool StepNorms::leaves_edges_alone(double most) const { return most <= 0.5 * kGreatestEdgeTurn * shortest_edge_; }
+bool StepNorms::leaves_edges_alone(double most) const { return most <= 0.5 * kMaxEdgeTurn * shortest_edge_; }
 
 }  // namespace withe

@@ -43,21 +43,21 @@ bool StiffnessSigns::stable(const State& state, StepData& data) {
     ++counters_.factorizations;
     return solver.factorize().status == FactorStatus::ok;
   }
-  if (definite(symmetric_part(), -1.0, neutral_shift(equations_, kDoubtful))) return true;
+  if (definite(symmetric_part(), -1.0, neutral_shift(equations_, kMaxRounding))) return true;
   const Lowest found = lowest(lowest_mode(0), state, data);
   return found.curvature > -found.unknown;
 }
 
 bool StiffnessSigns::neutral(const State& state, StepData& data) {
   if (equations_.assembler().solver().symmetry() == Symmetry::symmetric) return neutral_motion(state, data).size() != 0;
-  return !definite(symmetric_part(), -1.0, neutral_shift(equations_, kDoubtful));
+  return !definite(symmetric_part(), -1.0, neutral_shift(equations_, kMaxRounding));
 }
 
 VectorX StiffnessSigns::neutral_motion(const State& state, StepData& data, double slack) {
-  if (definite(symmetric_part(), -1.0, neutral_shift(equations_, kDoubtful))) return {};
+  if (definite(symmetric_part(), -1.0, neutral_shift(equations_, kMaxRounding))) return {};
   VectorX mode = lowest_mode(0);
   // A hundredth of what rounding leaves of the matrix: what is softer than that is none of its motions.
-  const double least = 0.01 * neutral_shift(equations_, kRounded).dot(mode.cwiseAbs2());
+  const double least = 0.01 * neutral_shift(equations_, kEpsilon).dot(mode.cwiseAbs2());
   const Lowest found = lowest(mode, state, data);
   if (std::abs(found.curvature) > slack * found.unknown + least) mode.resize(0);
   return mode;

@@ -3,10 +3,11 @@
 namespace withe {
 namespace {
 
-// Halvings of a step before it is taken as it is.
-constexpr int kMostHalvings = 10;
-// That much of a step uphill is too little.
-constexpr double kLittle = 0.125;
+// Halvings of a step before it is taken as it is: a thousandth of the step is left.
+constexpr int kMaxHalvings = 10;
+// Share of a step uphill that must be kept; else it is made anew without contact's geometric stiffness. Three halvings
+// cost about as much as a new matrix.
+constexpr double kMinUphillShare = 0.125;
 
 }  // namespace
 
@@ -21,7 +22,7 @@ double SurfaceSearch::shortened(const VectorX& z, VectorX& step) const {
 bool SurfaceSearch::run(const VectorX& z, double& shorten) {
   NewtonWorkspace& work = system_.work;
   const bool uphill = heuristics_.uses(Heuristic::drop_geometric) && work.step.dot(work.data.residual) > 0.0;
-  double kept = search(z, uphill ? kLittle : 0.0, shorten);
+  double kept = search(z, uphill ? kMinUphillShare : 0.0, shorten);
   if (uphill && !evaluated_) {
     work.contact.geometric = false;
     system_.evaluate(z, true);
@@ -45,7 +46,7 @@ double SurfaceSearch::search(const VectorX& z, double least, double shorten) {
   const double full = norms_.displacement(work.step) / shorten, before = work.step.dot(e.residual);
   forget();
   double kept = 1.0;
-  for (int tries = 0; tries < kMostHalvings && kept > least; ++tries) {
+  for (int tries = 0; tries < kMaxHalvings && kept > least; ++tries) {
     work.trial = z + kept * work.step;
     system_.evaluate(work.trial, false);
     evaluated_ = e.residual.allFinite();
