@@ -4,12 +4,7 @@
 #include <cmath>
 
 namespace withe {
-namespace {
-
-// Pairs farther apart than this beyond their reach, over it, are of no interest.
-constexpr double kFar = 0.6;
-
-}  // namespace
+namespace {}  // namespace
 
 double Bodies::place(std::span<const ObstaclePlace> places) {
   double square = 0.0;
@@ -93,9 +88,9 @@ Proximity Bodies::proximity(const ContactPair& pair, const VectorX& q, bool whol
   end_points(pair, q, x);
   // Far apart by their middles: no need for more.
   const Vec3d middle = 0.5 * (x[0] + x[1] - x[2] - x[3]), u = x[1] - x[0], v = x[3] - x[2];
-  const double size = 0.5 * (std::sqrt(dot(u, u)) + std::sqrt(dot(v, v))) + (1.0 + kFar) * pair.reach();
+  const double size = 0.5 * (std::sqrt(dot(u, u)) + std::sqrt(dot(v, v))) + (1.0 + kMaxPatternDistance) * pair.reach();
   if (!whole && dot(middle, middle) > size * size) {
-    p.distance = std::sqrt(dot(middle, middle)) - size + (1.0 + kFar) * pair.reach();  // or more
+    p.distance = std::sqrt(dot(middle, middle)) - size + (1.0 + kMaxPatternDistance) * pair.reach();  // or more
     return p;
   }
   p.points = closest_points(x[0], x[1], x[2], x[3], pair.weight_a, pair.weight_b);

@@ -7,8 +7,8 @@
 namespace withe {
 namespace {
 
-constexpr int kMostCells = 64;        // a box that covers more is compared with every other one
-constexpr long long kSide = 1 << 20;  // cells along an axis, at most
+constexpr int kMaxCells = 64;                   // a box that covers more is compared with every other one
+constexpr long long kMaxCellsOfAxis = 1 << 20;  // cells along an axis, at most
 
 }  // namespace
 
@@ -38,7 +38,8 @@ BroadPhase::Grid BroadPhase::Grid::of(const std::vector<Box>& boxes) {
     size += longest;
   }
   const double extent = std::max({end[0] - grid.origin[0], end[1] - grid.origin[1], end[2] - grid.origin[2]});
-  grid.width = std::max({size / static_cast<double>(boxes.size()), extent / static_cast<double>(kSide - 2), 1e-300});
+  grid.width =
+      std::max({size / static_cast<double>(boxes.size()), extent / static_cast<double>(kMaxCellsOfAxis - 2), 1e-300});
   return grid;
 }
 
@@ -51,14 +52,14 @@ void BroadPhase::sort_into_cells(const std::vector<Box>& boxes, const Grid& grid
       last[k] = grid.cell(boxes[i].high[k], k);
       count *= last[k] - first[k] + 1;
     }
-    if (count > kMostCells) {
+    if (count > kMaxCells) {
       large_.push_back(static_cast<int>(i));
       continue;
     }
     for (long long x = first[0]; x <= last[0]; ++x)
       for (long long y = first[1]; y <= last[1]; ++y)
         for (long long z = first[2]; z <= last[2]; ++z)
-          entries_.push_back({(x * kSide + y) * kSide + z, static_cast<int>(i)});
+          entries_.push_back({(x * kMaxCellsOfAxis + y) * kMaxCellsOfAxis + z, static_cast<int>(i)});
   }
   std::sort(entries_.begin(), entries_.end(),
             [](const Entry& a, const Entry& b) { return a.cell != b.cell ? a.cell < b.cell : a.box < b.box; });
@@ -75,7 +76,7 @@ void BroadPhase::pair_within_cells(const std::vector<Box>& boxes, const Grid& gr
                   &b = boxes[static_cast<std::size_t>(entries_[j].box)];
         if (!a.overlaps(b)) continue;
         long long first = 0;
-        for (int k = 0; k < 3; ++k) first = first * kSide + grid.cell(std::max(a.low[k], b.low[k]), k);
+        for (int k = 0; k < 3; ++k) first = first * kMaxCellsOfAxis + grid.cell(std::max(a.low[k], b.low[k]), k);
         if (first == entries_[begin].cell) pairs_.push_back({entries_[i].box, entries_[j].box});
       }
     begin = stop;

@@ -6,12 +6,11 @@
 namespace withe {
 namespace {
 
-// Pairs nearer than this beyond their reach, over the sum of their radii, are part of the matrix's pattern.
-constexpr double kNear = 0.5;
-// Surfaces that go through each other by more than this between two states, over the smaller radius, should have met.
-constexpr double kGrazed = 0.1;
-// What rounding leaves of a distance to go.
-constexpr double kSafe = 1.0 - 1e-9;
+// Depth by which surfaces may pass through each other between two states, over the smaller radius: deeper ones should
+// have met.
+constexpr double kMaxGrazingDepth = 0.1;
+// Lower bound of a distance to go, over its rounded value: sums of coordinates lose a few of their sixteen digits.
+constexpr double kRoundedDown = 1.0 - 1e-9;
 
 /// How far a coordinate is outside of two bounds; NaN where it is one.
 double outside(double x, double low, double high) { return x < low ? low - x : x - std::min(x, high); }
@@ -28,7 +27,7 @@ double way_between(const std::vector<Obstacle>& from, const std::vector<Obstacle
 struct Limit {
   double share, nearest;  ///< [-], [m]
 };
-Limit apart(const ContactPair& pair) { return {kNearest, pair.nearest()}; }
+Limit apart(const ContactPair& pair) { return {kMinDistance, pair.nearest()}; }
 
 /// How much of a way may be made, by conservative advancement: the distance, a function of that much, falls no faster
 /// than by `speed`.
@@ -138,7 +137,7 @@ void Candidates::reach(const VectorX& q, const Bodies& bodies) {
 /// A distance changes by no more than both edges move.
 void Candidates::set_bounds(double distance, std::size_t p) {
   const ContactPair& pair = pairs_[p];
-  const auto above = [&](double least) { return moved_ + kSafe * 0.5 * (distance - least); };
+  const auto above = [&](double least) { return moved_ + kRoundedDown * 0.5 * (distance - least); };
   // The weights of closest_points make it greater than that of the points themselves.
   const double weights = 0.25 * (pair.weight_a + pair.weight_b);
   bounds_[p] = {above(pair.reach()), above(std::sqrt(pair.nearest() * pair.nearest() + weights))};
@@ -214,10 +213,10 @@ void Candidates::add_near(const std::vector<BroadPhase::Pair>& found, std::vecto
 
 std::vector<ContactKey> Candidates::near(const VectorX& q, const Bodies& bodies) const {
   CandidateSearch search;
-  find_near(q, kNear, search);
+  find_near(q, kMaxPatternDistance, search);
   std::vector<ContactKey> keys;
   for (const ContactPair& pair : search.pairs)
-    if (pair.key.b < 0 || bodies.proximity(pair, q).distance < pair.reach() + kNear * pair.radii())
+    if (pair.key.b < 0 || bodies.proximity(pair, q).distance < pair.reach() + kMaxPatternDistance * pair.radii())
       keys.push_back(pair.key);
   std::sort(keys.begin(), keys.end());
   return keys;
@@ -260,7 +259,8 @@ bool Candidates::missed(const VectorX& before, const VectorX& q, const Bodies& b
     const double touching = pair.radii();
     if (distance_of(bodies, pair, q, Vec3d{}) < touching || distance_of(bodies, pair, before, moved) < touching)
       continue;
-    if (allowed_of(bodies, pair, q, &back_, -moved, {1.0, touching - kGrazed * pair.small_radius()}) < 1.0) return true;
+    if (allowed_of(bodies, pair, q, &back_, -moved, {1.0, touching - kMaxGrazingDepth * pair.small_radius()}) < 1.0)
+      return true;
   }
   return false;
 }

@@ -135,7 +135,7 @@ class Contact {
   /// Keeps in `state`, still where the step began, what contacts at q1 must remember: see `ContactStiffness::accept`.
   double accept(State& state, double spare);
   /// The same in an equilibrium, or on the way to one.
-  void accept_at_rest(State& state, bool arrived, double deepest = kDeepest);
+  void accept_at_rest(State& state, bool arrived, double deepest = kMaxDepth);
   /// The greatest of the stiffnesses that forces want of contacts, over what they have; no less than 1.
   double wanted_ratio() const { return ContactStiffness(problem_).wanted_ratio(set_); }
   /// True if what was accepted last there presses as it did, but for rounding.
@@ -172,7 +172,7 @@ class Contact {
   bool current_ = false;  ///< set_ is what touches in this step
   std::span<const ObstaclePlace> target_;
   bool blocked_ = false;
-  double deepest_ = kDeepest;
+  double deepest_ = kMaxDepth;
 };
 
 }  // namespace withe

@@ -10,10 +10,11 @@
 namespace withe {
 namespace {
 
-// The elastic give of an anchor at its limit, over the distance tolerance.
-constexpr double kGive = 0.05;
-// On a way this short, over the slip that friction grows with, a tangent says enough.
-constexpr double kShortWay = 0.1;
+// Elastic slip of an anchor at Coulomb's limit, over the distance tolerance.
+constexpr double kAnchorSlip = 0.05;
+// Displacement in an iteration, over the slip with which friction grows, up to which the tangent of the friction law
+// needs no prediction.
+constexpr double kMaxTangentSlip = 0.1;
 
 double coefficient(const ContactPair& pair, FrictionKind kind) {
   return kind == FrictionKind::rolling ? pair.rolling : pair.friction;
@@ -58,7 +59,7 @@ bool regularises_friction(const Model& model) {
 
 double anchor_stiffness(const ContactPair& pair, FrictionKind kind, double stiffness) {
   const double pressing = stiffness * 2.0 * kDepth * pair.small_radius();
-  return coefficient(pair, kind) * pressing / (kGive * pair.tolerance);
+  return coefficient(pair, kind) * pressing / (kAnchorSlip * pair.tolerance);
 }
 
 FrictionSetting friction_setting(const ContactProblem& problem, const Touching& t, FrictionKind kind,
@@ -230,7 +231,7 @@ Slipping slipping(const ContactProblem& problem, const Touching& t, FrictionKind
 }
 
 bool slips_shortly(const ContactProblem& problem, const ContactLinearisation& linearisation, const VectorX& change) {
-  return farthest(problem.model(), change) * slip_rate(problem, linearisation.regularisation) < kShortWay;
+  return farthest(problem.model(), change) * slip_rate(problem, linearisation.regularisation) < kMaxTangentSlip;
 }
 
 }  // namespace withe

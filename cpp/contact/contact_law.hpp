@@ -19,6 +19,9 @@
 
 namespace withe {
 
+/// K delta, at which softplus(-delta) is e^-15 / K: the laws end there [Choi, dissertation, (5.2)].
+inline constexpr double kSteepness = 15.0;
+
 /// E and its first two derivatives by D.
 struct ContactEnergy {
   double value = 0, first = 0, second = 0;
@@ -28,7 +31,7 @@ inline ContactEnergy imcv2_energy(double distance, double radii, double toleranc
   const double x = radii - distance;
   if (x <= -tolerance) return {};
   if (x >= tolerance) return {x * x, -2.0 * x, 2.0};
-  const double steepness = 15.0 / tolerance;
+  const double steepness = kSteepness / tolerance;
   // log(1 + e^y) without overflow or loss.
   const double y = steepness * x, decay = std::exp(-std::abs(y));
   const double softplus = (std::max(y, 0.0) + std::log1p(decay)) / steepness;
@@ -48,9 +51,8 @@ inline ContactEnergy barrier_energy(double distance, double radii, double tolera
 inline ContactEnergy imcv1_energy(double distance, double radii, double tolerance) {
   const double x = radii - distance;
   if (x <= -tolerance) return {};
-  constexpr double kEnd = 15.0;
-  const double size = 0.5 * radii, steepness = kEnd / tolerance;
-  const double y = steepness * x, decay = std::exp(-std::abs(y)), end = std::exp(-kEnd);
+  const double size = 0.5 * radii, steepness = kSteepness / tolerance;
+  const double y = steepness * x, decay = std::exp(-std::abs(y)), end = std::exp(-kSteepness);
   const double softplus = std::max(y, 0.0) + std::log1p(decay);
   const double logistic = y >= 0.0 ? 1.0 / (1.0 + decay) : decay / (1.0 + decay);
   const double least = end / (1.0 + end);  // the logistic at the end

@@ -60,7 +60,7 @@ double ContactProblem::offset(const ContactPair& pair) const {
   const BodyOffset bodies{pair.rod_a, pair.key.b < 0 ? pair.key.b : pair.rod_b};
   const auto found = std::lower_bound(offsets.begin(), offsets.end(), bodies, by_bodies);
   if (found == offsets.end() || by_bodies(bodies, *found)) return 0.0;
-  return std::min(found->moment / found->force, kMostYield * pair.small_radius());
+  return std::min(found->moment / found->force, 2.0 * kDepth * pair.small_radius());
 }
 
 double ContactProblem::at_own_depth(double firm, double stiffness, double power) const {

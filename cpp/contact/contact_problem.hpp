@@ -9,15 +9,6 @@
 
 namespace withe {
 
-/// Surfaces that carry the greatest force of their rod are this deep in each other, over the smaller radius.
-inline constexpr double kDepth = 0.01;
-/// No deeper than this where a step, an equilibrium or a drawing is accepted.
-inline constexpr double kDeepest = 0.04;
-
-/// Greatest depth that presses no more with which contacts begin beside others of their bodies, over the smaller
-/// radius.
-inline constexpr double kMostYield = 0.02;
-
 /// Law of the pressing force in a step (see pressing_law.hpp): in statics and explicit steps, where nothing is known of
 /// impacts; by the force at its end; by that of the whole step, where they have just met; and along the mean direction
 /// too, so that sliding gains nothing.

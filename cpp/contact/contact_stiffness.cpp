@@ -14,15 +14,18 @@ namespace {
 
 bool by_key(const ContactRecord& a, const ContactRecord& b) { return a.key < b.key; }
 
-// A stiffness follows forces that outgrow it at once, and is then so many times what they want; and it follows those
-// for which it is so many times too great.
-constexpr double kAhead = 1.25, kSlack = 32.0;
-// Of the depth that has yielded, over the smaller radius, what is beyond that which lasts presses again little by
-// little: this share of it in a step, where surfaces part no faster than this share of the speed at which they rest.
-constexpr double kLastingYield = 0.01, kFading = 0.1, kRising = 0.1;
-// What surfaces that a scene draws near each other may press with, beside what their edges weigh, over the force that
-// their contact is stiff for.
-constexpr double kDrawnForce = 1e-6;
+// Stiffness over the one that a force requires, which a contact gets when the force outgrows it: the next increases of
+// up to a quarter change nothing.
+constexpr double kStiffnessMargin = 1.25;
+// Force that a stiffness bears, over the present one, from which on the stiffness decreases.
+constexpr double kMaxForceMargin = 32.0;
+// Share of the yielded depth beyond kDepth that presses again after a step, where surfaces rest.
+constexpr double kFadingPerStep = 0.1;
+// Speed of resting surfaces that part, over `rest_speed`.
+constexpr double kMaxFadingSpeed = 0.1;
+// Force of surfaces that a scene draws near each other, beside what their edges weigh, over the force that their
+// contact is stiff for.
+constexpr double kMaxDrawnForce = 1e-6;
 
 /// A contact that is yet to come starts as stiff as its rods' greatest force has wanted, so that those which take over
 /// from each other while surfaces slide have no need to change; that fades where it is much more than is wanted now.
@@ -31,8 +34,8 @@ void follow_forces(const ContactProblem& problem, const VectorX& greatest, Vecto
   for (Eigen::Index rod = 0; rod < greatest.size(); ++rod) {
     double& own = stiffness(rod);
     if (greatest(rod) > own)
-      own = kAhead * greatest(rod);
-    else if (own > problem.stiffness_to_bear_more(firm(rod), greatest(rod), kSlack))
+      own = kStiffnessMargin * greatest(rod);
+    else if (own > problem.stiffness_to_bear_more(firm(rod), greatest(rod), kMaxForceMargin))
       own *= 0.8;
   }
 }
@@ -47,11 +50,11 @@ double worn(const ContactProblem& problem, const Touching& t) {
 /// And fades where it is deep and surfaces rest, which takes work: until they part, and so that they press about half
 /// as hard again after a step at most. Otherwise what friction takes would throw them off.
 double faded(const ContactProblem& problem, const Touching& t) {
-  const double beyond = t.yielded - kLastingYield * t.pair.small_radius(), left = worn(problem, t);
+  const double beyond = t.yielded - kDepth * t.pair.small_radius(), left = worn(problem, t);
   if (!(beyond > 0.0 && t.energy.second > 0.0)) return left;
   const double parted = t.proximity.distance - start_distance(problem, t.pair);
-  if (parted > kRising * rest_speed(problem, t.pair) * problem.duration) return left;
-  return std::min(left, t.yielded - std::min(kFading * beyond, -0.5 * t.energy.first / t.energy.second));
+  if (parted > kMaxFadingSpeed * rest_speed(problem, t.pair) * problem.duration) return left;
+  return std::min(left, t.yielded - std::min(kFadingPerStep * beyond, -0.5 * t.energy.first / t.energy.second));
 }
 
 /// Of the weight of an edge what a contact holds up, where edges touch several others. Contacts of the same bodies,
@@ -196,14 +199,14 @@ double ContactStiffness::change_stiffness(const Touching& t, double ratio, doubl
 double ContactStiffness::wanted_ratio(const Touching& t, const ContactRecord& record) const {
   if (problem_.fixed(t.pair)) return 1.0;
   const double wanted = wanted_stiffness(problem_, t);
-  if (wanted > record.stiffness) return kAhead * wanted / record.stiffness;
+  if (wanted > record.stiffness) return kStiffnessMargin * wanted / record.stiffness;
   if (record.approach > 0.0) return 1.0;  // as stiff as the impact that has only begun will want it
   // A contact that is about to open wants next to nothing, and more when it presses again.
   const double common = std::max(wanted, start_stiffness(problem_, t.pair, problem_.start->contact_stiffness));
   const auto bears = [&](double times) {
     return problem_.stiffness_to_bear_more(problem_.firm_stiffness(t.pair), common, times);
   };
-  return bears(kSlack) < record.stiffness ? bears(2.0) / record.stiffness : 1.0;
+  return bears(kMaxForceMargin) < record.stiffness ? bears(2.0) / record.stiffness : 1.0;
 }
 
 /// The greatest force that contact has to hold at a node, times 1e5 / m [Choi, dissertation, (5.16), (5.17)]: what all
@@ -310,14 +313,14 @@ void ContactStiffness::accept_at_rest(const ContactSet& set, bool arrived, doubl
     for (int rod : {t.pair.rod_a, t.pair.rod_b}) {
       if (rod < 0) continue;
       greatest(rod) = std::max(greatest(rod), wanted);
-      if (more) stiffness(rod) = std::max(stiffness(rod), kAhead * wanted);
+      if (more) stiffness(rod) = std::max(stiffness(rod), kStiffnessMargin * wanted);
     }
   }
   // What a rod has met on the way is no reason to be stiff for.
   for (Eigen::Index rod = 0; arrived && source == 0.0 && rod < greatest.size(); ++rod)
     if (stiffness(rod) >
-        problem_.stiffness_to_bear_more(problem_.parameters->firm_stiffness(rod), greatest(rod), kSlack))
-      stiffness(rod) = kAhead * greatest(rod);
+        problem_.stiffness_to_bear_more(problem_.parameters->firm_stiffness(rod), greatest(rod), kMaxForceMargin))
+      stiffness(rod) = kStiffnessMargin * greatest(rod);
   scratch.records.clear();
   scratch.pressing = scratch.change = 0.0;
   for (const Touching& t : set) {
@@ -414,7 +417,7 @@ void ContactStiffness::renew(ContactSet& start, std::vector<ContactRecord>& reco
 /// stiff for: what is beyond that presses no more. Where the stiffness is given, its law holds as it stands.
 bool ContactStiffness::begins_at_rest(const Touching& t, ContactRecord& record) const {
   if (problem_.fixed(t.pair)) return false;
-  const double most = record.force + kDrawnForce * 2.0 * kDepth * t.pair.small_radius() * t.stiffness;
+  const double most = record.force + kMaxDrawnForce * 2.0 * kDepth * t.pair.small_radius() * t.stiffness;
   if (!(-t.energy.first > most)) return false;
   record.yielded = distance_at(problem_, t, 1.0, true, most / t.stiffness) - t.proximity.distance;
   return true;

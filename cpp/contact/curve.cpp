@@ -43,11 +43,10 @@ void add_curve_hessian(const CurvePiece& piece, const Obstacle& o, const CurveDi
   if (o.kind == ObstacleKind::plane) return;
   double w[3];
   sample_weights(*piece.weights, d, w);
-  constexpr Vec3d kAxis[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   for (int p = 0; p < 3; ++p) {
     const double place = piece.weights->sample(p);
     for (int k = 0; k < 3; ++k) {
-      const Vec3d turned = (factor * w[p]) * normal_change(o, d.sample[p], kAxis[k]);
+      const Vec3d turned = (factor * w[p]) * normal_change(o, d.sample[p], kUnitVectors[k]);
       for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j) {
           const double share = piece.weights->at(i, place) * piece.weights->at(j, place);

@@ -8,8 +8,6 @@ namespace {
 // Unknowns that move a contact: three nodes, and both angles.
 constexpr int kAngle = 9, kWays = 11;
 
-constexpr Vec3d kAxis[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-
 int unknown_of(int way) { return way < kAngle ? way : way + 3; }
 
 /// Derivatives by them.
@@ -56,7 +54,7 @@ void add_contact_slopes(const FrictionSetting& f, const SlippingSurfaces<double>
   curve.each_way(false, [&](int j) {
     d.s[j] = slopes.s[j];
     d.pressing[j] = -c.law.by_end * slopes.distance[j];
-    d.normal[j] = normal_change(*f.obstacle, point, curve.weight[j / 3] * kAxis[j % 3] + d.s[j] * tangent);
+    d.normal[j] = normal_change(*f.obstacle, point, curve.weight[j / 3] * kUnitVectors[j % 3] + d.s[j] * tangent);
   });
 }
 
@@ -67,8 +65,8 @@ void add_turn_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c
     const Vec3d start = side.edge - side.change, bend = side.turn - angle * side.tangent;
     for (int k = 0; k < 3; ++k) {
       const double along = side.tangent[k];
-      const Vec3d turned = (rho * inverse) * (inverse * cross(start, kAxis[k]) - (2.0 * along) * bend +
-                                              angle * (kAxis[k] - along * side.tangent));
+      const Vec3d turned = (rho * inverse) * (inverse * cross(start, kUnitVectors[k]) - (2.0 * along) * bend +
+                                              angle * (kUnitVectors[k] - along * side.tangent));
       d.turn[3 * side.tail + 3 + k] += turned;
       d.turn[3 * side.tail + k] -= turned;
     }
@@ -91,7 +89,7 @@ Vec3d obstacle_arm_slope(const FrictionSetting& f, const Curve& curve, const Vec
   if (f.rolling) return -f.pair->radius_a * d.normal[j];
   const PointDistance<double> point = distance_to(*f.obstacle, curve_point(curve.w, x, curve.s));
   Vec3d moved = d.s[j] * curve_direction(curve.w, x, curve.s);
-  if (j < kAngle) moved += curve.weight[j / 3] * kAxis[j % 3];
+  if (j < kAngle) moved += curve.weight[j / 3] * kUnitVectors[j % 3];
   return moved - dot(point.normal, moved) * point.normal - (point.distance - f.pair->radius_b) * d.normal[j];
 }
 
@@ -111,7 +109,7 @@ void add_force_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& 
     const Vec3d& across = d.normal[j];
     Vec3d moved = cross(n, d.turn[j]) - cross(turn, across);
     if (!f.rolling) moved += d.s[j] * moved_on;
-    if (!f.rolling && j < kAngle) moved += curve.weight[j / 3] * kAxis[j % 3];
+    if (!f.rolling && j < kAngle) moved += curve.weight[j / 3] * kUnitVectors[j % 3];
     if (turns) moved -= cross(f.turn, obstacle_arm_slope(f, curve, x, d, j));
     d.force[j] = g.factor * (moved - off * across) - (g.factor * (dot(n, moved) + dot(slip, across))) * n +
                  (2.0 * g.by_square * dot(slip, moved - off * across)) * dual + (g.by_pressing * d.pressing[j]) * slip;
@@ -131,7 +129,7 @@ void direct_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, 
   for (int i = 0; i < curve.w.nodes; ++i) bend += curve.w.bend[i] * x[i];
   curve.each_way(true, [&](int j) {
     Vec3d change = d.s[j] * bend;
-    if (j < kAngle) change += (edge ? of_edge : curve.weight_slope)[j / 3] * kAxis[j % 3];
+    if (j < kAngle) change += (edge ? of_edge : curve.weight_slope)[j / 3] * kUnitVectors[j % 3];
     const Vec3d turned = inverse * (change - dot(t, change) * t), &leant = d.normal[j];
     const Vec3d along = turned - (dot(turned, n) + dot(t, leant)) * n - dot(t, n) * leant;
     d.force[j] = across * d.force[j] + (more * (dot(along, c.plain) + dot(c.along, d.force[j]))) * c.along +
@@ -158,11 +156,11 @@ void add_couples(const FrictionSetting& f, const SlippingSurfaces<double>& c, co
   const double facing = f.spatial ? dot(source, t) : 0.0, share = inverse / (1.0 + facing);
   const Vec3d bend = inverse * cross(m, t), mean = (2.0 + facing) * t + source;
   for (int k = 0; k < 3; ++k) {
-    Vec3d own = (rho * inverse) * (inverse * cross(m, kAxis[k]) - (2.0 * t[k]) * bend);
+    Vec3d own = (rho * inverse) * (inverse * cross(m, kUnitVectors[k]) - (2.0 * t[k]) * bend);
     const double lean = inverse * (m[k] - along * t[k]);
     if (f.spatial)
       own += (rho * (lean - along * share * mean[k])) * side.spin -
-             (rho * along * share * inverse) * cross(source, kAxis[k]);
+             (rho * along * share * inverse) * cross(source, kUnitVectors[k]);
     const int head = 3 * side.tail + 3 + k, tail = 3 * side.tail + k;
     couple[head] += own;
     couple[tail] -= own;

@@ -10,8 +10,6 @@ namespace {
 // Ways in which a contact moves: dp, du, dv (3 each), both angles.
 constexpr int kEdge[2] = {3, 6}, kAngle[2] = {9, 10}, kWays = 11;
 
-constexpr Vec3d kAxis[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-
 /// Derivatives by them.
 struct Slopes {
   double s[kWays] = {}, t[kWays] = {}, pressing[kWays] = {};
@@ -34,7 +32,7 @@ void add_contact_slopes(const FrictionSetting& f, const SlippingSurfaces<double>
     d.pressing[k] = -c.law.by_end / c.distance * across;
     d.s[k] = a[k];
     d.t[k] = b[k];
-    d.between[k] = kAxis[k] + d.s[k] * u - d.t[k] * v;
+    d.between[k] = kUnitVectors[k] + d.s[k] * u - d.t[k] * v;
     d.s[kEdge[0] + k] = -K[0][0] * across;
     d.t[kEdge[0] + k] = -K[1][0] * across;
     d.between[kEdge[0] + k] = across * a;
@@ -55,7 +53,7 @@ void add_turn_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c
     d.lever[j] = f.pair->rod_b < 0 ? c.inverse * (moved - dot(c.normal, moved) * c.normal) : moved;
     if (!f.middle) continue;
     const Vec3d way = d.s[j] * c.sides[0].change - d.t[j] * c.sides[1].change;
-    d.lever[j] -= 0.5 * (j < 3 ? kAxis[j] + way : way);
+    d.lever[j] -= 0.5 * (j < 3 ? kUnitVectors[j] + way : way);
   }
   const double share = edge_share(f);
   for (int b = 0; b < c.bodies; ++b) {
@@ -64,8 +62,8 @@ void add_turn_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c
     const Vec3d start = side.edge - side.change, bend = side.turn - angle * side.tangent;
     for (int k = 0; k < 3; ++k) {
       const double along = side.tangent[k];
-      d.turn[kEdge[b] + k] = (rho * inverse) * (inverse * cross(start, kAxis[k]) - (2.0 * share * along) * bend +
-                                                (share * angle) * (kAxis[k] - along * side.tangent));
+      d.turn[kEdge[b] + k] = (rho * inverse) * (inverse * cross(start, kUnitVectors[k]) - (2.0 * share * along) * bend +
+                                                (share * angle) * (kUnitVectors[k] - along * side.tangent));
     }
     if (!f.spatial) continue;
     const WorkingTurnSlopes spun = f.finite_turns ? working_turn_slopes(side) : WorkingTurnSlopes{};
@@ -95,7 +93,7 @@ void direct_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, 
   const Vec3d t = inverse * e;
   for (int j = 0; j < kWays; ++j) {
     const int k = j - kEdge[0];
-    const Vec3d turned = k >= 0 && k < 3 ? inverse * (kAxis[k] - t[k] * t) : Vec3d{};
+    const Vec3d turned = k >= 0 && k < 3 ? inverse * (kUnitVectors[k] - t[k] * t) : Vec3d{};
     const Vec3d& leant = d.lever[j];
     const Vec3d along = turned - (dot(turned, n) + dot(t, leant)) * n - dot(t, n) * leant;
     d.force[j] = across * d.force[j] + (more * (dot(along, c.plain) + dot(c.along, d.force[j]))) * c.along +
@@ -116,7 +114,7 @@ void add_force_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& 
     const Vec3d across = c.inverse * d.between[j];
     Vec3d moved = cross(lever, d.turn[j]) - cross(turn, d.lever[j]);
     if (!f.rolling) moved += d.s[j] * change_a - d.t[j] * change_b;
-    if (!f.rolling && j < 3) moved += kAxis[j];
+    if (!f.rolling && j < 3) moved += kUnitVectors[j];
     if (dot(f.turn, f.turn) > 0.0) moved -= cross(f.turn, obstacle_arm_slope(f, c, d, j));
     moved -= off * across;
     d.force[j] = g.factor * moved - (g.factor * (dot(n, moved) + dot(slip, across))) * n +
@@ -141,11 +139,11 @@ void add_couple_slopes(const FrictionSetting& f, const SlippingEdge<double>& sid
   for (int k = 0; k < 3; ++k) {
     const double by = moved * rho, lean = inverse * (m[k] - along * t[k]);
     Vec3d& own = couple[kEdge[b] + k];
-    own += (by * inverse) * (inverse * cross(m, kAxis[k]) - (2.0 * t[k]) * bend);
+    own += (by * inverse) * (inverse * cross(m, kUnitVectors[k]) - (2.0 * t[k]) * bend);
     if (!f.spatial) continue;
     axial[kEdge[b] + k] += by * lean;
-    own +=
-        (by * (lean - along * share * mean[k])) * side.spin - (by * along * share * inverse) * cross(source, kAxis[k]);
+    own += (by * (lean - along * share * mean[k])) * side.spin -
+           (by * along * share * inverse) * cross(source, kUnitVectors[k]);
   }
 }
 

@@ -7,33 +7,36 @@
 namespace withe {
 namespace {
 
-// An impact is over after so many swings of its contact and steps, and forgotten after twice as many.
-constexpr double kSwings = 12.0, kSteps = 4.0;
-// What gives nothing back leaves where it came to at kParting kLeastParting of the speed of approach: within some 90
-// swings, which are those of a contact at its stiffest. What contact stores until then is lost as well.
-constexpr double kSwingsOut = 128.0;
-// The speed of approach of what rests, if it does not fall on; over the speed of rest.
-constexpr double kLeastApproach = 1e-9;
-// Surfaces that part faster than this, over the speed at which they will have parted, give back no more than
-// restitution says: slower ones have a four-hundredth of the energy that is to be left. That speed is so much of that
-// of approach, at least.
-constexpr double kParting = 0.05, kLeastParting = 0.3;
-// What an impact gives back is known within this many swings.
+// Time after which an impact presses less elastically, in swings of its contact and in steps; after twice as long it
+// does so no more.
+constexpr double kImpactSwings = 12.0, kImpactSteps = 4.0;
+// Surfaces that part faster than kPartingShare of the speed at which they will have parted give back no more than
+// their restitution: slower ones have a four-hundredth, kPartingShare^2, of the energy that is to be left. That speed
+// is at least kMinPartingSpeed of the speed of approach.
+constexpr double kPartingShare = 0.05, kMinPartingSpeed = 0.3;
+// The same as kImpactSwings, for restitution. Surfaces that give nothing back leave at kPartingShare kMinPartingSpeed
+// of the speed of approach: within some 90 swings of a contact at its stiffest. The energy stored until then is lost
+// too.
+constexpr double kRestitutionSwings = 128.0;
+// Speed of approach of surfaces at rest, if they do not fall on, over `rest_speed`: above 0, which means no impact.
+constexpr double kMinApproach = 1e-9;
+// Swings within which an impact's rebound is known.
 constexpr double kResolvedSwings = 4.0;
-// Backward Euler leaves 1 / (w dt)^2 of the speed with which surfaces meet where a step is long for a swing, w dt = pi
-// dt over its time: after this many swings less than a hundredth, so that what gives back no more needs no steps of its
-// own.
-constexpr double kLeftBehind = 0.01, kLongSwings = 3.2;
-// Surfaces that meet within a step press along a mean of the directions in which they lie to each other at its ends,
-// which is off the one in which they meet by half of what is between these, at most [rad]. Where bodies touch already,
-// contacts take over from others as these slide, time and again: there it counts for this share. Within one rod it does
-// not: knots that are pulled by some radii a step come out right without, in a tenth of the steps.
-constexpr double kMostTurn = 0.05, kHandover = 0.125;
-// A rod rolls if where it touches tilts against the obstacle so that one end of that goes up against its middle faster
-// than this, over the speed of rest: so far from there it is as much nearer as surfaces are deep in each other, or so
-// many pieces of its curve at most. It has rolled off a piece when its slope has changed by so much, over what changes
-// it by a whole piece.
-constexpr double kTilting = 0.03, kMostPieces = 16.0, kRolledOff = 2.0;
+// Rebound of backward Euler, over the speed of approach, up to which an impact without restitution needs no steps of
+// its own.
+constexpr double kMaxRebound = 0.01;
+// Turn in a step of the direction in which surfaces lie to each other [rad]. Surfaces that meet within a step press
+// along a mean of the directions at both ends of the step, which is off the true one by half of that at most.
+constexpr double kMaxImpactTurn = 0.05;
+// Share of that turn that counts where bodies touch already: contacts take over from others as these slide, time and
+// again. Within one rod it does not count: knots that are pulled by some radii a step come out right without, in a
+// tenth of the steps.
+constexpr double kSlidingTurnShare = 0.125;
+// Speed at which one end of a touching piece goes up against its middle, over `rest_speed`, from which on the rod
+// rolls. The end is where the curve is nearer by the depth of contact, and at most kMaxPiecesToEnd pieces away.
+constexpr double kMinRollingSpeed = 0.03, kMaxPiecesToEnd = 16.0;
+// Change of a piece's slope, over the change from one piece to the next, after which a rod has rolled off the piece.
+constexpr double kRolledOffSlope = 2.0;
 
 /// From 0 to 1 where x does, without a corner.
 double smooth_step(double x) {
@@ -51,7 +54,7 @@ double steps_in_swing(double restitution) { return std::clamp(10.0 / std::max(re
 /// so many swings.
 double share_within(const ContactProblem& problem, const Touching& t, double speed, double swings) {
   if (!(t.approach > 0.0)) return 0.0;
-  const double over = swings * swing_time(problem, t) + kSteps * problem.duration;
+  const double over = swings * swing_time(problem, t) + kImpactSteps * problem.duration;
   return smooth_step(speed / rest_speed(problem, t.pair) - 1.0) * smooth_step(2.0 - t.age / over);
 }
 
@@ -94,14 +97,14 @@ bool rolls(const ContactProblem& problem, const Touching& t) {
   const CurveDistance<double> start = problem.curve_at_start(pair);
   const double rate = curve_rate(problem, pair, curve_slopes(pair.piece, start).slope);
   const double depth = kDepth * pair.small_radius(), pieces = std::sqrt(2.0 * depth / std::abs(start.bend));
-  return std::abs(rate) * std::clamp(pieces, 1.0, kMostPieces) > kTilting * rest_speed(problem, pair) &&
-         std::abs(rate) * t.age < kRolledOff * start.stiff;
+  return std::abs(rate) * std::clamp(pieces, 1.0, kMaxPiecesToEnd) > kMinRollingSpeed * rest_speed(problem, pair) &&
+         std::abs(rate) * t.age < kRolledOffSlope * start.stiff;
 }
 
 /// What presses elastically in a step: 1 of surfaces that have just met, and where a rod rolls; 0 of those that rest on
 /// each other.
 double elastic_share(const ContactProblem& problem, const Touching& t) {
-  const double share = share_within(problem, t, speed_of_impact(problem, t), kSwings);
+  const double share = share_within(problem, t, speed_of_impact(problem, t), kImpactSwings);
   return share < 1.0 && problem.pressing >= Pressing::mean && rolls(problem, t) ? 1.0 : share;
 }
 
@@ -134,7 +137,7 @@ double rest_speed(const ContactProblem& problem, const ContactPair& pair) {
 }
 
 double least_approach(const ContactProblem& problem, const ContactPair& pair) {
-  return kLeastApproach * rest_speed(problem, pair);
+  return kMinApproach * rest_speed(problem, pair);
 }
 
 double swing_time(const ContactProblem& problem, const Touching& t) {
@@ -143,14 +146,14 @@ double swing_time(const ContactProblem& problem, const Touching& t) {
 
 bool impact_lasts(const ContactProblem& problem, const Touching& t) {
   return elastic_share(problem, t) > 0.0 ||
-         (t.pair.restitution < 1.0 && share_within(problem, t, t.approach, kSwingsOut) > 0.0);
+         (t.pair.restitution < 1.0 && share_within(problem, t, t.approach, kRestitutionSwings) > 0.0);
 }
 
 ElasticShareSlopes elastic_share_slopes(const ContactProblem& problem, const Touching& t) {
   ElasticShareSlopes out;
   if (!(t.approach > 0.0) || elastic_share(problem, t) == 1.0) return out;
   const double rest = rest_speed(problem, t.pair), swing = swing_time(problem, t),
-               over = kSwings * swing + kSteps * problem.duration;
+               over = kImpactSwings * swing + kImpactSteps * problem.duration;
   const double speed = speed_of_impact(problem, t), fast = speed / rest - 1.0, fresh = 2.0 - t.age / over;
   const double by_fast = smooth_slope(fast) * smooth_step(fresh), by_fresh = smooth_step(fast) * smooth_slope(fresh);
   if (speed > t.approach)
@@ -162,7 +165,7 @@ ElasticShareSlopes elastic_share_slopes(const ContactProblem& problem, const Tou
     out.gravity = 0.5 * by_rest * rest / problem.parameters->gravity;
   else
     out.slip_tolerance = by_rest;
-  out.mass = by_fresh * t.age / (over * over) * kSwings * 0.5 * swing / problem.mass_of(t.pair);
+  out.mass = by_fresh * t.age / (over * over) * kImpactSwings * 0.5 * swing / problem.mass_of(t.pair);
   return out;
 }
 
@@ -248,7 +251,7 @@ void set_pressing(const ContactProblem& problem, Touching& t) {
   if (problem.pressing == Pressing::still) return;
   const double share = elastic_share(problem, t);
   const double lost = pair.restitution < 1.0 ? (1.0 - pair.restitution * pair.restitution) *
-                                                   share_within(problem, t, t.approach, kSwingsOut)
+                                                   share_within(problem, t, t.approach, kRestitutionSwings)
                                              : 0.0;
   if (share == 0.0 && lost == 0.0) return;
   // Friction that goes with the force k E'(D0) asks for the same force at the end of the step before.
@@ -258,22 +261,23 @@ void set_pressing(const ContactProblem& problem, Touching& t) {
     if (share < 1.0) t.law.elastic_by_way = elastic_share_slopes(problem, t).way;
   }
   t.law.restitution = std::sqrt(1.0 - lost);
-  t.law.parting = kParting * std::max(t.law.restitution, kLeastParting) * t.approach * problem.duration;
+  t.law.parting = kPartingShare * std::max(t.law.restitution, kMinPartingSpeed) * t.approach * problem.duration;
   if (t.law.elastic == 0.0 && !(t.law.restitution < 1.0)) return;
   t.before = start_distance(problem, pair);
   const bool begins = t.law.elastic > 0.0 && t.age == 0.0 && pair.rod_a != pair.rod_b;
   t.turn = begins ? turned(problem, t) : 0.0;
-  if (t.turn > kMostTurn && touches_already(problem, pair)) t.turn *= kHandover;
+  if (t.turn > kMaxImpactTurn && touches_already(problem, pair)) t.turn *= kSlidingTurnShare;
   t.pressing = t.law.at(t.before, t.proximity.distance);
 }
 
 bool unresolved(const ContactProblem& problem, const Touching& t, double dt) {
   if (t.lagged >= 0) return false;
-  if (t.turn * dt > kMostTurn * problem.duration) return true;
+  if (t.turn * dt > kMaxImpactTurn * problem.duration) return true;
   if (!(t.law.restitution < 1.0)) return false;
   const double swing = swing_time(problem, t);
-  const bool keeps_nothing = problem.pressing == Pressing::end && t.pair.restitution <= kLeftBehind;
-  if (keeps_nothing && dt > kLongSwings * swing) return false;
+  const bool keeps_nothing = problem.pressing == Pressing::end && t.pair.restitution <= kMaxRebound;
+  // A long step of backward Euler leaves 1 / (w dt)^2 of the speed, w = pi / swing.
+  if (keeps_nothing && std::numbers::pi * std::sqrt(kMaxRebound) * dt > swing) return false;
   return t.age < kResolvedSwings * swing && steps_in_swing(t.pair.restitution) * dt > swing;
 }
 

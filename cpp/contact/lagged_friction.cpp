@@ -8,8 +8,6 @@
 namespace withe {
 namespace {
 
-constexpr Vec3d kAxes[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-
 /// Adds how edge `tail`, `tail + 1` turns and spins the surface on `arm`, to columns of J.
 void add_turning(const Vec3d (&x)[4], int tail, int angle, const Vec3d& arm, bool spatial,
                  Vec3d (&column)[kContactUnknowns]) {
@@ -17,7 +15,7 @@ void add_turning(const Vec3d (&x)[4], int tail, int angle, const Vec3d& arm, boo
   const double inverse = 1.0 / std::sqrt(dot(e, e));
   const Vec3d tangent = inverse * e;
   for (int k = 0; k < 3; ++k) {
-    const Vec3d turned = inverse * cross(cross(tangent, kAxes[k]), arm);
+    const Vec3d turned = inverse * cross(cross(tangent, kUnitVectors[k]), arm);
     column[3 * tail + 3 + k] += turned;
     column[3 * tail + k] -= turned;
   }
@@ -35,7 +33,7 @@ void set_slip(const ContactProblem& problem, const Touching& t, LaggedFriction& 
   for (int i = 0; i < 3 && pair.curve(); ++i) w[i] = pair.piece.weights->at(i, points.s);
   Vec3d x[4], column[kContactUnknowns] = {};
   t.end_points(x);
-  for (int i = 0; i < (pair.curve() ? 9 : obstacle ? 6 : 12); ++i) column[i] = w[i / 3] * kAxes[i % 3];
+  for (int i = 0; i < (pair.curve() ? 9 : obstacle ? 6 : 12); ++i) column[i] = w[i / 3] * kUnitVectors[i % 3];
   const int edges = centreline ? 0 : pair.curve() ? pair.piece.weights->edges : obstacle ? 1 : 2;
   for (int side = 0; side < edges; ++side) {
     const Vec3d arm = pair.curve()

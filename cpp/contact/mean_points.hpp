@@ -55,8 +55,8 @@ MeanPoints<Scalar> mean_points(const ContactPair& pair, const ClosestPoints& fir
   const Vec3<Scalar> back = end.moved(-along_a, -along_b), on = start.between + turned0;
   // h(b) = c0 + c1 b + c2 b^2, from more than 0 to less. Where nothing slides any share will do, and a half is taken:
   // there both ends are rounding, to which so little is added that it is more.
-  constexpr double kLittle = 1e-10;  // of D^2
-  const Scalar little = kLittle * (start.square + end.square);
+  constexpr double kMinRoot = 1e-10;  // of D^2, far above its rounding error of 1e-15
+  const Scalar little = kMinRoot * (start.square + end.square);
   const Scalar c0 = dot(back, back) + start.spread - end.square + little,
                at_end = start.square - dot(on, on) - end.spread - little,
                c2 = dot(turned1, turned1) - dot(turned0, turned0), c1 = at_end - c0 - c2;

@@ -10,6 +10,8 @@
 
 namespace withe {
 
+inline constexpr Vec3d kUnitVectors[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+
 /// An obstacle in the axes of the unknowns (in a plane: its two, and zero).
 struct Obstacle {
   ObstacleKind kind = ObstacleKind::plane;

@@ -22,7 +22,7 @@ struct StartShare {
 /// `way`: x1 - x0, of three nodes; `nearer`: D1 - D0.
 template <int N>
 StartShare start_share(const double (&first)[N], const double (&last)[N], const double (&way)[N], double nearer) {
-  constexpr double kLittle = 1e-4;
+  constexpr double kSmoothing = 1e-4;  // a, over what nodes add to p0
   constexpr int kAxes = N / 3;
   double part[3] = {}, p1 = 0.0;
   for (int i = 0; i < N; ++i) {
@@ -31,13 +31,13 @@ StartShare start_share(const double (&first)[N], const double (&last)[N], const 
   }
   const double p0 = part[0] + part[1] + part[2], excess = nearer - 0.5 * (p0 + p1), apart = p0 - p1;
   const double least = part[0] * part[0] + part[1] * part[1] + part[2] * part[2],
-               square = apart * apart + kLittle * kLittle * least;
+               square = apart * apart + kSmoothing * kSmoothing * least;
   if (square == 0.0) return {0.5, 0.0, 0.0, {}};
   const double share = 0.5 + excess * apart / square, value = std::clamp(share, 0.0, 1.0);
   if (value != share) return {value, 0.0, 0.0, {}};
   const double by_square = -excess * apart / (square * square);
   StartShare out{value, apart / square, excess / square + 2.0 * apart * by_square, {}};
-  for (int n = 0; n < 3; ++n) out.by_part[n] = 2.0 * kLittle * kLittle * by_square * part[n];
+  for (int n = 0; n < 3; ++n) out.by_part[n] = 2.0 * kSmoothing * kSmoothing * by_square * part[n];
   return out;
 }
 

@@ -14,10 +14,6 @@
 namespace withe {
 namespace {
 
-// The length a of curve.hpp for the depth to which surfaces press, a hundredth of the rod's radius, which is taken no
-// greater than an edge.
-constexpr double kLeastBend = 12.0 * 0.01;
-
 double norm(const Vec3d& v) { return std::sqrt(dot(v, v)); }
 
 bool obstacle_order(const ContactKey& a, const ContactKey& b) {
@@ -309,7 +305,7 @@ void Surfaces::add_pieces(const ContactPair& prototype, const Obstacle& obstacle
     p.piece = {&weights,
                {model_.edge_tail[at(before)], model_.edge_head[at(before)], -1},
                {before, -1},
-               kLeastBend * std::min(p.radius_a, model_.edge_length(before))};
+               12.0 * kDepth * std::min(p.radius_a, model_.edge_length(before))};
     if (before == behind) {  // half as long
       p.share = 0.5;
       p.piece.least_bend *= 0.25;

@@ -10,8 +10,19 @@
 
 namespace withe {
 
-/// Centrelines may come as near as this, over their distance or the sum of their radii, within an iteration.
-constexpr double kNearest = 0.5;
+/// Depth in each other of surfaces that carry the greatest force of their rod, over the smaller radius: contact is so
+/// stiff that a hundredth of a radius bears it.
+inline constexpr double kDepth = 0.01;
+/// Depth up to which a step, an equilibrium or a drawing is accepted, over the smaller radius. Contacts
+/// stiffen from half of that on.
+inline constexpr double kMaxDepth = 4.0 * kDepth;
+
+/// Distance of centrelines after an iteration, over that before or over the sum of their radii: above 0, so that
+/// nothing passes through anything.
+inline constexpr double kMinDistance = 0.5;
+/// Distance of surfaces beyond their reach, over the sum of their radii, up to which a pair is part of the matrix's
+/// pattern. Farther pairs need no exact distance.
+inline constexpr double kMaxPatternDistance = 0.5;
 
 /// Unknowns of a contact: a0, a1, b0, b1 (3 each), angle of a, angle of b; of a piece of a curve: its nodes (3 each),
 /// three that are none, the angles of its edges.
@@ -37,7 +48,7 @@ struct ContactPair {
 
   double radii() const { return radius_a + radius_b; }
   double reach() const { return radii() + tolerance; }
-  double nearest() const { return kNearest * radii(); }
+  double nearest() const { return kMinDistance * radii(); }
   double small_radius() const { return rod_b < 0 || radius_a < radius_b ? radius_a : radius_b; }
   bool curve() const { return piece.weights != nullptr; }
   bool isotropic() const { return forward == across && backward == across; }

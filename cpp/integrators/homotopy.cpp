@@ -55,7 +55,7 @@ void Homotopy::start_out_of_balance() {
   go_to(0.0);
   equations_.evaluate(state_.q, false, nullptr, work_.data);
   imbalance_ = work_.data.residual;
-  if (const Contact* contact = equations_.contact()) deepest_ = std::max(kDeepest, contact->contacts().depth());
+  if (const Contact* contact = equations_.contact()) deepest_ = std::max(kMaxDepth, contact->contacts().depth());
   go_to(0.0);
 }
 

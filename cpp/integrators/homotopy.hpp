@@ -95,7 +95,7 @@ class Homotopy {
   double factor_ = 0.0, present_ = 0.0;  // last gone to; that of the present state
   /// Over the smaller radius, how deep surfaces may be in each other on the way: an obstacle that was pushed into them
   /// holds them there by what is out of balance, which is no force that contact is to be stiff for.
-  double deepest_ = kDeepest;
+  double deepest_ = kMaxDepth;
   bool moves_ = false, hold_neutral_ = false;
 };
 

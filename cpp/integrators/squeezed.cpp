@@ -63,10 +63,10 @@ Squeezed squeezed_contact(const Equations& equations, VectorX& slope, VectorX& o
   if (contact == nullptr) return {};
   for (int i = 0; i < contact->count(); ++i) {
     const Touching& t = contact->contacts()[i];
-    if (t.lagged >= 0 || !(excess(t, kDeepest) > 0.0)) continue;
+    if (t.lagged >= 0 || !(excess(t, kMaxDepth) > 0.0)) continue;
     const double all = free_slope(equations, i, slope);
     if (slope.norm() <= kMaxFreeSlope * all) return {i};
-    if (const int against = opposite_contact(equations, i, kDeepest, kMaxFreeSlope, slope, other); against >= 0)
+    if (const int against = opposite_contact(equations, i, kMaxDepth, kMaxFreeSlope, slope, other); against >= 0)
       return {i, against};
   }
   return {};

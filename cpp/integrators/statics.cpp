@@ -182,7 +182,7 @@ class Statics {
   bool falls() {
     // Signs of pivots are known of symmetric matrices only.
     if (!equations_.has_potential_here() || (equations_.has_potential() && firm()) || !tangent_.found) return false;
-    if (equations_.contact() && equations_.contact()->contacts().depth() > kDeepest) return false;
+    if (equations_.contact() && equations_.contact()->contacts().depth() > kMaxDepth) return false;
     return newton_.norms().displacement(tangent_.rate) > kMaxNearMove * equations_.model().length_scale && !stable(0.0);
   }
   bool let_fall(double& reached, StaticResult& result) {

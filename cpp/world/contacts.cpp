@@ -57,7 +57,7 @@ void World::Implementation::check_overlap() const {
   const ContactReport* deepest = nullptr;
   const std::vector<ContactReport> reports = contact->report(state, parameters);
   const bool bars = description.contact.law == ContactLaw::barrier;  // which is infinite where surfaces touch
-  double depth = bars ? 0.0 : kDeepest, overlap = 0.0;
+  double depth = bars ? 0.0 : kMaxDepth, overlap = 0.0;
   const auto bodies = [&](const ContactKey& key) {
     return std::pair(model.edge_rod[at(key.a)], key.b < 0 ? key.b : model.edge_rod[at(key.b)]);
   };

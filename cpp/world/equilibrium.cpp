@@ -150,7 +150,7 @@ void World::Implementation::settle_contact(Equations& system, const Boundary& bo
   };
   int tries = 0;
   for (; r.converged && tries < kMostStiffenings; ++tries) {
-    if (contact.contacts().depth() > kDeepest)
+    if (contact.contacts().depth() > kMaxDepth)
       contact.stiffen(state, true);
     else if (contact.presses_alike())
       break;
