@@ -88,7 +88,7 @@ World::Implementation::Implementation(SceneDescription scene, Options choice)
   if (description.contact.overlap == Overlap::separate) separate();
   check_overlap();
   if (options.integrator == Integrator::verlet) {
-    plan.stable_step = stable_step(*equations, parameters, at_rest(), state, work);
+    plan.stable_step = stable_step(systems.scheme(), parameters, at_rest(), state, systems.work);
     require(options.time_step <= plan.stable_step,
             "time_step must not exceed the stable step of the explicit scheme, " + text(plan.stable_step) + " s, got " +
                 text(options.time_step) + " s");
@@ -96,8 +96,7 @@ World::Implementation::Implementation(SceneDescription scene, Options choice)
 }
 
 World::Implementation::Implementation(const Implementation& other) : Implementation(other, Unbuilt{}) {
-  newton = std::make_unique<Newton>(model, options);
-  equations = std::make_unique<Equations>(model, equation_options(options));
+  systems.build(model, options);
 }
 
 World::Implementation::Implementation(const Implementation& other, Unbuilt /*unused*/)
@@ -112,22 +111,15 @@ World::Implementation::Implementation(const Implementation& other, Unbuilt /*unu
       statistics(other.statistics),
       separated(other.separated),
       spatial(other.spatial),
-      mesh_warning(other.mesh_warning),
-      step_warning(other.step_warning),
-      impact_warning(other.impact_warning),
-      branch_warning(other.branch_warning),
-      plane_warning(other.plane_warning),
-      drift_warning(other.drift_warning),
-      crossing_warning(other.crossing_warning),
-      squeeze_warning(other.squeeze_warning) {
-  work.newton.counters = other.work.newton.counters;
+      warnings(other.warnings) {
+  systems.work.newton.counters = other.systems.work.newton.counters;
   listen();
 }
 
 void World::Implementation::listen() {
-  work.newton.poll = [this] {
+  systems.work.newton.poll = [this] {
     if (interrupted.exchange(false)) throw Interrupted();
-    if (poll) poll();
+    if (callbacks.poll) callbacks.poll();
   };
 }
 
@@ -155,16 +147,9 @@ Model World::Implementation::model_of_active(Rebuild why) {
 
 /// Drops what has the sizes of the old model.
 void World::Implementation::drop_scratch() {
-  static_equations.reset();
+  systems.drop_scratch();
   spatial_twin.reset();
-  static_gradient.reset();
-  read_equations.reset();
-  const Counters counters = work.newton.counters;
-  const double finest = work.newton.finest;
-  work = StepWorkspace{};
   listen();
-  work.newton.counters = counters;
-  work.newton.finest = finest;
   energy_scratch = EnergyScratch{};
   predictor.clear();
 }
@@ -216,7 +201,7 @@ void World::Implementation::carry_over(const Model& old, Rebuild why) {
     kept.state = transferred(old, kept.state);
     kept.predictor.clear();
   } else {
-    kept = Moving{};
+    static_cast<Moving&>(kept) = Moving{};
   }
   ElasticCoefficients elastic;
   set_elastic(parameters, elastic);
@@ -242,8 +227,7 @@ void World::Implementation::rebuild(Rebuild why) {
   Model fresh = model_of_active(why);
   drop_scratch();
   const Model old = std::exchange(model, std::move(fresh));
-  newton = std::make_unique<Newton>(model, options);
-  equations = std::make_unique<Equations>(model, equation_options(options));
+  systems.build(model, options);
   if (why == Rebuild::first)
     begin_as_drawn();
   else
@@ -251,20 +235,16 @@ void World::Implementation::rebuild(Rebuild why) {
   description.uncorrected_ends = model.description.uncorrected_ends;
   // Half stencils go with the support that has held their frame.
   if (why == Rebuild::running) support_work += elastic_energy() - stored;
-  if (Contact* contact = equations->contact()) contact->initialise(state, parameters);
+  if (Contact* contact = systems.scheme().contact()) contact->initialise(state, parameters);
   reaction_current = false;
   make_plan();
 }
 
 void World::Implementation::remake_equations() {
   model.description.loads = description.loads;
-  static_equations.reset();
   spatial_twin.reset();
-  static_gradient.reset();
-  read_equations.reset();
-  newton = std::make_unique<Newton>(model, options);
-  equations = std::make_unique<Equations>(model, equation_options(options));
-  forget_matrix();
+  systems.build(model, options);
+  systems.forget_matrix();
   reaction_current = false;
   state.acceleration_current = false;
   make_plan();
@@ -502,8 +482,8 @@ void World::Implementation::add_contact_notes() {
   if (separated > 0.0)
     plan.notes.push_back("rods that overlapped as drawn were moved apart, by up to " + std::to_string(separated) +
                          " m: they are stressed there");
-  if (!equations->contact()->frictional()) plan.notes.emplace_back("no friction: contact stays symmetric");
-  if (options.integrator == Integrator::verlet && equations->contact()->regularises())
+  if (!systems.scheme().contact()->frictional()) plan.notes.emplace_back("no friction: contact stays symmetric");
+  if (options.integrator == Integrator::verlet && systems.scheme().contact()->regularises())
     plan.notes.emplace_back(
         "static friction limits explicit steps to about slip_tolerance / (7.5 mu) "
         "times the mass of a node over its contact force, which is unknown before the "
@@ -546,7 +526,8 @@ void World::Implementation::make_plan() {
   plan.stable_step = stable;
   plan.planar = model.planar();
   plan.unknowns = model.dof_count;
-  plan.solver = options.integrator == Integrator::verlet ? "none (explicit)" : equations->assembler().solver().name();
+  plan.solver =
+      options.integrator == Integrator::verlet ? "none (explicit)" : systems.scheme().assembler().solver().name();
   auto& notes = plan.notes;
   if (model.planar()) {
     plan.plane_normal = model.plane->normal;
@@ -559,14 +540,14 @@ void World::Implementation::make_plan() {
                                                                              : model.plane_reason));
   }
   if (!plane_left_by.empty()) notes.push_back("left the plane while running: " + plane_left_by);
-  for (const std::string& reason : equations->asymmetries()) notes.push_back("unsymmetric Jacobian: " + reason);
+  for (const std::string& reason : systems.scheme().asymmetries()) notes.push_back("unsymmetric Jacobian: " + reason);
   if (parameters.held_lumped)
     notes.emplace_back(
         "fourth order, and a support has moved: the mass of edges that supports hold sits at their nodes");
   if (!parameters.dragged) notes.push_back("no drag: its terms are left out");
   notes.push_back(fluid_note());
   if (!parameters.viscous) notes.push_back("no viscosity: its terms are left out");
-  for (const std::string& note : equations->notes()) notes.push_back(note);
+  for (const std::string& note : systems.scheme().notes()) notes.push_back(note);
   if (description.loads.empty()) notes.push_back("no loads but gravity");
   add_contact_notes();
   add_step_notes();

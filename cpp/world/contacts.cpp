@@ -30,7 +30,7 @@ ContactTable World::contacts() const {
   ContactTable table;
   table.bodies.resize(0, 5);
   table.numbers.resize(0, 14);
-  const Contact* contact = self.equations->contact();
+  const Contact* contact = self.systems.scheme().contact();
   if (contact == nullptr) return table;
   const Model& model = self.model;
   const std::vector<ContactReport> reports = contact->report(self.state, self.parameters);
@@ -52,7 +52,7 @@ ContactTable World::contacts() const {
 
 /// Refuses a drawing in which surfaces are inside each other; bodies that a step has pressed together are.
 void World::Implementation::check_overlap() const {
-  const Contact* contact = equations->contact();
+  const Contact* contact = systems.scheme().contact();
   if (contact == nullptr) return;
   const ContactReport* deepest = nullptr;
   const std::vector<ContactReport> reports = contact->report(state, parameters);

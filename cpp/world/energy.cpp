@@ -143,7 +143,7 @@ Energy World::Implementation::energy_of(const State& at, double loads, double wo
   coefficients.set(model, parameters);
   Energy e = mechanical_energy(model, coefficients, c, at);
   e.loads = -loads;
-  if (const Contact* contact = equations->contact()) e.contact = contact->energy_of(at, parameters, touching);
+  if (const Contact* contact = systems.scheme().contact()) e.contact = contact->energy_of(at, parameters, touching);
   e.total = e.kinetic + e.stretch + e.bend + e.twist + e.gravity + e.loads + e.contact + e.spring;
   e.work = work_done;
   e.dissipated = lost;
@@ -203,7 +203,7 @@ Energy World::Implementation::rod_energy(int rod) const {
 
 /// Whether the backward Euler step just taken added too much to a component, of what that has now.
 bool World::Implementation::gains_under_pressure() {
-  const VectorX& gains = work.pressure.gains;
+  const VectorX& gains = systems.work.pressure.gains;
   if ((gains.array() <= 0.0).all()) return false;
   ComponentEnergies& now = energy_scratch.components;
   find_component_energies(state, now);
@@ -272,7 +272,7 @@ double World::Implementation::touching_energy(const State& then) {
   find_component_energies(then, energies);
   double sum = 0.0, mass = 0.0, travelling = 0.0;
   Vector3 momentum = Vector3::Zero();
-  const auto [which, obstacles] = equations->contact()->touching_components();
+  const auto [which, obstacles] = systems.scheme().contact()->touching_components();
   bool held = false;
   for (int i = 0; i < model.component_count; ++i) {
     if (!which[at(i)]) continue;
@@ -328,14 +328,15 @@ void World::Implementation::begin_energy_watch() {
 
 void World::Implementation::check_energy() {
   if (options.integrator == Integrator::verlet) check_explicit();
-  if (options.integrator == Integrator::implicit_midpoint && first_energy && !drift_warning) check_drift();
+  if (options.integrator == Integrator::implicit_midpoint && first_energy && !warnings.has_reported(Warning::drift))
+    check_drift();
 }
 
 /// What to say where the time step is above the stable one at the present state; else nothing.
 std::string World::Implementation::longest_explicit_step() {
-  const double stable = stable_step(*equations, parameters, at_rest(), state, work);
+  const double stable = stable_step(systems.scheme(), parameters, at_rest(), state, systems.work);
   if (!(options.time_step > stable)) return "";
-  const bool slips = equations->contact() && equations->contact()->regularises();
+  const bool slips = systems.scheme().contact() && systems.scheme().contact()->regularises();
   return ": take a time_step below " + text(stable) + " s" +
          (slips ? ", or a greater slip_tolerance, which allows longer ones under friction" : "");
 }
@@ -359,11 +360,12 @@ void World::Implementation::check_drift() {
   greatest_kinetic = std::max(greatest_kinetic, e.kinetic);
   const double drift = balance_of(e) - balance_of(*first_energy);
   if (std::abs(drift) <= kMostDrift * greatest_kinetic + rounding_of(e, model.dof_count)) return;
-  drift_warning = "integrator='implicit_midpoint' has " + std::string(drift > 0.0 ? "added " : "lost ") +
-                  text(std::abs(drift), 2) + " J, " + text(100.0 * std::abs(drift) / greatest_kinetic, 2) +
-                  " % of the greatest kinetic energy (time " + text(state.time, 6) + " s, time_step " +
-                  text(options.time_step) +
-                  " s). Use integrator='energy_momentum', which conserves energy at any time_step, or a shorter one.";
+  warnings.report(
+      Warning::drift,
+      "integrator='implicit_midpoint' has " + std::string(drift > 0.0 ? "added " : "lost ") + text(std::abs(drift), 2) +
+          " J, " + text(100.0 * std::abs(drift) / greatest_kinetic, 2) + " % of the greatest kinetic energy (time " +
+          text(state.time, 6) + " s, time_step " + text(options.time_step) +
+          " s). Use integrator='energy_momentum', which conserves energy at any time_step, or a shorter one.");
 }
 
 }  // namespace withe

@@ -29,20 +29,6 @@ constexpr const char* kNotInSpace =
 
 }  // namespace
 
-Equations& World::Implementation::statics() {
-  const bool same =
-      options.integrator != Integrator::energy_momentum &&
-      (options.integrator == Integrator::statics || (description.fluid.model != FluidModel::resistive &&
-                                                     (!description.has_custom_force || description.custom_implicit)));
-  if (same) return *equations;
-  if (!static_equations) {
-    Options symmetric = options;
-    symmetric.integrator = Integrator::statics;
-    static_equations = std::make_unique<Equations>(model, equation_options(symmetric));
-  }
-  return *static_equations;
-}
-
 namespace {
 
 // A frame may turn by so much from the present state to the next on a path [rad]: rotations do not tell more than half
@@ -98,8 +84,8 @@ void World::Implementation::rest() {
   state.acceleration_current = false;
   state.motion.known = 0;
   predictor.clear();
-  forget_matrix();
-  work.newton.finest = INFINITY;
+  systems.forget_matrix();
+  systems.work.newton.finest = INFINITY;
 }
 
 /// True if nothing resists a translation along which forces do not sum to zero: no way off leads to equilibrium then.
@@ -109,7 +95,7 @@ bool World::Implementation::drifts(Equations& system, const Prescribed& given) {
   for (const Support& s : model.supports)
     if (s.active) return false;
   system.begin(state, parameters, StepRule::statics, 0.0, given);
-  StepData& e = work.newton.data;
+  StepData& e = systems.work.newton.data;
   system.evaluate(state.q, true, nullptr, e);
   if (!e.residual.allFinite()) return false;
   constexpr double kBalanced = 1e-6, kNeutral = 1e-12;  // over all forces there are; over the greatest stiffness
@@ -144,7 +130,8 @@ void World::Implementation::settle_contact(Equations& system, const Boundary& bo
   Contact& contact = *system.contact();
   const auto again = [&] {
     const StaticResult before = r;
-    r = find_equilibrium(system, *newton, options, parameters, nullptr, boundary, saddles, state, work.newton);
+    r = find_equilibrium(system, systems.newton(), options, parameters, nullptr, boundary, saddles, state,
+                         systems.work.newton);
     r.branch_changed = r.branch_changed || before.branch_changed;
     r.newton.iterations += before.newton.iterations;
   };
@@ -173,7 +160,7 @@ void World::Implementation::settle_contact(Equations& system, const Boundary& bo
 EquilibriumResult World::Implementation::equilibrium(double dt, Saddles saddles) {
   account_for_settings();
   const Moving before = *this;
-  const Lagged lagged_before = lagged();
+  const Lagged lagged_before = systems.lagged();
   const MatrixX3 loads = parameters.loads;
   const double time = state.time + dt;
   const bool actuation_changed_before = actuation_changed;
@@ -183,7 +170,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt, Saddles saddles)
   }
   const Actuation wanted = actuation_changed ? actuation_of(parameters) : Actuation{};
   prescribe(time, prescribed);
-  Equations& system = statics();
+  Equations& system = systems.statics();
   const MatrixX3 forces_before = custom_force, moments_before = custom_moments;
   const auto undo = [&] {
     custom_force = forces_before;
@@ -193,7 +180,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt, Saddles saddles)
     apply_ramps(state.time);
     actuation_changed = actuation_changed_before;
     parameters.loads = loads;
-    recall(lagged_before);  // and no more of `system`, which this may drop
+    systems.recall(lagged_before);  // and no more of `system`, which this may drop
   };
   std::vector<SupportMotion> from = motions;
   std::vector<SupportMotion> target = motions;
@@ -207,11 +194,12 @@ EquilibriumResult World::Implementation::equilibrium(double dt, Saddles saddles)
     VectorX reached = state.q;
     if (boundary.hold(0.0, 1.0, reached)) check_squeezed(system, prescribed, reached, dt);
     if (drifts(system, prescribed)) {
-      newton->balance(work.newton.data, r.newton);
-      r.newton.worst_row = newton->worst_row(work.newton.data.residual);
+      systems.newton().balance(systems.work.newton.data, r.newton);
+      r.newton.worst_row = systems.newton().worst_row(systems.work.newton.data.residual);
     } else {
-      r = find_equilibrium(system, *newton, options, parameters, actuation_changed ? &actuation_before : nullptr,
-                           boundary, saddles, state, work.newton);
+      r = find_equilibrium(system, systems.newton(), options, parameters,
+                           actuation_changed ? &actuation_before : nullptr, boundary, saddles, state,
+                           systems.work.newton);
     }
     for (SupportMotion& m : target) m.roll.setZero();
     from = target;
@@ -231,7 +219,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt, Saddles saddles)
   if (!release_left_rings()) {
     if (found.stable && buckles_out_of_plane()) {
       found.stable = false;
-      if (!plane_warning && saddles == Saddles::leave) plane_warning = kSideways;
+      if (saddles == Saddles::leave) warnings.report(Warning::plane, kSideways);
     }
     return found;
   }
@@ -243,7 +231,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt, Saddles saddles)
 }
 
 bool World::Implementation::buckles_out_of_plane() {
-  if (!model.planar() || options.planar.value_or(false) || !statics().has_potential_here()) return false;
+  if (!model.planar() || options.planar.value_or(false) || !systems.statics().has_potential_here()) return false;
   if (spatial_twin) {
     static_cast<Running&>(*spatial_twin) = *this;
     spatial_twin->state = spatial_twin->transferred(model, state);
@@ -256,27 +244,27 @@ bool World::Implementation::buckles_out_of_plane() {
       spatial_twin->rebuild(Rebuild::running);
     } catch (const std::invalid_argument&) {  // it exists in its plane only
       spatial_twin.reset();
-      if (!plane_warning) plane_warning = kNotInSpace;
+      warnings.report(Warning::plane, kNotInSpace);
       return false;
     }
   }
   Implementation& space = *spatial_twin;
-  space.equations->begin(space.state, space.parameters, StepRule::statics, 0.0);
-  StepData& data = space.work.newton.data;
-  space.equations->evaluate(space.state.q, true, nullptr, data);
-  StiffnessSigns signs(*space.equations, space.newton->norms(), space.work.newton.counters);
+  space.systems.scheme().begin(space.state, space.parameters, StepRule::statics, 0.0);
+  StepData& data = space.systems.work.newton.data;
+  space.systems.scheme().evaluate(space.state.q, true, nullptr, data);
+  StiffnessSigns signs(space.systems.scheme(), space.systems.newton().norms(), space.systems.work.newton.counters);
   return !signs.stable(space.state, data);
 }
 
 void World::Implementation::static_step(double end, double dt) {
-  work.newton.poll();
-  if (callback) callback(end, end);
-  if (!equilibrium(dt).branch_changed || branch_warning) return;
-  branch_warning = "the static step to time " + text(end, 6) +
-                   " s left its branch of equilibria: the scene jumps within the step, or was at "
-                   "a saddle, and the equilibrium after a jump depends on the motion. Time steps "
-                   "resolve the motion; equilibrium(path=\"arc_length\") follows a branch through "
-                   "limit points";
+  systems.work.newton.poll();
+  if (callbacks.before_step) callbacks.before_step(end, end);
+  if (!equilibrium(dt).branch_changed) return;
+  warnings.report(Warning::branch, "the static step to time " + text(end, 6) +
+                                       " s left its branch of equilibria: the scene jumps within the step, or was at "
+                                       "a saddle, and the equilibrium after a jump depends on the motion. Time steps "
+                                       "resolve the motion; equilibrium(path=\"arc_length\") follows a branch through "
+                                       "limit points");
 }
 
 /// Says that none was found.
@@ -307,9 +295,9 @@ EquilibriumResult World::Implementation::settle(Equations& system, StaticResult&
   steps_taken += 1;
   const Prescribed still = at_rest();
   system.begin(state, parameters, StepRule::statics, 0.0, still);
-  system.evaluate(state.q, false, nullptr, work.newton.data);
+  system.evaluate(state.q, false, nullptr, systems.work.newton.data);
   note_reactions();
-  newton->balance(work.newton.data, r.newton);
+  systems.newton().balance(systems.work.newton.data, r.newton);
   check_resolution();
   if (r.branch_changed) statistics.branch_changes += 1;
   const bool frictional = system.contact() && system.contact()->frictional();
@@ -371,7 +359,7 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
     scale_loads(self.description, wanted.loads, factor, full, acting.loads);
   };
   const Moving before = self;
-  const Lagged lagged_before = self.lagged();
+  const Lagged lagged_before = self.systems.lagged();
   const MatrixX3 forces_before = self.custom_force, moments_before = self.custom_moments;
   EquilibriumPath out;
   ArcResult r;
@@ -384,7 +372,7 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
     const std::vector<SupportMotion> from = self.motions;
     std::vector<SupportMotion> target = from;
     for (SupportMotion& motion : target) motion.put(motion.pose_at(self.state.time));
-    Equations& system = self.statics();
+    Equations& system = self.systems.statics();
     Prescribed& prescribed = self.prescribed;
     prescribed = {};
     self.prescribe_custom_at_rest(self.state.time, prescribed);
@@ -392,8 +380,9 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
     const Boundary boundary = self.boundary_between(system, from, target, prescribed);
     self.rest();
     const ActingPath acting =
-        by_loads ? scaled : growing(system, self.parameters, prescribed, self.state, self.work.newton, nullptr);
-    Homotopy path(system, *self.newton, self.parameters, boundary, acting, self.state, self.work.newton);
+        by_loads ? scaled : growing(system, self.parameters, prescribed, self.state, self.systems.work.newton, nullptr);
+    Homotopy path(system, self.systems.newton(), self.parameters, boundary, acting, self.state,
+                  self.systems.work.newton);
     if (!by_loads) path.start_out_of_balance();
     std::vector<SupportPose> poses;
     const ArcVisitor visit = [&](const ArcPoint& point) {
@@ -403,8 +392,9 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
       out.points.push_back(path_point(*this, self.model, point));
       if (point.stable && self.buckles_out_of_plane()) out.points.back().stable = false;
     };
-    r = follow_arc(system, *self.newton, self.options, path,
-                   {wanted.start, wanted.end, wanted.most_points, wanted.turn}, self.state, self.work.newton, visit);
+    r = follow_arc(system, self.systems.newton(), self.options, path,
+                   {wanted.start, wanted.end, wanted.most_points, wanted.turn}, self.state, self.systems.work.newton,
+                   visit);
     find_poses_between(from, target, r.factor, poses);
     put(poses, self.motions);
     for (SupportMotion& m : self.motions) stop(m, self.state.time);
@@ -414,7 +404,7 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
     static_cast<Moving&>(self) = before;
     self.parameters.loads = full;
     self.reaction_current = false;
-    self.recall(lagged_before);
+    self.systems.recall(lagged_before);
     throw;
   }
   self.parameters.loads = full;
@@ -429,10 +419,10 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
 
 void World::Implementation::refresh_reactions() {
   if (reaction_current) return;
-  Equations& system = statics();
+  Equations& system = systems.statics();
   const Prescribed still = at_rest();
   system.begin(state, parameters, StepRule::statics, 0.0, still);
-  system.evaluate(state.q, false, nullptr, work.newton.data);
+  system.evaluate(state.q, false, nullptr, systems.work.newton.data);
   note_reactions();
 }
 

@@ -122,22 +122,10 @@ std::string World::Implementation::unresolved() const {
 
 /// Warns once.
 void World::Implementation::check_resolution() {
-  if (mesh_warning) return;
-  if (std::string found = unresolved(); !found.empty()) mesh_warning = std::move(found);
+  if (!warnings.has_reported(Warning::mesh)) warnings.report(Warning::mesh, unresolved());
 }
 
-void Warnings::add(const Warnings& other) {
-  for (std::string Warnings::* each : {&Warnings::mesh, &Warnings::steps, &Warnings::impact, &Warnings::branch,
-                                       &Warnings::plane, &Warnings::drift, &Warnings::crossing, &Warnings::squeeze})
-    if ((this->*each).empty()) this->*each = other.*each;
-}
-
-Warnings World::take_warnings() {
-  const auto take = [](std::optional<std::string>& warning) { return warning ? std::exchange(*warning, {}) : ""; };
-  Implementation& self = *implementation_;
-  return {take(self.mesh_warning),  take(self.step_warning),  take(self.impact_warning),   take(self.branch_warning),
-          take(self.plane_warning), take(self.drift_warning), take(self.crossing_warning), take(self.squeeze_warning)};
-}
+Warnings World::take_warnings() { return implementation_->warnings.take(); }
 
 /// What may help where steps do not converge, by what is the matter; one sentence.
 std::string World::Implementation::what_to_try() const {
@@ -157,7 +145,7 @@ std::string World::Implementation::what_to_try() const {
   if (options.integrator == Integrator::statics)
     return "Try a smaller change of load or motion per step, or "
            "integrator='backward_euler' with viscosity, which comes to rest after a jump";
-  if (equations->contact() && equations->contact()->frictional())
+  if (systems.scheme().contact() && systems.scheme().contact()->frictional())
     return "Try a smaller time_step, or a greater slip_tolerance of enable_contact";
   if (options.integrator == Integrator::implicit_midpoint)
     return "Try integrator='energy_momentum', which conserves energy at any time_step, or "

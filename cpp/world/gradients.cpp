@@ -58,13 +58,8 @@ VectorX any_motion(const Model& model, const Assembler& assembler) {
 }  // namespace
 
 StepGradient& World::Implementation::begin_gradient(AtEquilibrium& at) const {
-  if (!static_gradient) {
-    Options statics = options;
-    statics.integrator = Integrator::statics;
-    static_gradient = std::make_unique<StepGradient>(model, equation_options(statics));
-  }
   require(!has_rings(), std::string("no gradient of this equilibrium is available: ") + kRing);
-  StepGradient& gradient = *static_gradient;
+  StepGradient& gradient = systems.gradient();
   at.frames = state;
   at.prescribed.supports = support_poses();
   State& frames = at.frames;
@@ -180,12 +175,7 @@ MatrixX World::equilibrium_responses(const MatrixX& residual, const MatrixX& hel
 /// Of length 1; empty where none costs nothing, where loads turn with the rod, or with custom forces.
 VectorX World::Implementation::neutral_motion() const {
   if (description.has_custom_force) return {};
-  if (!read_equations) {
-    Options symmetric = options;
-    symmetric.integrator = Integrator::statics;
-    read_equations = std::make_unique<Equations>(model, equation_options(symmetric));
-  }
-  Equations& system = *read_equations;
+  Equations& system = systems.readout();
   if (system.assembler().solver().symmetry() == Symmetry::unsymmetric) return {};
   StepData evaluation;
   system.begin(state, parameters, StepRule::statics, 0.0);
@@ -205,7 +195,7 @@ EquilibriumGradient World::Implementation::equilibrium_gradient(const Coefficien
 
 std::shared_ptr<Tape> World::start_tape() {
   Implementation& self = *implementation_;
-  const Contact* contact = self.equations->contact();
+  const Contact* contact = self.systems.scheme().contact();
   self.tape = std::make_shared<Tape>(self.model, equation_options(self.options), self.state, self.parameters,
                                      contact && contact->frictional(), self.support_poses());
   if (self.options.integrator == Integrator::verlet || self.options.integrator == Integrator::statics)
@@ -241,13 +231,13 @@ VectorX World::state_difference(const World& reference) const {
 void World::displace_state(const VectorX& by) {
   // On a copy, so that what is refused changes nothing.
   auto fresh = std::make_unique<Implementation>(accounted());
-  fresh->recall(implementation_->lagged());
-  fresh->take_callbacks(*implementation_);
+  fresh->systems.recall(implementation_->systems.lagged());
+  fresh->callbacks = implementation_->callbacks;
   withe::displace_state(fresh->model, by, fresh->state);
-  fresh->forget_contacts();
+  fresh->systems.forget_contacts();
   fresh->check_overlap();
   fresh->forget_motion();
-  fresh->forget_matrix();
+  fresh->systems.forget_matrix();
   implementation_ = std::move(fresh);
 }
 
@@ -260,7 +250,7 @@ void World::Implementation::check_tape() {
 
 void World::Implementation::record_step(StepRule rule, double dt, bool begins) {
   const char* unknown = nullptr;
-  if (const Contact* contact = equations->contact()) {
+  if (const Contact* contact = systems.scheme().contact()) {
     if (contact->frictional() && !known_friction(description.contact.friction_law))
       unknown = kFriction;
     else if (loses_in_impacts(description.contact))
@@ -270,8 +260,8 @@ void World::Implementation::record_step(StepRule rule, double dt, bool begins) {
     else if (!contact->has_given_stiffness(state))
       unknown = kStiffness;
   }
-  tape->record(
-      {rule, dt, work.move, state, parameters, reached(), support_poses(), begins, unknown, tensions_in_middle()});
+  tape->record({rule, dt, systems.work.move, state, parameters, reached(), support_poses(), begins, unknown,
+                tensions_in_middle()});
 }
 
 Reached World::Implementation::reached() const {

@@ -5,6 +5,7 @@
 
 #include "integrators/statics.hpp"
 #include "model/edge_vectors.hpp"
+#include "run/systems.hpp"
 #include "world/crossings.hpp"
 #include "world/running.hpp"
 
@@ -37,6 +38,14 @@ struct EnergyScratch {
   ComponentEnergies components;
 };
 
+/// Functions of who runs the scene, which copies do not take over.
+struct Callbacks {
+  CustomFunction force;
+  std::function<void(double force_time, double end_time)> before_step;  ///< StepCallback, bound to its world
+  bool prescribes = false;                                              ///< true if it may move supports and obstacles
+  std::function<void()> poll;
+};
+
 /// Why a model is built: at first, because supports changed or the plane was left, or to take a snapshot's state.
 enum class Rebuild { first, running, restored };
 
@@ -52,67 +61,36 @@ struct World::Implementation : Running {
   ContactDescription drawn_contact;  ///< which holds until it is set
   Options options;
   Model model;
-  std::unique_ptr<Newton> newton;
-  std::unique_ptr<Equations> equations;
-  std::unique_ptr<Equations> static_equations;            ///< symmetric ones, made when first needed
-  std::unique_ptr<Implementation> spatial_twin;           ///< of a planar scene: see `buckles_out_of_plane`
-  mutable std::unique_ptr<StepGradient> static_gradient;  ///< made when first needed
-  mutable std::unique_ptr<Equations> read_equations;      ///< symmetric ones, of which no matrix is yet to serve
-  std::shared_ptr<Tape> tape;                             ///< of a run that is kept for gradients
-  long taped = 0;                                         ///< its length at the start of a step that may be taken back
-  StepWorkspace work;
-  Prescribed prescribed;  ///< for the step or the equilibrium that was sought last
+  Systems systems;
+  std::unique_ptr<Implementation> spatial_twin;  ///< of a planar scene: see `buckles_out_of_plane`
+  std::shared_ptr<Tape> tape;                    ///< of a run that is kept for gradients
+  Prescribed prescribed;                         ///< for the step or the equilibrium that was sought last
   mutable EnergyScratch energy_scratch;
   /// Before what was set since the state last moved; the work of that is found when it is asked for.
   EnergyCoefficients before_settings;
   bool newly_set = false;
-  MatrixRecord marked_matrix;
-  GuessRecords marked_guesses;
-  StepHistory marked_history;
-  Division division;                   ///< of the present time step
-  Moving kept;                         ///< at the start of a step that may be taken back
-  double turned = 0, held_turned = 0;  ///< of an edge, of a held frame in the last step at most [rad]
-  /// Of steps that were cut for them, until one is accepted: `held_turned` over its most, way of an obstacle [m].
-  double cut_turn = 0, cut_way = 0;
-  std::vector<SupportMotion> motions_before;  ///< at the start of a time step
+  Division division;  ///< of the present time step
+  struct : Moving {
+    long taped = 0;  ///< length of the tape
+  } kept;            ///< at the start of a part that may be taken back
+  struct {
+    StepHistory history;
+    std::vector<SupportMotion> motions;
+  } mark;  ///< at the start of a time step
   Plan plan;
   bool plan_current = false;  ///< made when it is asked for
   std::string plane_left_by;  ///< what left the plane, where something did
   Statistics statistics;
-  CustomFunction force_function;
-  std::function<void(double, double)> callback;  ///< StepCallback, bound to its world
-  bool prescribes = false;                       ///< whether it may lead supports and obstacles
-  std::function<void()> poll;
+  Callbacks callbacks;
   std::atomic<bool> interrupted{false};
   double separated = 0;  ///< how far overlapping rods were moved before the start [m]
   bool spatial = false;  ///< left its plane while running
-  /// Messages of warnings, each given once: no value before its reason occurs, and empty after Python has read it.
-  std::optional<std::string> mesh_warning;        ///< the mesh is too coarse for the motion
-  std::optional<std::string> step_warning;        ///< steps are too long for the motion
-  std::optional<std::string> impact_warning;      ///< steps are too long for an impact
-  std::optional<std::string> branch_warning;      ///< a static step has left its branch
-  std::optional<std::string> plane_warning;       ///< an equilibrium is unstable out of its plane
-  std::optional<std::string> drift_warning;       ///< the integrator changes the energy
-  std::optional<std::string> crossing_warning;    ///< rods pass through each other
-  std::optional<std::string> squeeze_warning;     ///< obstacles squeeze a rod, and no contact stiffness is given
+  Warnings warnings;
   std::unique_ptr<CrossingWatch> crossing_watch;  ///< made when first needed
   std::vector<LeftRing> left_rings;               ///< not heard of yet
   NewtonResult last_newton;
 
-  // lagged.cpp
-  Lagged lagged();
-  void recall(const Lagged& lagged);
-  Equations* system(System which);
-  void factorize_again(System owner);
-  /// From here on a step may end without a trace; `return_to_mark` then makes it so.
-  void mark();
-  void return_to_mark();
-  /// Callbacks, which belong to who runs the scene.
   void check_shares(const ContactPairDescription& pair) const;
-  void take_callbacks(const Implementation& other);
-  /// Matrices of earlier steps.
-  void forget_matrix();
-  void forget_contacts();
 
   // building.cpp
   /// Lets interruptions reach the solver.
@@ -219,16 +197,31 @@ struct World::Implementation : Running {
   /// Shares of the time step: that of the next part, and that taken in so many tries.
   [[noreturn]] void fail_error_control(long tries, double duration, double share_of_part, double share_taken) const;
   [[noreturn]] void fail_step(Verdict why, double dt) const;
-  Verdict try_step(const StepControl& control, double dt);
+  /// What a part was found to do.
+  struct PartResult {
+    double error = 0;      ///< estimated [m]
+    double turn = 0;       ///< greatest of an edge [rad]
+    double held_turn = 0;  ///< greatest of what supports hold [rad]
+  };
+  /// What parts are rejected for, beside errors: turn of what is held over the greatest that is accurate; way of an
+  /// obstacle [m].
+  struct Excess {
+    double turn = 0, way = 0;
+  };
+  Verdict try_step(const StepControl& control, double dt, Excess& rejected);
+  Verdict judge(const StepControl& control, const PartResult& part, double dt, Excess& rejected);
+  bool may_take_back() const;
+  Contact* watched_contact() const;
+  double held_turn_of(const PartResult& part) const;
   void take_back();
-  void commit_step();
+  void commit_step(const PartResult& part);
   void return_to_start();
-  void ask_callback(double force_time, double end_time);
-  bool scheme_step(double dt, double& error);
-  bool composed_step(double dt, double& error);
+  void call_before_step(double force_time, double end_time);
+  bool scheme_step(double dt, PartResult& part);
+  bool composed_step(double dt, PartResult& part);
   bool conserving() const;
   double force_time(double start, double dt) const;
-  bool inner_step(double dt, int slot, double& error);
+  bool inner_step(double dt, int slot, PartResult& part);
   StepRule rule_of_step() const;
   StepResult step_by_rule(double dt, int slot);
   void check_impacts(const ContactDescription& contact) const;
@@ -296,7 +289,6 @@ struct World::Implementation : Running {
   bool even_contact(Equations& system, const Prescribed& given, bool arrived);
   void settle_contact(Equations& system, const Boundary& boundary, Saddles saddles, StaticResult& r);
   void rest();
-  Equations& statics();
   void refresh_reactions();
 
   // contacts.cpp

@@ -95,7 +95,7 @@ bool World::Implementation::turns_rods() const {
     const Support& support = model.supports[s];
     const SupportMotion& motion = motions[s];
     if (support.active && (support.frame >= 0 || !support.edges.empty()) &&
-        (prescribes || state.time < motion.turn.end))
+        (callbacks.prescribes || state.time < motion.turn.end))
       return true;
   }
   return false;
@@ -185,7 +185,7 @@ CustomForces World::Implementation::custom_forces(double time, const VectorX& q,
     positions.row(i) = node_position(model, q, i);
     velocities.row(i) = node_vector(model, v, i);
   }
-  CustomForces now = force_function(time, positions, velocities, derivatives);
+  CustomForces now = callbacks.force(time, positions, velocities, derivatives);
   const auto check = [&](const MatrixX3& table, const std::string& what) {
     require(table.rows() == model.node_count, what + " must have one row a node, " + std::to_string(model.node_count) +
                                                   ", got " + std::to_string(table.rows()));
@@ -217,20 +217,20 @@ void World::Implementation::find_custom_force(double time, const VectorX& q, con
 /// Custom forces of a step of dt are those where the scheme's own forces act.
 void World::Implementation::prescribe_custom(double dt, Prescribed& out) {
   if (!description.has_custom_force) return;
-  if (force_function && description.custom_implicit && options.integrator != Integrator::verlet) {
+  if (callbacks.force && description.custom_implicit && options.integrator != Integrator::verlet) {
     out.respond = [this, time = force_time(state.time, dt)](const VectorX& q, const VectorX& v, bool derivatives) {
       return custom_forces(time, q, v, derivatives);
     };
     return;
   }
-  if (force_function) find_custom_force_of_step(dt, out);
+  if (callbacks.force) find_custom_force_of_step(dt, out);
   put_custom_force(out);
 }
 
 /// In balance, whatever moves towards it, velocities are zero.
 void World::Implementation::prescribe_custom_at_rest(double time, Prescribed& out) {
   put_custom_force(out);
-  if (!force_function) return;
+  if (!callbacks.force) return;
   out.respond = [this, time](const VectorX& q, const VectorX& v, bool derivatives) {
     CustomForces now = custom_forces(time, q, VectorX::Zero(v.size()), derivatives);
     now.by_velocity.resize(0, 0);
@@ -244,15 +244,15 @@ void World::Implementation::prescribe_custom_at_rest(double time, Prescribed& ou
 /// determinant 1 and the trace 2 - (w dt)^2. Backward Euler's at the predicted end damp, for w < sqrt(4/3) / dt.
 /// Verlet's end is known.
 void World::Implementation::find_custom_force_of_step(double dt, Prescribed& out) {
-  VectorX &q = work.z, &v = work.velocity;
+  VectorX &q = systems.work.z, &v = systems.work.velocity;
   if (options.integrator == Integrator::verlet) {
     if (!state.acceleration_current) find_custom_force(state.time, state.q, state.v);
     put_custom_force(out);
-    begin_verlet(*equations, parameters, out, dt, state, work);
+    begin_verlet(systems.scheme(), parameters, out, dt, state, systems.work);
     find_custom_force(state.time + dt, q, v);
     return;
   }
-  const Assembler& assembler = equations->assembler();
+  const Assembler& assembler = systems.scheme().assembler();
   const double time = force_time(state.time, dt);
   const auto hold = [&] {
     assembler.project(v);

@@ -121,7 +121,7 @@ bool World::Implementation::tensions_in_middle() const { return rule_of_step() =
 void World::Implementation::note_tensions() {
   tensions.resize(tensions_in_middle() ? model.edge_count : 0);
   for (int e = 0; e < static_cast<int>(tensions.size()); ++e)
-    tensions(e) = tension(model, parameters, work.newton.data.configuration, e);
+    tensions(e) = tension(model, parameters, systems.work.newton.data.configuration, e);
 }
 
 VectorX World::tensions(int rod) const {

@@ -146,16 +146,4 @@ struct Found {
 
 struct Running : Settings, Moving, StepHistory, Found {};
 
-/// Systems of equations that a scene may have.
-enum class System { scheme, statics };
-inline constexpr std::array<System, 2> kSystems{System::scheme, System::statics};
-
-/// What solves leave for those to come: with it, a copy goes on with the same bits.
-struct Lagged {
-  MatrixHistory matrix;
-  GuessRecords guesses;
-  std::optional<System> owner;  ///< of the factorisation that may serve again
-  std::array<std::optional<EquationsMemory>, kSystems.size()> systems;
-};
-
 }  // namespace withe

@@ -162,11 +162,11 @@ class Separation {
 }  // namespace
 
 void World::Implementation::separate() {
-  if (equations->contact() == nullptr) return;
+  if (systems.scheme().contact() == nullptr) return;
   const VectorX drawn = state.q;
   Separation separation(model, parameters, options, state);
   if (!separation.run(state)) return;
-  separated = newton->norms().displacement(state.q - drawn);
+  separated = systems.newton().norms().displacement(state.q - drawn);
   make_plan();
 }
 

@@ -54,8 +54,8 @@ void World::set_state(const std::vector<RodState>& rods, std::optional<double> t
   require(!time || std::isfinite(*time), "time must be finite");
   // On a copy, so that what is refused changes nothing.
   auto fresh = std::make_unique<Implementation>(accounted());
-  fresh->recall(implementation_->lagged());
-  fresh->take_callbacks(*implementation_);
+  fresh->systems.recall(implementation_->systems.lagged());
+  fresh->callbacks = implementation_->callbacks;
   for (const RodState& rod : rods)
     if (fresh->model.planar() && fresh->leaves_plane(rod)) {
       fresh->leave_plane("a state of rod '" + fresh->description.rods[at(rod.rod)].name + "'");
@@ -229,7 +229,7 @@ void World::Implementation::place_rods(const std::vector<RodState>& rods) {
   pass_rings_anew(model, state);
   meet_anew(moved_rods(start, state.q));
   forget_motion();
-  forget_matrix();
+  systems.forget_matrix();
 }
 
 /// Which rods have a node that is elsewhere.
@@ -245,11 +245,11 @@ std::vector<bool> World::Implementation::moved_rods(const VectorX& before, const
 
 /// Contacts of rods that are where no step has led them to; all others go on.
 void World::Implementation::meet_anew(const std::vector<bool>& moved) {
-  Contact* contact = equations->contact();
+  Contact* contact = systems.scheme().contact();
   if (!contact) return;
   const auto is_moved = [&](int edge) { return edge >= 0 && moved[at(model.edge_rod[at(edge)])]; };
   std::erase_if(state.contacts, [&](const ContactRecord& r) { return is_moved(r.key.a) || is_moved(r.key.b); });
-  forget_contacts();
+  systems.forget_contacts();
   contact->initialise(state, parameters);
   check_overlap();
 }

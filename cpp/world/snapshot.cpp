@@ -356,7 +356,7 @@ std::string World::snapshot() const {
   w(set);
   if (set) write_contact(w, self.description.contact);
   exchange(w, self.model, static_cast<Running&>(self));
-  Lagged lagged = self.lagged();
+  Lagged lagged = self.systems.lagged();
   exchange(w, lagged);
   w(hash_of(w.bytes));
   return w.bytes;
@@ -375,7 +375,7 @@ void World::restore(const std::string& bytes) {
   require(print == fingerprint(implementation_->description), "snapshot belongs to another scene");
   // Everything is read into a copy, so that a damaged file changes nothing.
   auto fresh = std::make_unique<Implementation>(accounted());
-  fresh->take_callbacks(*implementation_);
+  fresh->callbacks = implementation_->callbacks;
   bool spatial = false, obstacles_move = false;
   r(spatial);
   r(obstacles_move);
@@ -407,7 +407,7 @@ void World::restore(const std::string& bytes) {
   update_derived(fresh->model, fresh->parameters);
   fresh->check_reversible(fresh->parameters);
   check_lagged(lagged, fresh->model);
-  fresh->recall(lagged);
+  fresh->systems.recall(lagged);
   implementation_ = std::move(fresh);
 }
 

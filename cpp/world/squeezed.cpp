@@ -16,14 +16,15 @@ void World::Implementation::check_squeezed(Equations& system, const Prescribed& 
   if (!system.contact()) return;
   system.begin(state, parameters, StepRule::statics, 0.0, given);
   system.contact()->update(q);
-  if (const Squeezed found = squeezed_contact(system, work.change, work.mean)) fail_squeezed(system, found, dt);
+  if (const Squeezed found = squeezed_contact(system, systems.work.change, systems.work.mean))
+    fail_squeezed(system, found, dt);
 }
 
 /// Warns once of two obstacles that press on both sides of a rod with a stiffness of contact that nobody has given.
 void World::Implementation::check_squeeze() {
-  const Contact* contact = equations->contact();
-  if (contact == nullptr || squeeze_warning || description.contact.obstacles.size() < 2) return;
-  const Squeezed found = opposite_contacts(*equations, work.change, work.mean);
+  const Contact* contact = systems.scheme().contact();
+  if (contact == nullptr || warnings.has_reported(Warning::squeeze) || description.contact.obstacles.size() < 2) return;
+  const Squeezed found = opposite_contacts(systems.scheme(), systems.work.change, systems.work.mean);
   if (!found) return;
   const Touching &a = contact->contacts()[found.contact], &b = contact->contacts()[found.against];
   const auto other = [&](const Touching& t) {
@@ -33,13 +34,14 @@ void World::Implementation::check_squeeze() {
   const int edge = a.pair.key.a;
   const double radius = contact->surfaces().radius(edge);
   const double modulus = parameters.edge_stretch(edge) / (std::numbers::pi * radius * radius);
-  squeeze_warning = "Rod '" + description.rods[at(model.edge_rod[at(edge)])].name + "' is squeezed between " +
-                    other(a) + " and " + other(b) + " (time " + text(state.time, 6) +
-                    " s). Both are rigid, so the force depends on the contact stiffness, which was "
-                    "not given. Use stiffness= of scene.enable_contact: half of Young's modulus "
-                    "times the edge length is " +
-                    text(0.5 * modulus * model.edge_arc(edge), 2) +
-                    " N/m here. Or press with a part that yields, such as a hand with stiffness=.";
+  warnings.report(Warning::squeeze, "Rod '" + description.rods[at(model.edge_rod[at(edge)])].name +
+                                        "' is squeezed between " + other(a) + " and " + other(b) + " (time " +
+                                        text(state.time, 6) +
+                                        " s). Both are rigid, so the force depends on the contact stiffness, which was "
+                                        "not given. Use stiffness= of scene.enable_contact: half of Young's modulus "
+                                        "times the edge length is " +
+                                        text(0.5 * modulus * model.edge_arc(edge), 2) +
+                                        " N/m here. Or press with a part that yields, such as a hand with stiffness=.");
 }
 
 void World::Implementation::fail_squeezed(const Equations& system, const Squeezed& squeezed, double dt) const {

@@ -47,10 +47,10 @@ void World::Implementation::watch_step(double dt, const Equations& system) {
   const Integrator integrator = options.integrator;
   if (options.tolerance || integrator == Integrator::statics || integrator == Integrator::verlet) return;
   const double of_part = integrator == Integrator::fourth_order ? kFourthOrderParts.back() * dt : dt;
-  if (!impact_warning && integrator != Integrator::backward_euler)
-    if (std::string found = unresolved_impact(of_part, system); !found.empty()) impact_warning = std::move(found);
+  if (!warnings.has_reported(Warning::impact) && integrator != Integrator::backward_euler)
+    warnings.report(Warning::impact, unresolved_impact(of_part, system));
   const std::int64_t place = steps_taken % kPeriod;
-  if (step_warning || place >= kLooked) return;
+  if (warnings.has_reported(Warning::steps) || place >= kLooked) return;
   auto& [change, motion, greatest, pull, moved, before] = step_watch;
   if (place == 0 || change.size() != model.component_count)
     for (VectorX* sum : {&change, &motion, &pull, &moved}) sum->setZero(model.component_count);
@@ -80,8 +80,8 @@ void World::Implementation::watch_step(double dt, const Equations& system) {
   }
   if (place + 1 < kLooked) return;
   greatest = greatest.cwiseMax(motion);
-  for (int c = 0; c < model.component_count && !step_warning; ++c)
-    if (std::string found = unresolved_in_time(of_part, c); !found.empty()) step_warning = std::move(found);
+  for (int c = 0; c < model.component_count && !warnings.has_reported(Warning::steps); ++c)
+    warnings.report(Warning::steps, unresolved_in_time(of_part, c));
 }
 
 void World::Implementation::forget_component(int component) {

@@ -32,17 +32,19 @@ void World::Implementation::advance(double duration) {
   account_for_settings();
   if (!first_energy) begin_energy_watch();
   begin_crossing_watch();
-  motions_before = motions;
-  mark();
+  mark.motions = motions;
+  mark.history = *this;
+  systems.mark();
   spread_jumps(duration);
   try {
     advance_in_parts(duration);
   } catch (...) {
     if (state.time == base) {  // what was tried leaves no trace
-      motions = motions_before;
-      return_to_mark();
+      motions = mark.motions;
+      static_cast<StepHistory&>(*this) = mark.history;
+      systems.return_to_mark();
     } else {
-      forget_matrix();
+      systems.forget_matrix();
     }
     throw;
   }
@@ -58,16 +60,16 @@ void World::Implementation::advance_in_parts(double duration) {
   const double base = state.time;
   const StepControl control(options);
   StepProgress progress = control.begin(lengths, !predictor.empty());
-  cut_turn = cut_way = 0.0;
+  Excess rejected;
   const long max_steps = options.max_steps.value_or(std::lround(kMaxWork / model.node_count));
   for (long tries = 0; !progress.division.finished(); ++tries) {
-    work.newton.poll();
+    systems.work.newton.poll();
     lengths = progress.lengths;
     division = progress.division;
     if (options.tolerance && tries >= max_steps)
       fail_error_control(tries, duration, control.share_at(lengths.level), (state.time - base) / duration);
     const double dt = duration * division.share();
-    const Verdict verdict = try_step(control, dt);
+    const Verdict verdict = try_step(control, dt, rejected);
     progress.lengths = lengths;
     if (accepts(verdict)) {
       progress = control.advance(progress, verdict, dt);
@@ -102,19 +104,16 @@ void World::Implementation::fail_step(Verdict why, double dt) const {
                                        : "");
 }
 
-/// One step of dt, taken back where it gains energy from nowhere or is not accurate enough.
-Verdict World::Implementation::try_step(const StepControl& control, double dt) {
-  const bool fourth = options.integrator == Integrator::fourth_order;
-  const bool euler = options.adaptive && options.integrator == Integrator::backward_euler;
-  const bool watched = options.adaptive && equations->contact() && options.integrator != Integrator::verlet;
-  const bool keeps = watched || euler || options.tolerance || fourth || turns_rods();
-  if (keeps) kept = *this;
-  if (tape) taped = tape->count();
-  work.newton.finest = 0.01 * control.allowed_error(dt);  // so that what Newton leaves is no part of the error
-  double error = 0.0;
+/// One part of dt, taken back where it gains energy from nowhere or is not accurate enough.
+Verdict World::Implementation::try_step(const StepControl& control, double dt, Excess& rejected) {
+  const bool keeps = may_take_back();
+  if (keeps) static_cast<Moving&>(kept) = *this;
+  if (tape) kept.taped = tape->count();
+  systems.work.newton.finest = 0.01 * control.allowed_error(dt);  // so that what Newton leaves is no part of the error
+  PartResult part;
   bool done = false;
   try {
-    done = scheme_step(dt, error);
+    done = scheme_step(dt, part);
   } catch (...) {
     if (keeps) return_to_start();
     throw;
@@ -123,33 +122,55 @@ Verdict World::Implementation::try_step(const StepControl& control, double dt) {
     statistics.rejected_steps += 1;
     return Verdict::failed;
   }
-  if (!control.bears(lengths, error, dt)) {
+  const Verdict judged = judge(control, part, dt, rejected);
+  if (!accepts(judged)) {
     take_back();
-    return Verdict::inaccurate;
+    return judged;
   }
-  Contact* contact = watched ? equations->contact() : nullptr;
-  const double held_turn =
-      options.adaptive && conserving() ? held_turned / (fourth ? kMostHeldTurnOfPart : kMostHeldTurn) : 0.0;
-  const double way = contact && !obstacle_motions.empty() ? farthest_obstacle(kept.state) : 0.0;
-  const bool unresolved =
-      (held_turn > 1.0 && lessens(held_turn, cut_turn)) ||
-      (contact && ((contact->unresolved(dt) && lessens(way, cut_way)) || contact->missed(kept.state.q)));
-  if (unresolved && control.may_subdivide(lengths)) {
-    cut_turn = held_turn;
-    cut_way = way;
-    take_back();
-    return Verdict::inaccurate;
-  }
-  if (!unresolved && ((euler && gains_under_pressure()) || (watched && contact_pumps(dt)))) {
-    take_back();
-    return Verdict::gained_energy;
-  }
-  watch_step(dt, *equations);
-  commit_step();
-  const bool near_limit = 2.5 * held_turn > 1.0 || (contact && contact->unresolved(2.0 * dt));
-  const auto [after, verdict] = control.accept(lengths, error, dt, near_limit);
+  rejected = {};
+  watch_step(dt, systems.scheme());
+  commit_step(part);
+  const Contact* contact = watched_contact();
+  const bool near_limit = 2.5 * held_turn_of(part) > 1.0 || (contact && contact->unresolved(2.0 * dt));
+  const auto [after, verdict] = control.accept(lengths, part.error, dt, near_limit);
   lengths = after;
   return verdict;
+}
+
+/// True if a part that was solved may be rejected.
+bool World::Implementation::may_take_back() const {
+  const bool euler = options.adaptive && options.integrator == Integrator::backward_euler;
+  return euler || watched_contact() || options.tolerance || options.integrator == Integrator::fourth_order ||
+         turns_rods();
+}
+
+/// Contact by which parts are judged; nothing where they are not.
+Contact* World::Implementation::watched_contact() const {
+  return options.adaptive && options.integrator != Integrator::verlet ? systems.scheme().contact() : nullptr;
+}
+
+/// Turn of what is held in a part, over the greatest that is accurate.
+double World::Implementation::held_turn_of(const PartResult& part) const {
+  if (!options.adaptive || !conserving()) return 0.0;
+  return part.held_turn / (options.integrator == Integrator::fourth_order ? kMostHeldTurnOfPart : kMostHeldTurn);
+}
+
+/// Verdict on a part that was solved. `rejected`: what parts were rejected for before.
+Verdict World::Implementation::judge(const StepControl& control, const PartResult& part, double dt, Excess& rejected) {
+  if (!control.bears(lengths, part.error, dt)) return Verdict::inaccurate;
+  Contact* contact = watched_contact();
+  const Excess now{held_turn_of(part), contact && !obstacle_motions.empty() ? farthest_obstacle(kept.state) : 0.0};
+  const bool unresolved =
+      (now.turn > 1.0 && lessens(now.turn, rejected.turn)) ||
+      (contact && ((contact->unresolved(dt) && lessens(now.way, rejected.way)) || contact->missed(kept.state.q)));
+  if (unresolved && control.may_subdivide(lengths)) {
+    rejected = now;
+    return Verdict::inaccurate;
+  }
+  const bool euler = options.adaptive && options.integrator == Integrator::backward_euler;
+  if (!unresolved && ((euler && gains_under_pressure()) || (contact && contact_pumps(dt))))
+    return Verdict::gained_energy;
+  return Verdict::easy;
 }
 
 /// Undoes an accepted step.
@@ -161,17 +182,16 @@ void World::Implementation::take_back() {
 
 void World::Implementation::return_to_start() {
   static_cast<Moving&>(*this) = kept;
-  if (tape) tape->cut(taped, state, support_poses());
+  if (tape) tape->cut(kept.taped, state, support_poses());
   apply_ramps(state.time);
 }
 
 /// What only steps that stay may do.
-void World::Implementation::commit_step() {
-  cut_turn = cut_way = 0.0;
+void World::Implementation::commit_step(const PartResult& part) {
   statistics.steps += 1;
   steps_taken += 1;
   if (rule_of_step() == StepRule::energy_momentum) statistics.energy_momentum_steps += 1;
-  statistics.largest_turn = std::max(statistics.largest_turn, turned);
+  statistics.largest_turn = std::max(statistics.largest_turn, part.turn);
   retire_ramps();
 }
 
@@ -187,18 +207,17 @@ double World::Implementation::force_time(double start, double dt) const {
 }
 
 /// One step of the scheme; changes nothing where it does not converge.
-bool World::Implementation::scheme_step(double dt, double& error) {
-  turned = held_turned = 0.0;
-  return options.integrator == Integrator::fourth_order ? composed_step(dt, error) : inner_step(dt, 0, error);
+bool World::Implementation::scheme_step(double dt, PartResult& part) {
+  return options.integrator == Integrator::fourth_order ? composed_step(dt, part) : inner_step(dt, 0, part);
 }
 
-bool World::Implementation::composed_step(double dt, double& error) {
+bool World::Implementation::composed_step(double dt, PartResult& part) {
   const double start = state.time;
   double reached = 0.0;
   try {
     for (std::size_t i = 0; i < kFourthOrderParts.size(); ++i) {
       reached += kFourthOrderParts[i];
-      if (!inner_step(kFourthOrderParts[i] * dt, static_cast<int>(i), error)) {
+      if (!inner_step(kFourthOrderParts[i] * dt, static_cast<int>(i), part)) {
         return_to_start();
         return false;
       }
@@ -213,30 +232,30 @@ bool World::Implementation::composed_step(double dt, double& error) {
 
 /// Asks for loads and for where supports shall be. An explicit step begins with the forces that the last one has ended
 /// with: loads at its end are none of those at its start, from which it would be of first order.
-void World::Implementation::ask_callback(double force_time, double end_time) {
-  if (!callback) return;
+void World::Implementation::call_before_step(double force_time, double end_time) {
+  if (!callbacks.before_step) return;
   if (options.integrator != Integrator::verlet) {
-    callback(force_time, end_time);
+    callbacks.before_step(force_time, end_time);
     return;
   }
   if (!state.acceleration_current) {
-    if (force_function) find_custom_force(state.time, state.q, state.v);
-    find_acceleration(*equations, parameters, at_rest(), end_time - state.time, state, work);
+    if (callbacks.force) find_custom_force(state.time, state.q, state.v);
+    find_acceleration(systems.scheme(), parameters, at_rest(), end_time - state.time, state, systems.work);
   }
   const bool planar = model.planar();
-  callback(force_time, end_time);
+  callbacks.before_step(force_time, end_time);
   state.acceleration_current = planar == model.planar();  // or another model's
 }
 
 /// Asks for what is prescribed, and steps by dt; changes nothing where the step does not converge.
-bool World::Implementation::inner_step(double dt, int slot, double& error) {
+bool World::Implementation::inner_step(double dt, int slot, PartResult& part) {
   const double start = state.time, end = start + dt, middle = force_time(start, dt);
-  ask_callback(middle, end);
+  call_before_step(middle, end);
   const bool ramped = actuated();
   double actuation = 0.0;
   if (ramped) apply_ramps(middle, configuration(), actuation);
   prescribe(end, prescribed);
-  Equations& system = *equations;
+  Equations& system = systems.scheme();
   const auto undo = [&] {
     if (ramped) apply_ramps(start);
   };
@@ -247,7 +266,7 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
     r = step_by_rule(dt, slot);
     for (int tries = 0; r.too_deep && tries < kMostStiffenings; ++tries) {
       dissipated -= system.contact()->stiffen(state, false);
-      work.newton.matrix.owner = nullptr;
+      systems.work.newton.matrix.owner = nullptr;
       r = step_by_rule(dt, slot);
     }
   } catch (...) {
@@ -263,17 +282,17 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
   for (std::size_t s = 0; s < motions.size(); ++s) motions[s].put(prescribed.supports[s]);
   const bool begins = division.first() && slot == 0;
   if (tape) record_step(rule_of_step(), dt, begins);
-  error = r.error;
-  turned = std::max(turned, r.largest_turn);
-  held_turned = std::max(held_turned, prescribed.held.turn);
-  if (rule_of_step() == StepRule::energy_momentum) held_turned = std::max(held_turned, prescribed.held.spin);
+  part.error = r.error;
+  part.turn = std::max(part.turn, r.largest_turn);
+  part.held_turn = std::max(part.held_turn, prescribed.held.turn);
+  if (rule_of_step() == StepRule::energy_momentum) part.held_turn = std::max(part.held_turn, prescribed.held.spin);
   load_work += r.load_work;
   dissipated += r.dissipated;
   support_work += r.support_work;
   contact_guard.put_in = r.pressing_gain;
   keep_reactions(dt, begins);
   if (ramped) {
-    apply_ramps(end, model.planar() ? configuration() : work.after, actuation);
+    apply_ramps(end, model.planar() ? configuration() : systems.work.after, actuation);
     actuation_work += actuation;
   }
   return true;
@@ -282,9 +301,10 @@ bool World::Implementation::inner_step(double dt, int slot, double& error) {
 StepRule World::Implementation::rule_of_step() const { return equation_options(options).rule; }
 
 StepResult World::Implementation::step_by_rule(double dt, int slot) {
-  if (options.integrator == Integrator::verlet) return verlet_step(*equations, parameters, prescribed, dt, state, work);
-  return implicit_step(*equations, *newton, options, parameters, prescribed, {rule_of_step(), dt, slot}, state,
-                       predictor, work);
+  if (options.integrator == Integrator::verlet)
+    return verlet_step(systems.scheme(), parameters, prescribed, dt, state, systems.work);
+  return implicit_step(systems.scheme(), systems.newton(), options, parameters, prescribed, {rule_of_step(), dt, slot},
+                       state, predictor, systems.work);
 }
 
 /// The explicit scheme loses nothing in impacts.

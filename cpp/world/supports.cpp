@@ -36,7 +36,7 @@ SupportMotion World::Implementation::standing(const Support& support) const {
 int World::add_support(const SupportDescription& support) {
   Implementation& self = *implementation_;
   const Implementation backup(self);
-  const Lagged lagged = self.lagged();
+  const Lagged lagged = self.systems.lagged();
   // The first row that a released support has left, so that who clamps and lets go without end needs no more of them.
   const auto& rows = self.model.supports;
   const auto index = static_cast<int>(
@@ -64,8 +64,8 @@ int World::add_support(const SupportDescription& support) {
     self.check_reversible(self.parameters);
   } catch (...) {
     auto before = std::make_unique<Implementation>(backup);
-    before->take_callbacks(self);
-    before->recall(lagged);
+    before->callbacks = self.callbacks;
+    before->systems.recall(lagged);
     implementation_ = std::move(before);
     throw;
   }
@@ -186,9 +186,9 @@ void World::Implementation::note_reactions() {
 }
 
 void World::Implementation::note_residual() {
-  reaction_residual = work.newton.data.full_residual;
-  reaction_place = work.newton.data.z;
-  hand_wrenches = work.newton.data.hands;
+  reaction_residual = systems.work.newton.data.full_residual;
+  reaction_place = systems.work.newton.data.z;
+  hand_wrenches = systems.work.newton.data.hands;
   reaction_current = true;
 }
 
@@ -205,9 +205,9 @@ void World::Implementation::keep_reactions(double dt, bool begins) {
   if (only || model.supports.empty()) return;
   impulses.resize(model.supports.size());
   impulse_time += dt;
-  VectorX& held = work.assumed;
+  VectorX& held = systems.work.assumed;
   held.setZero(model.dof_count);
-  equations->assembler().set_held_part(reaction_residual, held);
+  systems.scheme().assembler().set_held_part(reaction_residual, held);
   for (std::size_t s = 0; s < model.supports.size(); ++s) {
     if (!model.supports[s].active) continue;
     const Wrench found = reaction_of(static_cast<int>(s), held);
@@ -259,7 +259,7 @@ Reaction World::reaction(int support) const {
   self.refresh_reactions();
   Wrench found;
   if (self.impulses.empty()) {
-    found = self.reaction_of(support, self.equations->assembler().held_part(self.reaction_residual));
+    found = self.reaction_of(support, self.systems.scheme().assembler().held_part(self.reaction_residual));
   } else {
     found = self.impulses[at(support)];
     found.force /= self.impulse_time;

@@ -32,7 +32,7 @@ int checked_spring(const Parameters& parameters, int spring) {
 World::World(SceneDescription description, Options options)
     : implementation_(std::make_unique<Implementation>(std::move(description), options)) {}
 World::World(const World& other) : implementation_(std::make_unique<Implementation>(other.accounted())) {
-  implementation_->recall(other.implementation_->lagged());
+  implementation_->systems.recall(other.implementation_->systems.lagged());
 }
 World::~World() = default;
 
@@ -67,7 +67,7 @@ void World::interrupt() { implementation_->interrupted = true; }
 
 const Statistics& World::statistics() const {
   Statistics& s = implementation_->statistics;
-  const Counters& c = implementation_->work.newton.counters;
+  const Counters& c = implementation_->systems.work.newton.counters;
   s.iterations = c.iterations;
   s.evaluations = c.evaluations;
   s.factorizations = c.factorizations;
@@ -125,24 +125,24 @@ void World::advance_to(double time) {
 EquilibriumResult World::equilibrium(Saddles saddles) {
   Implementation& self = *implementation_;
   const Timer timer(self.statistics.total_time);
-  if (self.callback) self.callback(self.state.time, self.state.time);
+  if (self.callbacks.before_step) self.callbacks.before_step(self.state.time, self.state.time);
   return self.equilibrium(0.0, saddles);
 }
 
 void World::set_step_callback(const StepCallback& callback, bool prescribes) {
-  implementation_->prescribes = callback && prescribes;
+  implementation_->callbacks.prescribes = callback && prescribes;
   if (!callback) {
-    implementation_->callback = nullptr;
+    implementation_->callbacks.before_step = nullptr;
     return;
   }
-  implementation_->callback = [this, callback](double force_time, double end_time) {
+  implementation_->callbacks.before_step = [this, callback](double force_time, double end_time) {
     callback(*this, force_time, end_time);
   };
 }
 
-void World::set_poll(const std::function<void()>& poll) { implementation_->poll = poll; }
+void World::set_poll(const std::function<void()>& poll) { implementation_->callbacks.poll = poll; }
 
-void World::set_force_function(const CustomFunction& force) { implementation_->force_function = force; }
+void World::set_force_function(const CustomFunction& force) { implementation_->callbacks.force = force; }
 
 void World::set_load(int load, const Eigen::Ref<const MatrixX3>& values) {
   Implementation& self = *implementation_;
@@ -227,7 +227,7 @@ void World::set_contact(const ContactDescription& contact) {
   wanted.pairs = contact.pairs;
   self.check_impacts(wanted);
   const auto energy = [&] {
-    const Contact* touching = self.equations->contact();
+    const Contact* touching = self.systems.scheme().contact();
     return touching ? touching->energy_of(self.state, self.parameters, self.energy_scratch.contact) : 0.0;
   };
   const double before = energy();
@@ -238,7 +238,7 @@ void World::set_contact(const ContactDescription& contact) {
   const SurfaceParameters& now = self.parameters.surfaces;
   const bool stiffer = now.contact_stiffness != stiffness || now.pair_contact_stiffness.size() != of_pairs.size() ||
                        now.pair_contact_stiffness != of_pairs;
-  if (const Contact* touching = self.equations->contact(); touching && stiffer) {
+  if (const Contact* touching = self.systems.scheme().contact(); touching && stiffer) {
     touching->take_given_stiffness(self.state, self.parameters);
     VectorX before_of_pairs = VectorX::Zero(now.pair_contact_stiffness.size());
     const Eigen::Index known = std::min(of_pairs.size(), before_of_pairs.size());
@@ -269,7 +269,7 @@ void World::set_friction_shares(int pair, const VectorX& shares) {
   ContactPairDescription wanted = own;
   wanted.shares = shares;
   self.check_shares(wanted);
-  const Contact* contact = self.equations->contact();
+  const Contact* contact = self.systems.scheme().contact();
   // What anchors hold changes with the coefficients that they are made of.
   const bool stores = contact && contact->anchored();
   const auto energy = [&] {
@@ -284,7 +284,7 @@ void World::set_friction_shares(int pair, const VectorX& shares) {
     update_derived(self.model, Derived::nothing, 0, self.parameters);
     self.state.acceleration_current = false;
     for (const System which : kSystems)
-      if (Equations* known = self.system(which); known && known->contact())
+      if (Equations* known = self.systems.find(which); known && known->contact())
         known->contact()->set_parameters(self.parameters);
   } else {
     self.take_contact();
@@ -302,7 +302,7 @@ void World::Implementation::take_contact() {
   plan_current = false;
   bool remade = false;
   for (const System which : kSystems) {
-    Equations* known = system(which);
+    Equations* known = systems.find(which);
     if (!known || !known->contact()) continue;
     const bool frictional = known->contact()->frictional();
     known->contact()->set_parameters(parameters);

@@ -16,6 +16,7 @@
 #include "gradients/tape.hpp"
 #include "integrators/options.hpp"
 #include "model/parameter_index.hpp"
+#include "run/warnings.hpp"
 
 namespace withe {
 
@@ -73,21 +74,6 @@ struct LeftRing {
 struct Momentum {
   Vector3 linear = Vector3::Zero();   ///< [kg m/s]
   Vector3 angular = Vector3::Zero();  ///< about the origin [kg m^2/s]
-};
-
-/// What is wrong with how a scene is run, each said once; empty where nothing is, or where it was heard.
-struct Warnings {
-  std::string mesh;      ///< it is too coarse for the motion
-  std::string steps;     ///< they are too long for it
-  std::string impact;    ///< they are too long for one
-  std::string branch;    ///< a static step has left it
-  std::string plane;     ///< an equilibrium in it is not stable against motions out of it
-  std::string drift;     ///< the integrator changes the energy
-  std::string crossing;  ///< rods pass through each other
-  std::string squeeze;   ///< obstacles squeeze a rod by a stiffness of contact that is not given
-
-  /// Takes what is not said yet from others.
-  void add(const Warnings& other);
 };
 
 struct EquilibriumResult {
@@ -316,7 +302,8 @@ class World {
   /// edges meet there. All rods together have what the scene has, but for loads, contact and the energy balance.
   Energy rod_energy(int rod) const;
   Momentum momentum() const;
-  Warnings take_warnings();  ///< what has not been heard yet
+  /// Warnings since they were last taken.
+  Warnings take_warnings();
   ContactTable contacts() const;
   Linearisation linearise() const;
 

@@ -106,15 +106,16 @@ void register_results(py::module_& module) {
       .def_readwrite("twists", &RodState::twists)
       .def_readwrite("velocities", &RodState::velocities)
       .def_readwrite("spins", &RodState::spins);
+  const auto warning = [](Warning kind) { return [kind](const Warnings& all) { return all[kind]; }; };
   py::class_<Warnings>(module, "Warnings", "What is wrong with how a scene is run; empty where nothing is.")
-      .def_readonly("mesh", &Warnings::mesh)
-      .def_readonly("steps", &Warnings::steps)
-      .def_readonly("impact", &Warnings::impact)
-      .def_readonly("branch", &Warnings::branch)
-      .def_readonly("drift", &Warnings::drift)
-      .def_readonly("crossing", &Warnings::crossing)
-      .def_readonly("squeeze", &Warnings::squeeze)
-      .def_readonly("plane", &Warnings::plane);
+      .def_property_readonly("mesh", warning(Warning::mesh))
+      .def_property_readonly("steps", warning(Warning::steps))
+      .def_property_readonly("impact", warning(Warning::impact))
+      .def_property_readonly("branch", warning(Warning::branch))
+      .def_property_readonly("drift", warning(Warning::drift))
+      .def_property_readonly("crossing", warning(Warning::crossing))
+      .def_property_readonly("squeeze", warning(Warning::squeeze))
+      .def_property_readonly("plane", warning(Warning::plane));
   py::class_<Linearisation>(module, "Linearisation", "Equations linearised about the present configuration.")
       .def_property_readonly("geometric", [](const Linearisation& self) { return self.geometric; })
       .def_property_readonly("gradients", [](const Linearisation& self) { return self.gradients; })

@@ -244,7 +244,7 @@ struct Walk {
     const double past = 0.02 * kept * 2.0 * farthest(model, change);  // seen at a hundred points
     bool reached = kept == 1.0;
     for (const ContactPair& pair : pairs) {
-      const double least = std::min(kNearest * distance(pair, 0.0), pair.nearest());
+      const double least = std::min(kMinDistance * distance(pair, 0.0), pair.nearest());
       double nearest = INFINITY;
       for (int k = 1; k <= (kept < 1.0 ? 100 : 20); ++k)
         nearest = std::min(nearest, distance(pair, kept * k / (kept < 1.0 ? 100.0 : 20.0)));
