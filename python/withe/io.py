@@ -39,7 +39,7 @@ _POSE_COLUMNS = ("t", "x", "y", "z", "qx", "qy", "qz", "qw")
 
 @contextmanager
 def written_beside(path: Path) -> Iterator[Path]:
-    """Where to write what shall become a file: beside it, and in its place only when it is whole.
+    """Return a path beside a file to write to; the file is replaced only when it is complete.
 
     Whatever ends the writing early, a full disk or Ctrl-C, leaves what was there before.
 
@@ -193,7 +193,7 @@ def save_json(path: str | os.PathLike[str], kind: str, version: int, content: Ma
 def load_json(
     path: str | os.PathLike[str], kind: str, version: int, read: Callable[[dict[str, Any]], Content]
 ) -> Content:
-    """What `read` makes of the content that `save_json` wrote.
+    """Return the content that `save_json` wrote, converted by `read`.
 
     Raises
     ------

@@ -70,7 +70,7 @@ class Lanes:
         return part
 
     def nodes(self, rod: int) -> int:
-        """How many nodes a rod has."""
+        """Return the number of nodes of a rod."""
         return self._nodes[rod]
 
     def voronoi(self, rod: RodPart) -> FloatArray:
@@ -113,7 +113,7 @@ class Lanes:
 
     @property
     def numbers(self) -> IntArray:
-        """Of all simulations."""
+        """Return the numbers of all simulations."""
         return self._all
 
     def each(self, numbers: IntArray) -> Iterator[tuple[int, Simulation]]:
@@ -138,12 +138,12 @@ class Lanes:
             simulation._stepping.refuse_in_run(what)
 
     def gathered(self, read: Callable[[Simulation], Any]) -> Any:
-        """What every simulation answers, stacked."""
+        """Return the read-outs of all simulations, stacked."""
         return stacked([read(simulation) for simulation in self.simulations])
 
 
 def row(value: Any, index: int, count: int, what: str) -> Any:
-    """What one simulation gets of a value: its row of an array; numbers, words, functions and None are for all.
+    """Return one simulation's share of a value: its row of an array; numbers, words, functions and None are for all.
 
     Raises
     ------
@@ -172,7 +172,7 @@ def stacked(answers: list[Any]) -> Any:
 
 
 def output(out: FloatArray | None, shape: tuple[int, ...]) -> FloatArray:
-    """Where to put a read-out: the user's array, or a new one.
+    """Return the array for a read-out: the user's, or a new one.
 
     Raises
     ------

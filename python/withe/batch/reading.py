@@ -1,4 +1,4 @@
-"""What may be read of a batch: the read-outs of `Simulation` with one more axis in front."""
+"""Read-outs of a batch: those of `Simulation` with one more axis in front."""
 
 from __future__ import annotations
 

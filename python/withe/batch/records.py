@@ -1,4 +1,4 @@
-"""What a batch's runs and equilibria leave: those of every simulation, and arrays with one more axis in front."""
+"""Records and equilibria of batches: those of every simulation, and arrays with one more axis in front."""
 
 from __future__ import annotations
 
@@ -122,12 +122,12 @@ class Equilibria(Sequence[Equilibrium]):
 
     @property
     def stable(self) -> npt.NDArray[np.bool_]:
-        """Whether each is stable, shape (n,); false where none was found."""
+        """Return True for each stable equilibrium, shape (n,); False if none was found."""
         return np.array([each is not None and each.stable for each in self._found])
 
     @property
     def branch_changed(self) -> npt.NDArray[np.bool_]:
-        """Whether each lies on another branch than the state before, shape (n,)."""
+        """Return True for each equilibrium on another branch than the state before, shape (n,)."""
         return np.array([each is not None and each.branch_changed for each in self._found])
 
     @property

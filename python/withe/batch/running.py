@@ -29,7 +29,7 @@ class Stepped(Protocol):
 
     @property
     def time_step(self) -> float:
-        """Of all simulations [s]."""
+        """Return the time step of all simulations [s]."""
 
 
 B = TypeVar("B", bound=Stepped)

@@ -1,4 +1,4 @@
-"""What drives the simulations of a batch: the methods of `Simulation` that set, with a row for each simulation."""
+"""Actuation and parameters of a batch: the methods of `Simulation` that set, with a row for each simulation."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What every folder uses: checks of user input, hints, geometry of polylines, recorded frames, extras, the bar."""
+"""Tools for every folder: checks of user input, hints, geometry of polylines, recorded frames, extras, the bar."""

@@ -66,7 +66,7 @@ SIMULATION_WORDS = frozenset(
         "wrench",
     ]
 )
-"""What a simulation has, and new users ask of scenes and of handles."""
+"""Attributes of a simulation that new users look for on scenes and handles."""
 
 
 def of_a_simulation(owner: str, name: str, call: str) -> AttributeError:

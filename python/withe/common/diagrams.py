@@ -69,7 +69,7 @@ def closed_far_away(points: FloatArray) -> FloatArray:
 
 
 def diagram(points: FloatArray) -> Diagram:
-    """Of a closed curve, shape (n, 3), the view with the fewest crossings of some."""
+    """Return the view of a closed curve, shape (n, 3), with the fewest crossings among some views."""
     random = np.random.default_rng(_VIEW_SEED)
     found = None
     for _ in range(_VIEWS):

@@ -9,7 +9,7 @@ __all__ = ["require"]
 
 
 def _how(extra: str) -> str:
-    """How to install an extra: the package is on no index, so from a clone."""
+    """Return the command that installs an extra from a clone, because the package is on no index."""
     return f'in a clone of withe, run pip install ".[{extra}]"' + (" or make view" if extra == "view" else "")
 
 

@@ -48,7 +48,7 @@ class Frames(Protocol):
 
     @property
     def times(self) -> FloatArray:
-        """Of the frames, shape (frames,) [s]."""
+        """Times of the frames, shape (frames,) [s]."""
 
     @property
     def rods(self) -> tuple[RodOutline, ...]:
@@ -67,10 +67,10 @@ class Frames(Protocol):
         """In the order of the scene."""
 
     def positions(self, rod: Named | None = None) -> FloatArray:
-        """Of the nodes of a rod, or of all, shape (frames, nodes, 3) [m]."""
+        """Positions of the nodes of a rod, or of all, shape (frames, nodes, 3) [m]."""
 
     def velocities(self, rod: Named | None = None) -> FloatArray:
-        """Of the nodes of a rod, or of all, shape (frames, nodes, 3) [m/s]."""
+        """Velocities of the nodes of a rod, or of all, shape (frames, nodes, 3) [m/s]."""
 
     def directors(self, rod: Named) -> FloatArray:
         """Material frames of the edges, shape (frames, edges, 3, 3), rows d1, d2, tangent."""
@@ -85,7 +85,7 @@ class Frames(Protocol):
         """Axial forces of the edges, shape (frames, edges) [N]."""
 
     def obstacle_position(self, obstacle: Named) -> FloatArray:
-        """Of the point of a plane, a sphere's centre, a capsule's start, shape (frames, 3) [m]."""
+        """Positions of an obstacle: a plane's point, a sphere's centre or a capsule's start, shape (frames, 3) [m]."""
 
     def energy(self) -> EnergyHistory:
         """Every one an array of shape (frames,) [J]."""

@@ -162,7 +162,7 @@ def _hinted(function: Callable[..., Any], name: str) -> Any:
 
 
 def _explained(function: Callable[..., Any], name: str, given: int, keywords: Collection[str]) -> str | None:
-    """What is wrong with the arguments of a call, `given` of them by position; None where Python says it best."""
+    """Explain an error in the arguments of a call, `given` of them by position; None where Python says it best."""
     parameters = list(inspect.signature(function).parameters.values())
     kinds = [each.kind for each in parameters]
     takes_any = inspect.Parameter.VAR_KEYWORD in kinds
@@ -184,7 +184,7 @@ def _explained(function: Callable[..., Any], name: str, given: int, keywords: Co
 
 
 def _meant(word: str, known: list[str]) -> str:
-    """What may have been meant by a word, as the end of a sentence; else all that there is."""
+    """Return the likely meaning of a word, as the end of a sentence; else all known words."""
     if word in _COUNTED_OTHERWISE and _COUNTED_OTHERWISE[word][0] in known:
         return f"did you mean {_COUNTED_OTHERWISE[word][1]}?"
     near = [ours for ours in _ELSEWHERE.get(word, ()) if ours in known] or get_close_matches(word.lower(), known, 1)

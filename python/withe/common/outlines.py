@@ -1,4 +1,4 @@
-"""What pictures and files need to know of rods, obstacles, springs and tendons besides their motion."""
+"""Outlines of rods, obstacles, springs and tendons for pictures and files, without their motion."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Named = str | HasName
 
 @dataclass(frozen=True)
 class RodOutline:
-    """What pictures and files need to know of a rod besides its motion.
+    """Outline of a rod for pictures and files, without its motion.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class RodOutline:
 
 @dataclass(frozen=True)
 class ObstacleOutline:
-    """What pictures need to know of an obstacle besides its motion.
+    """Outline of an obstacle for pictures, without its motion.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ class ObstacleOutline:
 
 @dataclass(frozen=True)
 class SpringOutline:
-    """What pictures need to know of a spring besides the motion of its nodes.
+    """Outline of a spring for pictures, without the motion of its nodes.
 
     Attributes
     ----------
@@ -95,7 +95,7 @@ class SpringOutline:
 
 @dataclass(frozen=True)
 class TendonOutline:
-    """What pictures and read-outs need to know of a tendon besides the motion of its rods.
+    """Outline of a tendon for pictures and read-outs, without the motion of its rods.
 
     Attributes
     ----------
@@ -111,7 +111,7 @@ class TendonOutline:
     offsets: FloatArray
 
     def points(self, positions: Mapping[int, FloatArray], directors: Mapping[int, FloatArray]) -> FloatArray:
-        """Where its guides are, from nodes and directors of its rods.
+        """Return the positions of the guides, from nodes and directors of the rods.
 
         Parameters
         ----------

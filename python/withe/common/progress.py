@@ -34,12 +34,12 @@ class Progress:
 
     @property
     def completed(self) -> float:
-        """What is done so far, in the units of the total; never above it."""
+        """Return the completed part in the units of the total, never above the total."""
         return min(self._completed, self.total)
 
     @property
     def fraction(self) -> float:
-        """What is done so far, from 0 to 1."""
+        """Return the completed part, from 0 to 1."""
         return self.completed / self.total if self.total > 0.0 else 1.0
 
     def advance(self, amount: float) -> None:

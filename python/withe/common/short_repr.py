@@ -1,4 +1,4 @@
-"""How results that hold arrays show themselves."""
+"""Short representations of results that hold arrays."""
 
 from __future__ import annotations
 

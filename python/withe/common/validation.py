@@ -129,7 +129,7 @@ def near_word(value: str, options: Iterable[str]) -> str | None:
 
 
 def file_path(value: str | os.PathLike[str], *suffixes: str, instead: str = "") -> Path:
-    """Where a file is to be written, whose suffix says what is in it; `instead` names the way to other formats."""
+    """Return the path of a file to write, with a suffix for its format; `instead` names the way to other formats."""
     path = Path(value)
     if path.suffix.lower() not in suffixes:
         raise ValueError(f"path must end in {' or '.join(suffixes)}, got {str(path)!r}{instead and f'; {instead}'}")
@@ -174,7 +174,7 @@ def number_array(value: Any, what: str, *shapes: tuple[int | str, ...]) -> Float
 
 
 def _raw_numbers(value: Any, what: str, shapes: tuple[tuple[int | str, ...], ...]) -> npt.NDArray[Any]:
-    """What is given as an array of numbers in one of several shapes; they may be of any type, and not finite."""
+    """Return a value as an array of numbers in one of several shapes; they may be of any type, and not finite."""
     wanted = " or ".join(_shape(shape) for shape in shapes)
     if has_masked(value):
         raise ValueError(f"{what} must have a value everywhere, got a masked array with masked entries")
@@ -196,7 +196,7 @@ def _raw_numbers(value: Any, what: str, shapes: tuple[tuple[int | str, ...], ...
 
 
 def _in_range(values: FloatArray) -> bool:
-    """Whether all are finite and not too large, for certain. Unlike `dot`, `vdot` never warns.
+    """Return True if all are finite and not too large, for certain. Unlike `dot`, `vdot` never warns.
 
     From 10,001 numbers on it takes threads of its own, which then spin for a while on processors that others need.
     """
@@ -221,7 +221,7 @@ def broadcast_arrays(**values: Any) -> tuple[FloatArray, ...]:
 
 
 def has_masked(value: Any) -> bool:
-    """Whether entries of a masked array, or of a sequence of such, are masked: NumPy would take what is under the mask.
+    """Return True if entries of a masked array, or of a sequence of such, are masked: NumPy would use hidden values.
 
     Parameters
     ----------
@@ -319,7 +319,7 @@ def quaternion_matrix(quaternion: FloatArray, what: str) -> FloatArray:
 
 
 def is_scalar(value: Any) -> bool:
-    """Whether a value stands for itself, and not for several."""
+    """Return True if a value is a single one, not several."""
     try:
         return np.ndim(value) == 0
     except (ValueError, TypeError):  # lists of unequal length

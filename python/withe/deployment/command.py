@@ -110,7 +110,7 @@ def _points(path: Path) -> npt.NDArray[np.float64]:
 
 
 def _unit(head: str) -> float:
-    """Of a column whose head may end in one, 'x [mm]', 'x (mm)', 'x_mm' or 'x/mm' [m]."""
+    """Unit of a column whose head may end in one, 'x [mm]', 'x (mm)', 'x_mm' or 'x/mm' [m]."""
     found = re.search(r"[\[(_/\s]\s*([^\W\d_]+)\s*[\])]?\s*\"?\s*$", head)
     if found is None:
         return 1.0

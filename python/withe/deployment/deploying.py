@@ -31,7 +31,7 @@ _CURVATURE, _OFFSET, _TURN = 0.5, 5e-4, np.radians(0.5)  # [1/m], [m], [rad]
 
 @dataclass(frozen=True, eq=False)
 class Deployment:
-    """How a cable came to lie.
+    """Result of a deployment: the laid cable.
 
     Attributes
     ----------
@@ -253,7 +253,7 @@ def trial_cable(cable: Cable, seed: int, noise: float = 1.0) -> Cable:
 
 @keyword_hints
 def hang(cable: Cable, *, nodes: int = 200) -> FloatArray:
-    """How a cable hangs in the rod engine from a jaw at its end, at rest: what a camera sees before it is laid.
+    """Return the shape in which a cable hangs from a jaw at its end, at rest, as a camera would see it.
 
     Parameters
     ----------
@@ -282,7 +282,7 @@ def _require_plan(plan: object) -> None:
 
 
 def _drawn(seed: int, noise: float) -> FloatArray:
-    """What a trial has, in standard deviations."""
+    """Deviations of a trial, in standard deviations."""
     return noise * np.random.default_rng(validation.integer(seed, "seed", 0, 2**63 - 1)).normal(size=DRAWN)
 
 
@@ -307,7 +307,7 @@ def drawn_setup(
     quasi_static: bool,
     rolling_friction: float = ROLLING_FRICTION,
 ) -> Setup:
-    """What is there in a trial, from `DRAWN` numbers of standard normal distribution, times the noise."""
+    """Setup of a trial, from `DRAWN` numbers of standard normal distribution, times the noise."""
     return Setup(
         cable=replace(_cable_of(cable, drawn), length=plan.cable.length),
         friction=friction * float(np.exp(_FRICTION * drawn[1])),

@@ -1,4 +1,4 @@
-"""What friction it takes to lay a cable along a pattern."""
+"""Friction that is needed to lay a cable along a pattern."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ class Feasibility:
 
     @property
     def feasible(self) -> bool:
-        """Whether friction holds the cable all along."""
+        """Return True if friction holds the cable everywhere."""
         return not self.slips
 
     def __str__(self) -> str:
@@ -127,7 +127,7 @@ class Feasibility:
 
 
 class Laid(Protocol):
-    """What a cable is laid along: arc lengths [m] and curvatures there [1/m]."""
+    """Path of a laid cable: arc lengths [m] and curvatures there [1/m]."""
 
     @property
     def arc_length(self) -> FloatArray: ...
@@ -151,7 +151,7 @@ class Curve(Laid, Protocol):
 def examine(
     pattern: Curve, cable: Cable, friction: float, controller: Controller, force: FloatArray | None = None
 ) -> Feasibility:
-    """What `Pattern.feasibility` does; `force` of the grasps there, shape (nodes, 3), where it is known."""
+    """Return `Pattern.feasibility`; `force`: forces of the grasps, shape (nodes, 3), if known."""
     friction = validation.positive(friction, "friction")
     if friction > _PER_CENT:
         raise ValueError(f"friction must be at most {_PER_CENT:g}, got {friction:g}: is it in per cent?")

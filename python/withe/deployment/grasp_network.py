@@ -31,7 +31,7 @@ _NAMES = ("x", "y", "z", "ex", "ey", "ez")
 
 
 def side(module: Any, curvature: Any) -> Any:
-    """What is odd in curvature over what the small network learns of it, so that straight rods are laid straight."""
+    """Odd factor in curvature of the outputs, so that straight rods are laid straight."""
     return module.tanh(curvature)
 
 
@@ -87,7 +87,7 @@ FORMS = {
 
 
 class GraspNetwork(Surrogate):
-    """What a network has learned of grasps that lay a rod. `train` makes one, `load` reads one.
+    """Network that predicts grasps that lay a rod. `train` makes one, `load` reads one.
 
     Its answers are those of `grasp(suspended, curvature, stretch_stiffness)`, about right, and mirrored for negative
     curvature.

@@ -1,4 +1,4 @@
-"""Where to hold a rod so that it is laid down where it should lie."""
+"""Grasps: poses of a jaw that lays a rod down in its place."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ TWIST_STIFFNESS = _BEND_STIFFNESS / 1.5  # GJ of a round rod of incompressible m
 
 @dataclass(frozen=True, eq=False)
 class Grasp:
-    """How a gripper holds the suspended part of a rod. The arrays have the shape of what was asked for, then (3,).
+    """Grasp of the suspended part of a rod. The arrays have the shape of the arguments, then (3,).
 
     The frame is that of the lift-off point: x the direction in which the rod leaves the floor, z up.
 

@@ -1,4 +1,4 @@
-"""How a cable that is bent by itself hangs from its jaw, and what that tells of it."""
+"""Hanging cables: their natural curvature from how they hang."""
 
 from __future__ import annotations
 

@@ -55,7 +55,7 @@ class Path:
 
     @property
     def length(self) -> float:
-        """How far the lift-off point goes [m]."""
+        """Return the length of the path of the lift-off point [m]."""
         return float(self.arc_length[-1])
 
 
@@ -116,7 +116,7 @@ class Piece:
     laying: bool = False
 
     def duration(self, speed: float) -> float:
-        """How long it takes at a speed [m/s], in s."""
+        """Return the duration at a speed [m/s], in s."""
         if not self.laying:  # a quintic's greatest speed is 1.875 times its mean, and its acceleration 10 / 3^.5
             gentle = np.sqrt(10.0 / np.sqrt(3.0) * self.reach / _ACCELERATION)
             return max(1.0, 1.875 * self.reach / speed, float(gentle))

@@ -161,7 +161,7 @@ def optimised(
 
 
 def runs(path: Path, cable: Cable, pattern: Pattern) -> int:
-    """How many runs of the engine it takes at most."""
+    """Return the greatest number of runs of the engine."""
     knots = len(_centres(path, pattern, _KNOTS * cable.gravito_bending_length))
     return 2 + _ROUNDS * (min(knots, _COLOURS) + _STEPS)
 

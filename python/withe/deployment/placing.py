@@ -87,7 +87,7 @@ def require_room(posts: Sequence[Post], pattern: Pattern, cable: Cable) -> None:
 
 
 def passed(posts: Sequence[Post], pattern: Pattern, cable: Cable, laid: FloatArray) -> npt.NDArray[np.bool_]:
-    """Whether the laid cable passes each post on the same side as its pattern, and lies on the floor beside it.
+    """Return True for each post that the laid cable passes on the side of its pattern, on the floor.
 
     What lies between pattern and cable then does not go round the post: the winding number is zero.
 

@@ -354,7 +354,7 @@ def _needed(pattern: Pattern, cable: Cable, controller: Controller, grasps: Gras
 
 
 def _slips(pattern: Pattern, needed: FloatArray, friction: float) -> str:
-    """How much of a pattern needs more friction than there is, and most where."""
+    """Describe the share of a pattern that needs more friction, and the place that needs most."""
     share, most = 100.0 * float((needed > friction).mean()), int(needed.argmax())
     where = f"{needed[most]:.2f} at {1e3 * pattern.arc_length[most]:.0f} mm"
     return f"the cable slips: {share:.0f} % of the pattern needs more than friction {friction:g}, at most {where}"
@@ -367,7 +367,7 @@ def _worst_slip(found: Feasibility) -> Slip | None:
 
 
 def _missing_tail(pattern: Pattern, cable: Cable, controller: Controller, worst: Slip) -> str:
-    """What a tail of the usual length would change, if a floor would hold the pattern with it."""
+    """Describe the effect of a tail of the usual length, if friction would then be enough."""
     lgb = cable.gravito_bending_length
     usual, there = _TAIL * lgb, cable.length - pattern.length
     longer = replace(cable, length=pattern.length + usual)

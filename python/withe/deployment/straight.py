@@ -20,7 +20,7 @@ _ANGLE_STEP = 0.1  # [rad] between the rays that outline the region
 
 @dataclass(frozen=True)
 class StraightPose:
-    """How a jaw holds a rod that leaves the floor straight. All arrays have the shape of what was asked for.
+    """Pose of a jaw that holds a rod which leaves the floor straight. Arrays have the shape of the arguments.
 
     Where `valid` is False the other numbers are NaN, and `stable` is False.
 

@@ -31,7 +31,7 @@ _LEG = 2.0  # [s] from point to point
 
 @dataclass(frozen=True)
 class Move:
-    """What one gripper does: it takes a cable, carries it from point to point, and lets go.
+    """Move of one gripper: it takes a cable, carries it from point to point, and lets go.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ class Move:
 
 @dataclass(frozen=True)
 class Tying:
-    """How cables came to lie.
+    """Result of tying: the laid cables.
 
     Attributes
     ----------

@@ -31,7 +31,7 @@ _RECORD_EVERY = 0.1  # [s]
 
 
 class Motion(Protocol):
-    """What the world is told: where a jaw holds the end of a cable, when."""
+    """Motion of the jaw that holds the end of a cable."""
 
     @property
     def times(self) -> FloatArray:
@@ -48,7 +48,7 @@ class Motion(Protocol):
 
 @dataclass(frozen=True)
 class Setup:
-    """What is there: the cable up to the jaw, the floor, and what is not as it should be."""
+    """Setup of the world: the cable up to the jaw, the floor, and deviations."""
 
     cable: Cable
     friction: float
@@ -63,7 +63,7 @@ class Setup:
 
     @property
     def arc_length(self) -> FloatArray:
-        """Of each node, from the free end to the far side of the jaw, whose middle is at the cable's length [m]."""
+        """Return the arc length of each node, from the free end to the far side of the jaw [m]."""
         return np.linspace(0.0, self.cable.length + 0.5 * JAW, self.nodes)
 
 

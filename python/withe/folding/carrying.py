@@ -47,7 +47,7 @@ class Watch:
         self.failure: str | None = None
 
     def __call__(self, simulation: Simulation) -> bool:
-        """Whether it is over."""
+        """Return True if the fold is over."""
         speed = max(float((simulation.velocities(rod) ** 2).sum(axis=1).max()) for rod in self._rods) ** 0.5
         curvature = max(float(np.abs(simulation.curvatures(rod)).max()) for rod in self._rods)
         self.max_speed = max(self.max_speed, speed)

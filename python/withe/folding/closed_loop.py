@@ -134,7 +134,7 @@ def fold(
 
 
 def _slide(sheet: SimulatedSheet | WideSheet, camera: Camera, plan: Plan, pose: FloatArray) -> float:
-    """How far the sheet has slid, as a camera sees it; NaN where its far edge is hidden.
+    """Return the slide of the sheet, as a camera sees it; NaN if its far edge is hidden.
 
     The lifted edge, at a pose of the jaw, has corners like those of the far edge, and hides these in the end.
     """

@@ -73,13 +73,13 @@ class Holding:
         return worst
 
     def has_room(self, sheet: Elastica, least: float = -1e-9) -> npt.NDArray[np.bool_]:
-        """Whether an edge that looks back is over the table by what the fingers need, and more than `least`."""
+        """Return True if an edge that looks back is over the table by more than the fingers need and `least`."""
         x, room = self.outer(sheet)
         above = np.clip(_SLOPE * (self.goal - x), 0.0, self.clearance)
         return np.asarray((sheet.angle <= 0.5 * np.pi) | (room >= least + above))
 
     def bearable(self, sheet: Elastica) -> npt.NDArray[np.bool_]:
-        """Whether the sheet can be there, the jaw too, and is not bent too far."""
+        """Return True if sheet and jaw can be there, and the sheet is not bent too far."""
         fits = (sheet.suspended < self.length) & (sheet.angle < _STEEPEST) & (sheet.max_curvature <= self.curvature)
         return sheet.valid & sheet.stable & fits & self.has_room(sheet)
 

@@ -1,4 +1,4 @@
-"""How stiff a sheet is against its own weight, from how far a strip of it droops."""
+"""Stiffness of a sheet against its own weight, from the droop of a strip."""
 
 from __future__ import annotations
 

@@ -74,7 +74,7 @@ def _by_ratio(solve: Manifold, holding: Holding) -> Network:
 
 
 def connects(solve: Manifold, holding: Holding, goal: Elastica) -> bool:
-    """Whether there is a path from flat to a goal at all."""
+    """Return True if there is a path from flat to a goal."""
     label = _parts(solve, holding)
     return bool((label[nodes_near(_by_ratio(solve, holding), goal)] == label[0]).any())
 

@@ -1,4 +1,4 @@
-"""What a simulated sheet and its robot have that nobody told the planner."""
+"""Noise: deviations of a simulated sheet and its robot that the planner does not know."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ class Drawn:
         return np.asarray(np.maximum(0.0, self.friction * (1.0 + share)))
 
     def off(self, time: float, share: float) -> FloatArray:
-        """How far the jaw is from where it should be, (x, z [m], angle [rad]); `share` of it has come in."""
+        """Return the error of the jaw, (x, z [m], angle [rad]); `share` of it has come in."""
         amplitude, frequency, phase = self.waves[..., 0], self.waves[..., 1], self.waves[..., 2]
         if not amplitude.any():
             return share * self.shift

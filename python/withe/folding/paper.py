@@ -77,13 +77,13 @@ class Paper:
                 raise ValueError(f"{name} must be at most {what}, got {value:g} m: are all sizes in metres?")
 
     def width_at(self, place: npt.ArrayLike) -> FloatArray:
-        """How wide it is [m] at distances from the lifted edge [m]."""
+        """Return the width [m] at distances from the lifted edge [m]."""
         shares, widths = np.array(self.outline).T
         return np.asarray(self.width * np.interp(np.asarray(place, dtype=float) / self.length, shares, widths))
 
     @property
     def is_strip(self) -> bool:
-        """Whether it is as wide everywhere."""
+        """Return True if the width is uniform."""
         return all(width == 1.0 for _, width in self.outline)
 
     @classmethod

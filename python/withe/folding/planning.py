@@ -35,7 +35,7 @@ _CLEARANCE = 2e-3  # [m] of an edge on its way over the sheet
 
 @dataclass(frozen=True)
 class _Task:
-    """What was asked for, checked."""
+    """Checked arguments of a plan."""
 
     paper: Paper
     target: float
@@ -52,17 +52,17 @@ class _Task:
 
     @property
     def length(self) -> float:
-        """Of the sheet beyond the jaw [Lgb]."""
+        """Return the length of the sheet beyond the jaw [Lgb]."""
         return (self.paper.length - self.jaw.depth) / self.paper.gravito_bending_length
 
     @property
     def width(self) -> Width:
-        """Of what hangs freely."""
+        """Return the width of the freely hanging part."""
         return free_width(self.paper, self.jaw.depth)
 
     @property
     def solve(self) -> Manifold:
-        """How equilibria without moment are found."""
+        """Return the solver of equilibria without moment."""
         return Manifold(self.width, learned=self.manifold == "network")
 
     @property

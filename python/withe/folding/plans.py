@@ -121,7 +121,7 @@ class Plan:
 
     @cached_property
     def _width(self) -> Width:
-        """Of what hangs freely."""
+        """Return the width of the freely hanging part."""
         return free_width(self.paper, self.jaw.depth)
 
     @cached_property
@@ -162,7 +162,7 @@ class Plan:
 
     @property
     def sheet(self) -> Elastica:
-        """How the sheet hangs at each pose [Lgb], [w Lgb]: as planned, without slide, or else as predicted."""
+        """Return the hanging sheet at each pose [Lgb], [w Lgb]: as planned, without slide, or else as predicted."""
         return self._motion[0] if self._foreseen is None else self._foreseen
 
     @cached_property
@@ -179,7 +179,7 @@ class Plan:
 
     @cached_property
     def slide(self) -> FloatArray:
-        """How far the sheet has slid towards +x at each pose [m], of shape (n,), since the plan was made.
+        """Return the slide of the sheet towards +x at each pose [m], shape (n,), since the plan was made.
 
         Predicted with exact elastica, what lies as a rigid body, and Coulomb's law with the friction of the paper, for
         a sheet without inertia; NaN from `jumps_at` on.
@@ -187,7 +187,7 @@ class Plan:
         return self.slide_of(self.paper)
 
     def slide_of(self, paper: Paper) -> FloatArray:
-        """How far another paper slides on these poses [m], of shape (n,), as `slide` says of the plan's.
+        """Return the slide of another paper on these poses [m], shape (n,), as `slide` for the plan's.
 
         Parameters
         ----------
@@ -229,7 +229,7 @@ class Plan:
 
     @property
     def papers(self) -> list[Paper]:
-        """What the paper may be within `uncertainty`: as it is thought to be, and the bounds.
+        """Return the papers within `uncertainty`: the estimate, and the bounds.
 
         Lgb less and more, with the least friction and with the paper's; five papers, fewer where a share is 0.
         """

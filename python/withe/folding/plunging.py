@@ -59,7 +59,7 @@ class _Tried:
 
     @property
     def snapped(self) -> bool:
-        """Whether it snaps before a plunge could begin."""
+        """Return True if the sheet snaps before a plunge could begin."""
         return self._held is None
 
     def missed(self, way: Part, aside: float = 0.0) -> tuple[float, float]:

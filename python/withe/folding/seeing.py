@@ -1,4 +1,4 @@
-"""Where a sheet lies, in a picture from above."""
+"""Places of sheets in pictures from above."""
 
 from __future__ import annotations
 

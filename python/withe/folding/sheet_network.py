@@ -78,7 +78,7 @@ FORMS = {
 
 
 class SheetNetwork(Surrogate):
-    """What a network has learned of sheets that hang from a jaw without moment. `train` makes one, `load` reads one.
+    """Network that predicts sheets which hang from a jaw without moment. `train` makes one, `load` reads one.
 
     Its answers are those of `elastica(x, z)`, about right. It cannot say that a sheet touches the table elsewhere,
     so it also answers at x > 9.1, z < 0.8, where `elastica` refuses most positions for that.
@@ -99,7 +99,7 @@ class SheetNetwork(Surrogate):
     LEARNED = "sheets"
 
     def __call__(self, x: npt.ArrayLike, z: npt.ArrayLike) -> Elastica:
-        """How sheets hang whose tips are at positions.
+        """Return hanging sheets with tips at positions.
 
         Parameters
         ----------

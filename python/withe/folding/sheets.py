@@ -39,7 +39,7 @@ _LEAST_SHARE = 500  # sheets that are worth a thread of their own
 
 @dataclass(frozen=True, eq=False)
 class Elastica:
-    """How a sheet hangs, pose by pose. All arrays have the shape of what was asked for.
+    """Hanging sheets, pose by pose. All arrays have the shape of the arguments.
 
     Where `valid` is False the other numbers are NaN, and `stable` is False.
 

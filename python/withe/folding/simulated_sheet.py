@@ -42,7 +42,7 @@ class FoldingMotion(Motion, Protocol):
 
 @dataclass(frozen=True)
 class Fold:
-    """What became of a fold.
+    """Result of a fold.
 
     Attributes
     ----------
@@ -188,12 +188,12 @@ class SimulatedSheet:
         return lambda points: of_paper * drawn.friction_at(points[:, 0])
 
     def positions(self) -> FloatArray:
-        """Where the sheet is now, from the lifted edge on, of shape (edges + 1, 3) [m]."""
+        """Return the present positions of the sheet, from the lifted edge on, shape (edges + 1, 3) [m]."""
         return self.simulation.positions(self.rod)
 
     @property
     def slide(self) -> float:
-        """How far the sheet's far edge has slid over the table by now, in the direction of x [m]."""
+        """Return the slide of the sheet's far edge over the table, in the direction of x [m]."""
         return float(self.positions()[-1, 0]) - self.paper.length
 
     def picture(self, camera: Camera, size: tuple[int, int] = (640, 480)) -> npt.NDArray[np.uint8]:

@@ -41,7 +41,7 @@ _RIB_SPACING = 0.02  # [m]: between ribs a layer sinks by micrometres
 
 @dataclass(frozen=True)
 class WideFold:
-    """What became of a fold of a wide sheet.
+    """Result of a fold of a wide sheet.
 
     Attributes
     ----------

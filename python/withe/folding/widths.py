@@ -18,7 +18,7 @@ FloatArray = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Width:
-    """Of a sheet over the distance from its tip, in straight pieces, and beyond the last place as there.
+    """Width of a sheet over the distance from its tip, in straight pieces, and beyond the last place as there.
 
     Bending stiffness and weight per length are those at width 1 times this.
 
@@ -34,7 +34,7 @@ class Width:
 
     @property
     def even(self) -> bool:
-        """Whether it is 1 everywhere."""
+        """Return True if the width is 1 everywhere."""
         return all(width == 1.0 for width in self.widths)
 
     @cached_property
@@ -47,7 +47,7 @@ class Width:
         return {"places": self.places, "widths": self.widths}
 
     def weight(self, place: FloatArray | float) -> FloatArray:
-        """Of the part from the tip to places [w Lgb]."""
+        """Return the weight of the part from the tip to places [w Lgb]."""
         if self.even:
             return np.asarray(place, dtype=float)
         places, widths = np.array(self.places), np.array(self.widths)

@@ -36,7 +36,7 @@ _TWIST_STEP = 0.05  # of an action [rad]
 
 
 class Arm(Task):
-    """What the tasks share: the arm, its segments, what is seen of it.
+    """Base of the arm tasks: the arm, its segments, its observations.
 
     Attributes
     ----------
@@ -116,7 +116,7 @@ class Arm(Task):
 
     @abstractmethod
     def aim(self, lane: int, generator: np.random.Generator) -> None:
-        """Where the target of a robot is at the start of its episode."""
+        """Return the position of a robot's target at the start of its episode."""
 
     def act(self, robots: Batch, actions: FloatArray, chosen: IntArray) -> None:
         """Lead the natural curvatures on, and twists."""
@@ -145,11 +145,11 @@ class Arm(Task):
         return np.concatenate(rows, axis=1, dtype=np.float32, casting="same_kind")
 
     def seen(self, robots: Batch) -> list[FloatArray]:
-        """What is observed besides the arm: arrays with a row for each robot."""
+        """Return observations besides the arm: arrays with a row for each robot."""
         return [self.target[:, self.axes]]
 
     def distances(self, robots: Batch) -> FloatArray:
-        """Of every tip to its target, shape (n,) [m]."""
+        """Return the distance of every tip from its target, shape (n,) [m]."""
         apart = (robots.positions("arm", out=self._x)[:, -1] - self.target)[:, self.axes]
         return np.asarray(np.sqrt(np.einsum("ij,ij->i", apart, apart)))
 

@@ -26,7 +26,7 @@ def _require() -> Any:
 
 
 def _boxes(episodes: Episodes) -> tuple[Any, Any]:
-    """What is seen, and what may be done, as Gymnasium says it."""
+    """Return the observation and action spaces of Gymnasium."""
     box = _require().spaces.Box
     seen = episodes.observe()
     return (
@@ -84,7 +84,7 @@ class _Environment:
 
     @property
     def task(self) -> Task:
-        """What the robot does: the environment's own copy of the task that it was given."""
+        """Return the environment's own copy of its task."""
         return self._episodes.task
 
     @property
@@ -210,7 +210,7 @@ class _VectorEnvironment:
 
     @property
     def task(self) -> Task:
-        """What the robots do: the environment's own copy of the task that it was given."""
+        """Return the environment's own copy of its task."""
         return self._episodes.task
 
     @property
@@ -325,7 +325,7 @@ def environment_class(name: str) -> Any:
 
 
 def maker(task: Callable[..., Task]) -> Callable[..., Any]:
-    """What `gymnasium.make` calls, with options of the environment; a task has none."""
+    """Return the function for `gymnasium.make`, with options of the environment; a task has none."""
 
     def make(render_mode: str | None = None, **others: Any) -> Any:
         _refuse(task, others, "Environment", "render_mode")
@@ -335,7 +335,7 @@ def maker(task: Callable[..., Task]) -> Callable[..., Any]:
 
 
 def vector_maker(task: Callable[..., Task]) -> Callable[..., Any]:
-    """What `gymnasium.make_vec` calls; as for `gymnasium.make`, max_episode_steps=-1 is no limit but the task's."""
+    """Return the function for `gymnasium.make_vec`; as in `gymnasium.make`, max_episode_steps=-1 sets no limit."""
 
     def make(
         num_envs: int = 1,

@@ -29,7 +29,7 @@ _ROUNDING = 1e-6  # of numbers about 1 in a few operations of single precision
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of actions, an entry for each robot.
+    """Result of actions, with an entry for each robot.
 
     Attributes
     ----------
@@ -118,7 +118,7 @@ class Episodes:
             self.task.begin(self.robots, chosen, generators)
 
     def observe(self) -> npt.NDArray[np.float32]:
-        """What is seen of every robot.
+        """Return the observations of every robot.
 
         Raises
         ------
@@ -182,7 +182,7 @@ class Episodes:
         return built
 
     def _returned(self, found: Any, method: str, kind: type[Number]) -> npt.NDArray[Number]:
-        """What a method of the task returned, as an array."""
+        """Return the result of a method of the task, as an array."""
         try:
             return np.asarray(found, kind)
         except (TypeError, ValueError) as error:

@@ -27,7 +27,7 @@ __all__ = ["equilibrium", "rollout"]
 
 FloatArray = npt.NDArray[np.float64]
 Values = Mapping[Unknown, Any]
-"""What acts, and a tensor of its values."""
+"""Tensors of values, by parameter."""
 
 _READOUTS = ("positions", "velocities")
 

@@ -189,11 +189,11 @@ class Wrap(_Limbs):
         return np.hstack([*limbs, self.balls, self.actions])
 
     def reward(self, robots: Batch) -> FloatArray:
-        """How much of the limbs is near the ball."""
+        """Return the share of the limbs that is near the ball."""
         x = np.concatenate([robots.positions(limb)[:, self.nodes // 2 :] for limb in self.limbs], axis=1)
         gaps = np.linalg.norm(x - self.balls[:, None], axis=2) - self.ball - self.radius
         return np.asarray(np.exp(-np.maximum(gaps, 0.0) / 0.01).mean(axis=1))
 
     def draw(self, axes: Any, robots: Batch) -> None:
-        """Where the ball is."""
+        """Draw the ball."""
         axes.plot(*self.balls[:1].T, "o", color="#d1495b", markersize=4)

@@ -32,7 +32,7 @@ _CHUNK = 2048  # rows whose activations stay in the processor's cache
 
 @dataclass(frozen=True)
 class Training:
-    """How a network was trained.
+    """Record of the training of a network.
 
     Attributes
     ----------

@@ -22,7 +22,7 @@ FloatArray = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Form:
-    """What a network is asked and what it says, as functions of NumPy or torch, whose names are the same.
+    """Inputs and outputs of a network, as functions of NumPy or torch, whose names are the same.
 
     Attributes
     ----------

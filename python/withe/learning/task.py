@@ -1,4 +1,4 @@
-"""What a robot is to learn: a scene, what an action does, what is seen, what is good."""
+"""Tasks for learning: a scene, actions, observations and a reward."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ IntArray = npt.NDArray[np.intc]
 
 
 class Task(ABC):
-    """What robots are to do, many at once: each method is given a `withe.Batch`, of one robot or of hundreds.
+    """Task of many robots: each method is given a `withe.Batch`, of one robot or of hundreds.
 
     A subclass says how the scene is built, what an action does, what is observed, and how good that is; arrays have a
     row for each robot. `Environment` makes one Gymnasium environment of it, `VectorEnvironment` many in one.
@@ -85,11 +85,11 @@ class Task(ABC):
 
     @abstractmethod
     def observe(self, robots: Batch) -> npt.NDArray[np.floating[Any]]:
-        """What is seen of every robot, shape (n, ...), finite."""
+        """Return the observations of every robot, shape (n, ...), finite."""
 
     @abstractmethod
     def reward(self, robots: Batch) -> FloatArray:
-        """How good the present state of every robot is, shape (n,), finite."""
+        """Return the reward of the present state of every robot, shape (n,), finite."""
 
     def finished(self, robots: Batch) -> npt.NDArray[np.bool_]:
         """Whose episode has come to its end (terminated, not truncated), shape (n,); none by default."""

@@ -1,4 +1,4 @@
-"""What a scene is made of: parts, their names and numbers, and how the engine is told of them."""
+"""Parts of a scene, their names and numbers, and their description for the engine."""
 
 from withe.parts.kinds import (
     ContactModel,

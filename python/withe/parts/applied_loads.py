@@ -22,7 +22,7 @@ Value = npt.ArrayLike | Callable[[float], npt.ArrayLike]
 
 
 class Bearer(Protocol):
-    """What loads are put on: a scene, or a simulation that runs."""
+    """Bearer of loads: a scene, or a running simulation."""
 
     @property
     def directory(self) -> Directory:
@@ -43,7 +43,7 @@ class AppliedLoads(ABC):
     @property
     @abstractmethod
     def _bearer(self) -> Bearer:
-        """What loads are put on."""
+        """Return the bearer of loads."""
 
     def add_force(
         self, node: NodeHandle | str, force: Value, *, follower: bool = False, name: str | None = None

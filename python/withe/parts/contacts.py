@@ -1,4 +1,4 @@
-"""What the rods of a scene may touch, as the engine takes it and as it answers."""
+"""Contact settings of a scene for the engine, and contacts from the engine."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def pair_friction(directory: Directory, a: Body, b: Body, friction: Friction) ->
 
 
 def touching(directory: Directory, handle: Body) -> RodPart | ObstaclePart:
-    """What a handle or name of something that touches means.
+    """Return the rod or obstacle of a handle or name.
 
     Raises
     ------
@@ -121,12 +121,12 @@ class BodyPair:
         return ", ".join(sorted((self.first.name, self.second.name)))
 
     def bodies(self, directory: Directory) -> set[int]:
-        """How the engine calls them."""
+        """Return the numbers of the bodies in the engine."""
         return {body_of(directory, self.first), body_of(directory, self.second)}
 
 
 def body_of(directory: Directory, part: RodPart | ObstaclePart) -> int:
-    """How the engine calls a rod (its index) or an obstacle (-1 - index)."""
+    """Return the number of a rod (its index) or an obstacle (-1 - index) in the engine."""
     return part.index if isinstance(part, RodPart) else -1 - directory.all(ObstaclePart).index(part)
 
 

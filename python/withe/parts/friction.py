@@ -53,14 +53,14 @@ class Coefficients:
     field: FrictionField | None = None
 
     def shares(self, nodes: npt.NDArray[np.float64], closed: bool, what: str) -> npt.NDArray[np.float64] | None:
-        """What nodes and edges of a rod have of the coefficients, where they vary; see `field_shares`."""
+        """Return the shares of the coefficients at nodes and edges of a rod, if they vary; see `field_shares`."""
         if self.field is not None:
             return field_shares(self.field, nodes, closed, what)
         return None if self.edges is None else edge_shares(self.edges, closed)
 
     @property
     def given(self) -> Friction:
-        """What a user gave."""
+        """Return the value that a user gave."""
         if self.field is not None:
             return self.field
         return as_given(self.directions) if self.edges is None else self.edges.copy()
@@ -97,7 +97,7 @@ def coefficients(
 
 
 def _is_of_edges(value: object, edges: int) -> bool:
-    """Whether it is a coefficient for each edge, and none for each direction."""
+    """Return True for a coefficient per edge, not per direction."""
     size = np.size(value) if np.ndim(value) == 1 else 0  # type: ignore[arg-type]
     if size == 3:
         return edges == 3 and not isinstance(value, tuple)

@@ -42,7 +42,7 @@ FloatArray = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class RodPlace:
-    """What a scene's layout knows of one rod."""
+    """Place of a rod in a scene's layout."""
 
     name: str
     nodes: int
@@ -147,12 +147,12 @@ class Joint(Handle):
 
 @dataclass(frozen=True)
 class Support(Handle):
-    """What holds a node: made by `clamp` and `pin`."""
+    """Handle of a support, made by `clamp` and `pin`."""
 
 
 @dataclass(frozen=True)
 class Hand(Support):
-    """What holds a length of a rod: made by `grasp`."""
+    """Handle of a hand, made by `grasp`."""
 
 
 @dataclass(frozen=True)
@@ -244,7 +244,7 @@ class Rod(Handle):
 
     @property
     def closed(self) -> bool:
-        """Whether the last node is joined to the first by an edge."""
+        """Return True if an edge joins the last node to the first."""
         return self._place.closed
 
     @property

@@ -21,7 +21,7 @@ _TOUCHED = 1e-9  # of an edge's length: less than that is rounding
 
 
 class Sliding(NamedTuple):
-    """What a user says of a ring."""
+    """Options of a ring."""
 
     slides: bool
     friction: float

@@ -27,7 +27,7 @@ __all__ = [
 
 FloatArray = npt.NDArray[np.float64]
 JOINT_WORDS = ("stiffness", "rest_angle", "damping", "moment")
-"""What revolute joints have; `Simulation.set` changes it."""
+"""Parameters of revolute joints, which `Simulation.set` changes."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""What a scene remembers of everything that was added to it: values, never changed in place."""
+"""Parts of a scene as values, which are never changed in place."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ SUPPORT_KINDS: tuple[str, ...] = get_args(SupportKind)
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
-    """How the directors and the natural shape of a rod follow from its nodes."""
+    """Drawing of a rod: its directors and natural shape from its nodes."""
 
     normal: FloatArray | None  # as it was given
     natural_curvature: bool  # whether it follows
@@ -106,7 +106,7 @@ class RodPart:
 
     @property
     def owner(self) -> str:
-        """How errors call it."""
+        """Return the name of the rod in errors."""
         return f"rod {self.name!r}"
 
     def without_arcs(self) -> RodPart:
@@ -140,7 +140,7 @@ class JoinPart:
 
 @dataclass(frozen=True, eq=False)
 class Grasp:
-    """What a hand holds, and how."""
+    """Grasp of a hand."""
 
     at: float  # arc length [m]
     length: float  # [m]
@@ -155,7 +155,7 @@ class Grasp:
 
 @dataclass(frozen=True, eq=False)
 class SupportPart:
-    """What holds a node, or, a hand, a length of a rod."""
+    """Support of a node, or of a length of a rod by a hand."""
 
     name: str
     kind: SupportKind
@@ -255,7 +255,7 @@ class ObstaclePart:
 
     @property
     def axis(self) -> FloatArray | None:
-        """What it may turn about: normal or axis; None of a sphere, which may turn about any."""
+        """Return the axis of rotation: normal or axis; None for a sphere, which may turn about any axis."""
         axis = self.other if self.kind == "plane" else self.other - self.point
         length = float(np.linalg.norm(axis))
         return axis / length if length > 0.0 else None
@@ -263,7 +263,7 @@ class ObstaclePart:
 
 @dataclass(frozen=True)
 class PairSettings:
-    """What two bodies have of their own; None: what the scene has."""
+    """Settings of a pair of bodies; None: those of the scene."""
 
     ignored: bool = False
     friction: Coefficients | None = None
@@ -273,7 +273,7 @@ class PairSettings:
 
 @dataclass(frozen=True, eq=False)
 class ContactSettings:
-    """Whether rods touch, and how."""
+    """Settings of contact and friction."""
 
     rods: bool | None = None  # None: not said
     friction: float = 0.0

@@ -195,7 +195,7 @@ class RodParameters:
         return cls(**values)._checked(owner)
 
     def equals(self, other: RodParameters) -> bool:
-        """Whether every number is the same."""
+        """Return True if every number is the same."""
         mine, theirs = self.arrays(), other.arrays()
         return mine.keys() == theirs.keys() and all(np.array_equal(mine[name], theirs[name]) for name in mine)
 

@@ -112,7 +112,7 @@ def make_rod(
 
 
 def redrawn(part: RodPart, points: FloatArray) -> RodPart:
-    """What follows from other nodes, drawn as these were: lengths, directors, natural shape."""
+    """Return a rod with other nodes, drawn as this one: lengths, directors, natural shape."""
     how = part.drawing
     assert how is not None
     lengths = drawing.check_edges(points, part.closed, part.owner)

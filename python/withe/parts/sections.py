@@ -19,7 +19,7 @@ FloatArray = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class SectionProperties:
-    """What the equations of a rod need of its section, every one an array of shape (edges,).
+    """Properties of a section for the equations of a rod, each an array of shape (edges,).
 
     Attributes
     ----------

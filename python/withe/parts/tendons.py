@@ -53,7 +53,7 @@ def checked_tension(name: str, value: float) -> float:
 
 
 def outline_of(part: TendonPart) -> TendonOutline:
-    """What pictures and files keep of a tendon."""
+    """Return the outline of a tendon for pictures and files."""
     guides = tuple((rod, edge, _SHARES[place]) for rod, edge, place in part.guides)
     return TendonOutline(part.name, guides, part.offsets)
 
@@ -96,7 +96,7 @@ def _place(directory: Directory, guide: EdgeHandle | NodeHandle | str, what: str
 
 
 def _drawn(directory: Directory, part: TendonPart) -> FloatArray:
-    """Where the guides are drawn, shape (guides, 3) [m]."""
+    """Return the drawn positions of the guides, shape (guides, 3) [m]."""
     rods = {rod.index: rod for rod in directory.all(RodPart)}
     frames = {
         index: np.stack([rod.directors, np.cross(rod.tangents, rod.directors), rod.tangents], axis=1)

@@ -136,7 +136,7 @@ class Camera:
 
     @property
     def flat(self) -> bool:
-        """Whether it is calibrated on the plane z = 0 only."""
+        """Return True if the camera is calibrated on the plane z = 0 only."""
         return self._flat
 
     def looks_from(self, pixels: ArrayLike) -> Array:

@@ -1,4 +1,4 @@
-"""What tracing an image gives."""
+"""Results of tracing an image."""
 
 from __future__ import annotations
 
@@ -163,7 +163,7 @@ class Tracing:
 
     @classmethod
     def from_dict(cls, fields: dict[str, Any]) -> Tracing:
-        """What `to_dict` made, read again.
+        """Return a tracing from the fields of `to_dict`.
 
         Raises
         ------
@@ -200,7 +200,7 @@ class Tracing:
 
 
 def lifts(tracing: Tracing, camera: Camera, height: float, radius: float) -> list[Array]:
-    """How far every row of every cable is lifted so that upper strands clear lower ones [m].
+    """Return the lift of every row of every cable, by which upper strands clear lower ones [m].
 
     At a crossing the upper strand lies 2.1 radii above the lower one, over the length in which their outlines
     overlap, and comes down over as much again on both sides; strands that cross several others are lifted over the

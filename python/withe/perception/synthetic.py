@@ -40,7 +40,7 @@ Array = NDArray[np.float64]
 
 @dataclass
 class TrueCrossing:
-    """Where two strands cross: the place and, for either strand, cable and arc length [px]."""
+    """Crossing of two strands: the place and, for either strand, cable and arc length [px]."""
 
     point: Array
     over: tuple[int, float]

@@ -142,7 +142,7 @@ def _quads(picture: NDArray[np.uint8], family: str) -> tuple[list[int], Array]:
 
 
 def _crossing(quad: Array) -> Array:
-    """Where the diagonals of a quadrilateral meet: the image of the square's centre."""
+    """Return the crossing of the diagonals of a quadrilateral, which is the image of the square's centre."""
     start, other = quad[0], quad[1]
     first, second = quad[2] - start, quad[3] - other
     share = np.linalg.solve(np.stack([first, -second], axis=1), other - start)[0]

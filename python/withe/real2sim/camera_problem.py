@@ -93,7 +93,7 @@ class CameraProblem:
         return free
 
     def view(self, coordinates: FloatArray) -> View:
-        """How the plane is seen."""
+        """Return the view of the plane."""
         return View(coordinates[self.count :], self.axes)
 
     def residual(self, coordinates: FloatArray, frame: int) -> tuple[FloatArray, FloatArray] | None:

@@ -22,7 +22,7 @@ FloatArray = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Log(ShortRepr):
-    """What a camera saw of tags.
+    """Log of tags that a camera saw.
 
     Attributes
     ----------

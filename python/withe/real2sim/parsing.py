@@ -1,4 +1,4 @@
-"""What a user says is unknown, checked."""
+"""Unknowns of fits, as users give them, checked."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ Place = NodeHandle | str | tuple[Rod | str, float]
 
 
 def rod_part(simulation: Simulation, rod: Rod | str) -> RodPart:
-    """What a scene knows of a rod."""
+    """Return the part of a rod."""
     return simulation._session.directory.rod(rod)
 
 

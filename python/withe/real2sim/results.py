@@ -1,4 +1,4 @@
-"""What a fit found."""
+"""Results of fits."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ class Unobservable:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Fit:
-    """What a fit found, frame by frame.
+    """Result of a fit, frame by frame.
 
     Attributes
     ----------

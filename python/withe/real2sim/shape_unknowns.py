@@ -183,7 +183,7 @@ class DrawnShape(Unknown):
 
 
 class Pose(Unknown):
-    """Where a support is [m], or how it is turned against the first guess, as a rotation vector [rad]."""
+    """Position of a support [m], or its rotation against the initial guess, as a rotation vector [rad]."""
 
     per_frame = False
 

@@ -49,7 +49,7 @@ class Equilibria(Coordinates):
         self.solves = 0
 
     def positions(self, coordinates: FloatArray, frame: int) -> FloatArray:
-        """Where the nodes come to rest, shape (nodes, 3) [m].
+        """Return the positions of the nodes at rest, shape (nodes, 3) [m].
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""What a simulation is to look like: curvatures, tags, or centrelines, frame by frame."""
+"""Targets of fits: curvatures, tags, or centrelines, frame by frame."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ FloatArray = npt.NDArray[np.float64]
 
 
 class Residual(ABC):
-    """How far positions are from a frame of a target, in units of `sigma`, or of 1; NaN where nothing was seen."""
+    """Distance of positions from a frame of a target, in units of `sigma`, or of 1; NaN where nothing was seen."""
 
     @abstractmethod
     def value(self, positions: FloatArray, frame: int) -> FloatArray:
@@ -45,7 +45,7 @@ class Residual(ABC):
 
 
 class Target(ABC):
-    """What every frame shows. `times` are those of the frames [s], `sigma` a standard deviation; None if not known."""
+    """Target of a fit, frame by frame, with `times` of the frames [s] and a standard deviation `sigma`, or None."""
 
     times: Any
     sigma: float | None
@@ -213,7 +213,7 @@ class _CurvatureResidual(Residual):
 
 @dataclass(eq=False, repr=False)
 class Tags(ShortRepr, Target):
-    """Where tags on rods were seen, in pixels or in metres.
+    """Positions of tags on rods, in pixels or in metres.
 
     Parameters
     ----------
@@ -303,7 +303,7 @@ def across_of_points(count: int, normal: FloatArray, in_metres: bool) -> FloatAr
 
 
 def pixel_derivative(camera: Camera, points: FloatArray) -> FloatArray:
-    """How pixels move with points, shape (n, 2, 3) [px/m], by central differences of the projection."""
+    """Return the derivative of pixels by points, shape (n, 2, 3) [px/m], by central differences of the projection."""
     step = 1e-5 * max(float(np.ptp(points, axis=0).max()), 1e-3)
     near = points[None, None] + step * np.array([1.0, -1.0])[:, None, None, None] * np.eye(3)[None, :, None]
     pixels = camera.project(near.reshape(-1, 3)).reshape(2, 3, len(points), 2)

@@ -1,4 +1,4 @@
-"""What is looked for, as coordinates: parameters of rods in the words of `set`, a tilt, a delay."""
+"""Unknowns of fits as coordinates: parameters of rods in the words of `set`, a tilt, a delay."""
 
 from __future__ import annotations
 
@@ -64,14 +64,14 @@ class Unknown(ABC):
     @property
     @abstractmethod
     def words(self) -> list[Any]:
-        """What to ask the engine for derivatives by, to have those by the coordinates."""
+        """Return the parameters of gradients that determine those by the coordinates."""
 
     @abstractmethod
     def chain(self, coordinates: FloatArray, found: list[list[Any]]) -> FloatArray:
         """Derivatives of m scalars by the coordinates, shape (m, n), from those by the words, m each."""
 
     def value(self, coordinates: FloatArray) -> FloatArray:
-        """What the coordinates, of shape (..., n), mean, in SI units."""
+        """Return the value of coordinates, of shape (..., n), in SI units."""
         return coordinates
 
     def slope(self, coordinates: FloatArray) -> FloatArray:
@@ -237,7 +237,7 @@ class Tilt(Unknown):
 
 
 class Delay(Unknown):
-    """How much later than a run the clock of what was seen began [s]."""
+    """Delay of the clock of the targets after the start of a run [s]."""
 
     word, per_frame = "delay", False
 

@@ -1,4 +1,4 @@
-"""What a run leaves behind: records, and what takes their frames."""
+"""Records of runs, and recorders that take their frames."""
 
 from withe.recording.record import EnergyHistory, Record
 

@@ -1,4 +1,4 @@
-"""What a run leaves behind: the read-outs of a simulation, frame by frame.
+"""Records: the read-outs of a simulation, frame by frame.
 
 A `Record` answers to the same read-outs as a `Simulation`, with one more axis in front: the frames. It
 holds NumPy arrays only, so it pickles, saves to one file, and needs no engine to be looked at.
@@ -44,7 +44,7 @@ ROD_READOUTS = ("directors", "curvatures", "twists", "tensions", "spins")
 
 
 class RunGradient(Protocol):
-    """What a differentiable run knows."""
+    """Gradients of a differentiable run."""
 
     def gradient(self, by: Mapping[str, Any], wrt: Sequence[Any], /) -> list[Any]:
         """See `Record.gradient`."""

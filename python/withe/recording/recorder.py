@@ -29,7 +29,7 @@ class Drawn(Protocol):
 
     @property
     def name(self) -> str:
-        """Of the rod."""
+        """Name of the rod."""
 
     @property
     def rows(self) -> npt.NDArray[np.int64]:
@@ -37,15 +37,15 @@ class Drawn(Protocol):
 
     @property
     def closed(self) -> bool:
-        """Whether its last node is joined to its first by an edge."""
+        """True if an edge joins the last node to the first."""
 
     @property
     def radii(self) -> npt.NDArray[np.float64]:
-        """Of its edges, shape (edges,) [m]."""
+        """Radii of the edges, shape (edges,) [m]."""
 
 
 class Moving(Protocol):
-    """What answers to the read-outs of `Simulation`; also to those of `ROD_READOUTS`, given a rod's name."""
+    """Object with the read-outs of `Simulation`; also to those of `ROD_READOUTS`, given a rod's name."""
 
     @property
     def time(self) -> float:
@@ -56,20 +56,20 @@ class Moving(Protocol):
         """In the order of the scene."""
 
     def positions(self) -> npt.NDArray[np.float64]:
-        """Of all nodes, shape (nodes, 3) [m]."""
+        """Positions of all nodes, shape (nodes, 3) [m]."""
 
     def velocities(self) -> npt.NDArray[np.float64]:
-        """Of all nodes, shape (nodes, 3) [m/s]."""
+        """Velocities of all nodes, shape (nodes, 3) [m/s]."""
 
     def obstacle_position(self, obstacle: str, /) -> npt.NDArray[np.float64]:
         """Shape (3,) [m]."""
 
     def energy(self) -> Energies:
-        """Of the whole scene."""
+        """Energies of the whole scene."""
 
 
 class Derivatives(RunGradient, Protocol):
-    """What a differentiable run keeps."""
+    """Data that a differentiable run keeps."""
 
     def note_frame(self) -> None:
         """A frame has been taken."""

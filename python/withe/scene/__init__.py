@@ -1,4 +1,4 @@
-"""What a user describes: rods, joints, supports, loads, contact, fluid."""
+"""Scenes that a user describes: rods, joints, supports, loads, contact, fluid."""
 
 from withe.scene.scene import Scene
 

@@ -1,4 +1,4 @@
-"""What the rods of a scene may touch: the methods of `Scene` that are about contact and friction.
+"""Contact and friction: the methods of `Scene` for obstacles and pairs of bodies.
 
 Its numbered equations are those of Andrew Choi's doctoral dissertation, University of California, Los Angeles, whose
 chapters on contact follow Tong, Choi, Joo, Jawed: A fully implicit method for robust frictional contact handling in

@@ -1,4 +1,4 @@
-"""What pulls, pushes and slows the rods of a scene, besides loads that a simulation may also take."""
+"""Masses, springs, tendons, drag, custom forces and fluids of a scene."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What holds the rods of a scene."""
+"""Supports of a scene: clamps, pins and hands."""
 
 from __future__ import annotations
 

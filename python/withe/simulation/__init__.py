@@ -1,4 +1,4 @@
-"""What runs a scene: stepping, read-outs, what may be changed meanwhile, snapshots."""
+"""Simulations: stepping, read-outs, changes during a run, snapshots."""
 
 from withe.simulation.simulation import Simulation
 

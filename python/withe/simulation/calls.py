@@ -1,4 +1,4 @@
-"""What was set while a differentiable run went, call by call, and gradients by it."""
+"""Calls that set values during a differentiable run, and gradients by these values."""
 
 from __future__ import annotations
 
@@ -192,11 +192,11 @@ class _Epoch:
                 self.ways[name, word] = Way(word, None, call.time, 0.0)
 
     def weights(self, key: _Key, time: float) -> _Weights:
-        """How much each call has in a natural shape at a time."""
+        """Return the share of each call in a natural shape at a time."""
         return self.ramps[key].at(time) if key in self.ramps else {_START: 1.0}
 
     def share_of_start(self, key: _Key, time: float) -> float:
-        """How much of what a word had at the start of the run acts at a time."""
+        """Return the share of the initial value of a parameter that acts at a time."""
         return 0.0 if key in self.live else self.weights(key, time).get(_START, 0.0)
 
     def arrays(self, rod: RodPart, word: str, *, initial: bool) -> set[str]:
@@ -311,7 +311,7 @@ class Ledger:
 
     @property
     def calls(self) -> list[CallGradient]:
-        """What was found of each."""
+        """Return the gradients by each call."""
         out = []
         for call, found in zip(self._calls, self._by_calls, strict=True):
             gradients = {word: found[word] for word in call.values if word in found}

@@ -1,4 +1,4 @@
-"""What drives a simulation while it runs: natural shapes, parameters, loads."""
+"""Control of a running simulation: natural shapes, parameters, loads."""
 
 from __future__ import annotations
 

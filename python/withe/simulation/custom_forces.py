@@ -46,7 +46,7 @@ class CustomForces:
         self._moments = any(part.moments for part in parts)
 
     def __call__(self, time: float, positions: FloatArray, velocities: FloatArray, derivatives: bool) -> Answer:
-        """What the engine asks for; derivatives are SciPy matrices of 3 or, with moments, 6 rows a node, or None."""
+        """Return forces for the engine; derivatives are SciPy matrices of 3 (with moments 6) rows a node, or None."""
         total = np.zeros((2 if self._moments else 1, *positions.shape))
         by_positions, by_velocities = [], []
         for part in self._parts:

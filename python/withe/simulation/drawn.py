@@ -22,7 +22,7 @@ _STEP = 1e-3  # of the shortest edge, of differences that leave its fourth power
 
 @dataclass(frozen=True, eq=False)
 class Moment:
-    """Where everything is at a moment, and the natural shape that rods have then.
+    """Positions and natural shapes at a moment.
 
     Attributes
     ----------
@@ -180,7 +180,7 @@ class _Shape:
 
 
 def _turns(part: RodPart, other: RodPart) -> FloatArray:
-    """How the frame of each edge is turned, as rotation vectors but for the third power of the turn."""
+    """Return the rotation of the frame of each edge, as rotation vectors but for the third power of the turn."""
     out = np.zeros_like(part.tangents)
     for rod, new in (
         (part.directors, other.directors),

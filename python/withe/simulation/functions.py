@@ -23,7 +23,7 @@ FloatArray = npt.NDArray[np.float64]
 
 
 def step_callback(session: Session) -> Callable[[float, float], None] | None:
-    """What to call before every inner step, if anything."""
+    """Return the function to call before every inner step, if any."""
     now = session.world.time
     moving = any(not _finished(path, now) for path in session.settings.paths.values())
     if moving or session.settings.functions or session.settings.friction_fields:
@@ -62,7 +62,7 @@ def apply_functions(session: Session, force_time: float, end_time: float) -> Non
 
 
 def force_function(session: Session) -> CustomForces | None:
-    """What finds the custom forces, if any."""
+    """Return the function that computes the custom forces, if any."""
     if not session.custom_forces:
         return None
     shortest = min(float(rod.lengths.min()) for rod in session.directory.all(RodPart))
@@ -102,7 +102,7 @@ def _check_in_plane(session: Session, value: FloatArray, what: str, along_normal
 
 
 def _finished(path: Path, time: float) -> bool:
-    """Whether a path has come to its end, and was followed there."""
+    """Return True if a path has ended and was followed to its end."""
     if not isinstance(path, Turn | Waypoints):
         return False
     begin, end = path.times.min(), path.times.max()

@@ -54,7 +54,7 @@ Loss = npt.ArrayLike | Mapping[str, Any]
 
 
 def _poses_unknown(session: Session) -> bool:
-    """Whether derivatives of reaction moments by poses are unknown.
+    """Return True if derivatives of reaction moments by poses are not available.
 
     Reactions hold the inertia of what supports turn by other rates than the equations of midpoint steps do, and of held
     edges in space; and moments of the parts of a fourth-order step are about where a hand is in each.
@@ -229,7 +229,7 @@ def _with_frame(value: Any) -> Any:
 
 
 class RunDerivatives:
-    """What a differentiable run keeps: its tape, what was set, and after how many steps each frame was taken."""
+    """Data of a differentiable run: its tape, the values that were set, and the step of each frame."""
 
     def __init__(self, session: Session) -> None:
         self._session = replace(

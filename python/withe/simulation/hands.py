@@ -38,7 +38,7 @@ FloatArray = npt.NDArray[np.float64]
 
 
 class HeldPose(NamedTuple):
-    """Where a support is.
+    """Pose of a support.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class HeldPose(NamedTuple):
 
 
 class Deflection(NamedTuple):
-    """How far what a yielding hand holds is from where it holds it, in the hand's axes; of a long hand the mean.
+    """Displacement of the held part of the rod relative to the hand, in the hand's axes; the mean of a long hand.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ class Deflection(NamedTuple):
 
 
 class Passage(NamedTuple):
-    """How a rod passes a ring.
+    """Passage of a rod through a ring.
 
     Attributes
     ----------
@@ -115,7 +115,7 @@ class RunningHand(Hand):
 
     @property
     def pose(self) -> HeldPose:
-        """Where the hand is now. See `Simulation.pose`."""
+        """Return the pose of the hand. See `Simulation.pose`."""
         return support_pose(self.session, self)
 
     def move(
@@ -137,12 +137,12 @@ class RunningHand(Hand):
 
     @property
     def deflection(self) -> Deflection:
-        """How far the rod has gone in the hand. See `Simulation.deflection`."""
+        """Return the displacement of the rod in the hand. See `Simulation.deflection`."""
         return hand_deflection(self.session, self)
 
     @property
     def passage(self) -> Passage:
-        """How the rod passes this ring. See `Simulation.passage`."""
+        """Return the passage of the rod through this ring. See `Simulation.passage`."""
         return ring_passage(self.session, self)
 
     def feed(self, rate: float) -> None:
@@ -180,13 +180,13 @@ def hand_wrench(session: Session, hand: Handle | str, about: npt.ArrayLike | Non
 
 
 def hand_deflection(session: Session, hand: Handle | str) -> Deflection:
-    """How far the rod has gone in a hand; see `Simulation.deflection`."""
+    """Return the displacement of the rod in a hand; see `Simulation.deflection`."""
     found = session.world.deflection(find_hand(session, hand))
     return Deflection(np.array(found.shift), np.array(found.turn), np.array(found.slip))
 
 
 def ring_passage(session: Session, hand: Handle | str) -> Passage:
-    """How a rod passes a ring; see `Simulation.passage`."""
+    """Return the passage of a rod through a ring; see `Simulation.passage`."""
     index, grasp = _find_ring(session, hand)
     found = session.world.passage(index)
     return Passage(found.at, found.pull, found.press, None if grasp.feed_rate is None else found.feed_rate)
@@ -232,7 +232,7 @@ def _find_ring(session: Session, hand: Handle | str) -> tuple[int, Grasp]:
 
 
 def support_pose(session: Session, support: Handle | str) -> HeldPose:
-    """Where a support is; see `Simulation.pose`."""
+    """Return the pose of a support; see `Simulation.pose`."""
     index, _ = find_support(session, support)
     world = session.world
     return HeldPose(np.array(world.support_position(index)), np.array(world.support_rotation(index)))

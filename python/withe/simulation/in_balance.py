@@ -50,7 +50,7 @@ def _strains_of(session: Session, part: RodPart) -> list[_Strains]:
     stencils, edges = part.voronoi, part.lengths
 
     def at_nodes(value: FloatArray) -> FloatArray:
-        """Of edges: the mean of both at a node."""
+        """Return nodal values of edges: the mean of both at a node."""
         return 0.5 * (value + np.roll(value, -1, axis=0))[: len(stencils)]
 
     ours = part.parameters

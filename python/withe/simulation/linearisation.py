@@ -125,7 +125,7 @@ class Linearisation:
 
     @cached_property
     def stability(self) -> Stability:
-        """Whether small motions stay small: "stable", or what the fastest that grows does.
+        """Return "stable" if small motions stay small, or else the kind of the fastest growing motion.
 
         "diverges" grows steadily, "flutters" swings and grows, which only loads that turn with the rod can do. Without
         damping, which may make things better or worse [Ziegler 1952]. Neutral motions (of a rod that may spin about its
@@ -149,7 +149,7 @@ class Linearisation:
         return float(growth[fastest]), "flutters" if squares[fastest].imag != 0.0 else "diverges"
 
     def _parts(self) -> list[Linearisation]:
-        """What hangs together, each by itself."""
+        """Return a linearisation for each connected part."""
         from scipy.sparse.csgraph import connected_components
 
         coupled = abs(self._assembled) + abs(self._mass)
@@ -279,7 +279,7 @@ class Linearisation:
         return float(shift)
 
     def _positive(self, shift: float) -> bool:
-        """Whether no motion has a square, or the real part of one, below -shift.
+        """Return True if no motion has a square, or the real part of one, below -shift.
 
         All pivots of the stiffness or its symmetric part are positive [Sylvester's law of inertia; a square lies in the
         field of values].

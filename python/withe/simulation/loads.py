@@ -45,7 +45,7 @@ class RunningLoads:
 
 
 def load_index(session: Session, part: LoadPart) -> int:
-    """How the engine calls a load."""
+    """Return the index of a load in the engine."""
     return session.loads.index(part)
 
 

@@ -1,4 +1,4 @@
-"""What a gradient is of: derivatives of a scalar by what a simulation reads out, checked."""
+"""Losses: derivatives of a scalar by read-outs of a simulation, checked."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def check_in_plane(session: Session, array: FloatArray, name: str) -> None:
 
 
 def _table(session: Session, word: str, value: Any, frames: int) -> FloatArray:
-    """Of every node, edge, stencil or support, as the engine takes them: (frames, rows, ...)."""
+    """Return derivatives by every node, edge, stencil or support, for the engine: (frames, rows, ...)."""
     if word in _NODAL and not isinstance(value, Mapping):
         nodes = session.directory.layout.node_count
         return validation.number_array(value, word, (frames, nodes, 3))
@@ -130,5 +130,5 @@ def _as_rod(target: Any) -> Rod | str:
 
 
 def spoken(target: Any) -> str:
-    """What a part is called in messages."""
+    """Return the name of a part in messages."""
     return repr(target if isinstance(target, str) else getattr(target, "name", target))

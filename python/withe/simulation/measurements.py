@@ -1,4 +1,4 @@
-"""What may be read of a simulation at any moment. Read-outs are copies."""
+"""Measurements: read-outs of a simulation at any moment, as copies."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where a moving support is to be."""
+"""Motions of supports: paths and rotations."""
 
 from __future__ import annotations
 
@@ -153,7 +153,7 @@ def paths_by_owner(paths: PathTable) -> list[tuple[str, Path, set[PoseWord]]]:
 
 
 def make_path(path: PathLike, turns: bool, owner: str) -> Path:
-    """What a user gives as a path, as a function of time.
+    """Return a user's path as a function of time.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Where supports are that calls of `move` set on their way, and how that depends on what the calls gave."""
+"""Motions of supports by calls of `move`, and their derivatives by the values of these calls."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _Weights = dict[int, FloatArray]  # of calls: (3, 3), from a change of what they
 
 @dataclass(frozen=True, eq=False)
 class Way:
-    """Of a position, evenly, or of a rotation, by a turn at an even rate.
+    """Way of a position, or of a rotation, at an even rate.
 
     Attributes
     ----------
@@ -39,13 +39,13 @@ class Way:
     start: _Weights = field(default_factory=dict)
 
     def reached(self, time: float) -> float:
-        """How much of the way is behind it at the end of a time step, from 0 to 1."""
+        """Return the completed share of the way at the end of a time step, from 0 to 1."""
         if self.over == 0.0:
             return float(time > self.begin)
         return min(max((time - self.begin) / self.over, 0.0), 1.0)
 
     def weights(self, share: float) -> _Weights:
-        """Of every call, after a share of the way."""
+        """Return the weight of every call, after a share of the way."""
         if self.call is None:
             return self.start
         if self.word == "position":

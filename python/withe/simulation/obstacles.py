@@ -77,7 +77,7 @@ def move_obstacle(
 
 
 def obstacle_pose(session: Session, index: int, path: Path, time: float) -> tuple[FloatArray, FloatArray | None]:
-    """Where the path of an obstacle leads, and how it has turned since it was drawn [rad], if the path says."""
+    """Return the position of an obstacle on its path, and its rotation since the drawing [rad], if given."""
     part = session.directory.all(ObstaclePart)[index]
     value = path(time)
     what = f"path of {part.name!r} at t = {time:g}"
@@ -90,7 +90,7 @@ def obstacle_pose(session: Session, index: int, path: Path, time: float) -> tupl
 
 
 def obstacle_outlines(directory: Directory) -> list[ObstacleOutline]:
-    """What records keep of obstacles."""
+    """Return the outlines of obstacles for records."""
     return [
         ObstacleOutline(
             part.name,

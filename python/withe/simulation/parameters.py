@@ -276,7 +276,7 @@ _SETTABLE = (
 
 
 def _nothing_to_set(part: Part) -> str:
-    """What drives a part instead."""
+    """Return a hint on how to drive a part that has nothing to set."""
     if isinstance(part, JoinPart):
         first, second = part.node_names
         return (

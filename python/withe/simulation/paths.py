@@ -70,7 +70,7 @@ class EquilibriumPath(ShortRepr):
 
 @dataclass(frozen=True)
 class PathOptions:
-    """What path is wanted: checked arguments of `Simulation.equilibrium`."""
+    """Options of a path: checked arguments of `Simulation.equilibrium`."""
 
     loads: list[LoadPart]
     start: float

@@ -1,4 +1,4 @@
-"""What is put where while a simulation runs: supports, obstacles, rods."""
+"""Placement of supports, obstacles and rods during a simulation."""
 
 from __future__ import annotations
 

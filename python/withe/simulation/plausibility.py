@@ -77,7 +77,7 @@ def _check_time_step(stepping: Stepping) -> None:
 
 
 def _cantilever_period(session: Session, rod: RodPart) -> float:
-    """Of the slowest bending mode of a rod that is clamped at one end [s]."""
+    """Return the period of the slowest bending mode of a rod that is clamped at one end [s]."""
     numbers = session.settings.rods[rod.index]
     softest, heaviest = float(np.min(numbers.bend_stiffness)), float(np.max(numbers.line_density))
     return 2.0 * math.pi * float(rod.lengths.sum()) ** 2 / _FIRST_CANTILEVER * math.sqrt(heaviest / softest)

@@ -1,4 +1,4 @@
-"""What a simulation answers: small values that do not change any more."""
+"""Read-outs of a simulation: small constant values."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What was set on a simulation while it ran."""
+"""Settings that were made during a simulation."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ FloatArray = npt.NDArray[np.float64]
 
 @dataclass
 class Settings:
-    """What was set on a simulation that the engine does not keep in its state, or keeps in another form.
+    """Settings of a simulation that the engine does not keep in its state, or keeps in another form.
 
     Attributes
     ----------

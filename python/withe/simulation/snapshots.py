@@ -225,7 +225,7 @@ def restore(session: Session, snapshot: Snapshot) -> None:
 
 
 def matched(session: Session, snapshot: Snapshot) -> Settings:
-    """What `adopt` takes over once the engine is back at a snapshot; see `restore`."""
+    """Return the settings for `adopt` after the engine has restored a snapshot; see `restore`."""
     return _matched(snapshot, session.settings, session.directory, session.scene)
 
 

@@ -33,7 +33,7 @@ def spring_tension(session: Session, part: SpringPart) -> float:
 
 
 def spring_outlines(directory: Directory) -> list[SpringOutline]:
-    """What records keep of springs."""
+    """Return the outlines of springs for records."""
     return [
         SpringOutline(part.name, (directory.row(part.nodes[0]), directory.row(part.nodes[1])))
         for part in directory.all(SpringPart)

@@ -96,7 +96,7 @@ class StateSpace:
         return csr_array(found.state), csr_array(inputs)
 
     def state_difference(self, reference: Any) -> FloatArray:
-        """What leads from the state of a copy of this simulation to the present one, shape (2 unknowns,).
+        """Return the difference of the present state from that of a copy of this simulation, shape (2 unknowns,).
 
         Positions and velocities are subtracted. An edge's directors turn by at most half a turn from those of the
         reference, taken along by the smallest turn between the two tangents; joints turn by 2 tan(angle / 2) about

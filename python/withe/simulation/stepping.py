@@ -35,7 +35,7 @@ __all__ = ["Stepping", "convergence_error", "pass_on", "report_left"]
 
 
 class Stepping:
-    """What advances a session.
+    """Stepping of a session.
 
     Parameters
     ----------

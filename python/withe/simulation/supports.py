@@ -180,7 +180,7 @@ def _turn(
 
 
 def _tangent_and_roll(rotation: FloatArray, drawn: tuple[FloatArray, FloatArray]) -> tuple[FloatArray, float]:
-    """Where a rotation points, and by how much it rolls about that, from -pi to pi."""
+    """Return the direction of a rotation, and its roll about this direction, from -pi to pi."""
     tangent = rotation @ drawn[0]
     tangent /= np.linalg.norm(tangent)
     flat = oriented(drawn[0], drawn[1], tangent, 0.0) @ drawn[1]

@@ -1,4 +1,4 @@
-"""How surfaces press and rub, set and read while a simulation runs."""
+"""Contact and friction, set and read during a simulation."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def set_scene(session: Session, values: dict[str, Any]) -> None:
 
 
 def scene_value(session: Session, word: str) -> float | None:
-    """What `set_scene` sets; None for a contact stiffness that is found by the rule."""
+    """Return the value of `set_scene`; None for a contact stiffness that is found by the rule."""
     contact = session.world.contact
     if word == "contact_stiffness":
         return float(contact.stiffness) or None
@@ -119,7 +119,7 @@ def _with_obstacle_friction(
 
 
 def obstacle_value(session: Session, part: ObstaclePart, word: str) -> Friction:
-    """What `set_obstacle` sets."""
+    """Return the value of `set_obstacle`."""
     contact = session.world.contact
     index = session.directory.all(ObstaclePart).index(part)
     if word == "restitution":
@@ -249,7 +249,7 @@ def follow_friction_fields(session: Session) -> None:
 
 
 def _shares_now(session: Session, rod: RodPart, obstacle: ObstaclePart, given: Coefficients) -> FloatArray | None:
-    """What nodes and edges of a rod have of a coefficient; fields move and turn with their obstacle."""
+    """Return the shares of a coefficient at nodes and edges of a rod; fields move and turn with their obstacle."""
     nodes = np.array(session.world.positions())[session.directory.layout.rows(rod.index)]
     if given.field is not None:
         index = session.directory.all(ObstaclePart).index(obstacle)

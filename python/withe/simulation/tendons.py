@@ -39,10 +39,10 @@ def tendon_length(session: Session, part: TendonPart) -> float:
 
 
 def tendon_points(session: Session, part: TendonPart) -> FloatArray:
-    """Where its guides are, shape (guides, 3) [m]."""
+    """Return the positions of the guides, shape (guides, 3) [m]."""
     return np.array(session.world.tendon_points(tendon_index(session, part)))
 
 
 def tendon_outlines(directory: Directory) -> list[TendonOutline]:
-    """What records keep of tendons."""
+    """Return the outlines of tendons for records."""
     return [outline_of(part) for part in directory.all(TendonPart)]

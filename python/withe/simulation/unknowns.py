@@ -1,4 +1,4 @@
-"""What a gradient is by, in the words of `set` and `get`: reads it from what the engine finds."""
+"""Parameters of gradients, in the words of `set` and `get`, and their readers."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ Unknown = (
     ]
     | str
 )
-"""What to differentiate by: a part and a word of `set`, two bodies and "friction", or a word of the scene."""
+"""Parameter of a gradient: a part and a word of `set`, two bodies and "friction", or a word of the scene."""
 
 
 Array = tuple[str, str]
@@ -108,12 +108,12 @@ def check_list(wrt: Sequence[Unknown], *, may_be_empty: bool = False) -> None:
 
 
 def is_points(unknown: Unknown) -> bool:
-    """Whether it names the nodes of a rod as it was drawn."""
+    """Return True if the parameter is the drawn nodes of a rod."""
     return isinstance(unknown, tuple) and len(unknown) == 2 and isinstance(unknown[1], str) and unknown[1] == "points"
 
 
 def unknown_reader(session: Session, unknown: Unknown | Remaining) -> Reader:
-    """What reads the derivative by one of `wrt`."""
+    """Return the reader of the derivative by one of `wrt`."""
     if isinstance(unknown, Remaining):
         return _remaining_reader(session, unknown)
     if isinstance(unknown, str):
@@ -127,7 +127,7 @@ def unknown_reader(session: Session, unknown: Unknown | Remaining) -> Reader:
 
 
 def part_of(session: Session, target: Any) -> Part | BodyPair:
-    """What `wrt` names: a part, or two bodies."""
+    """Return the part, or pair of bodies, that `wrt` names."""
     if isinstance(target, tuple):
         if len(target) != 2:
             raise ValueError(f"wrt must name two bodies by a pair, got {target!r}")
@@ -136,7 +136,7 @@ def part_of(session: Session, target: Any) -> Part | BodyPair:
 
 
 def reader_of(session: Session, part: Part | BodyPair, word: str) -> Reader:
-    """What reads the derivative by a word of a part."""
+    """Return the reader of the derivative by a parameter of a part."""
     if isinstance(part, RodPart):
         return _rod_reader(session, part, word)
     if isinstance(part, ObstaclePart | BodyPair) and word == "friction":
@@ -238,7 +238,7 @@ def _hand_reader(session: Session, part: SupportPart, word: str) -> Reader:
 
 
 def friction_reader(session: Session, part: ObstaclePart | BodyPair) -> Reader:
-    """What reads the derivative by the coefficients of each direction, shape (3,)."""
+    """Return the reader of the derivative by the coefficients of each direction, shape (3,)."""
     if isinstance(part, ObstaclePart):
         obstacle = session.directory.all(ObstaclePart).index(part)
         return lambda g: np.array(g.parameters.obstacle_friction[obstacle])
@@ -266,7 +266,7 @@ def _check_rubs(friction: float, what: str) -> None:
 
 
 def scene_reader(session: Session, word: str) -> Reader:
-    """What reads the derivative by a word of the scene."""
+    """Return the reader of the derivative by a parameter of the scene."""
     if word == "gravity":
         return lambda g: np.array(g.parameters.gravity)
     if word in SCENE_WORDS:

@@ -1,4 +1,4 @@
-"""What colours rods by: which they are, or a quantity along them, and the scale of that."""
+"""Colours of rods, by rod or by a quantity along them, and its scale."""
 
 from __future__ import annotations
 

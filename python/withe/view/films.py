@@ -15,7 +15,7 @@ FloatArray = npt.NDArray[np.float64]
 
 
 def film_places(times: FloatArray, interval: float) -> FloatArray:
-    """Where in the record the pictures of a film lie, as fractional frame numbers.
+    """Return the places of the pictures of a film in the record, as fractional frame numbers.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How to render off-screen on this machine.
+"""Off-screen rendering on this machine.
 
 That takes a graphics library that wheels do not bring. VTK may end the process where it is missing, so the first render
 is tried in another one.
@@ -59,7 +59,7 @@ def probe_rendering() -> str:
 
 
 def _advice(output: str) -> str:
-    """What to install, from what the failed render wrote."""
+    """Return advice on what to install, from the output of the failed render."""
     message = "cannot render off-screen: "
     if sys.platform != "linux":
         last = output.strip().splitlines()[-1:] or ["no reason given"]

@@ -242,7 +242,7 @@ def _even(size: Sequence[int]) -> Sequence[int]:
 
 
 def _in_notebook() -> bool:
-    """Whether this runs in a Jupyter kernel."""
+    """Return True in a Jupyter kernel."""
     try:
         shell = require("IPython", "view").get_ipython()
     except ImportError:

@@ -16,7 +16,7 @@ _NEAREST = 1e-4  # what is closer to the camera is cut off, over the distance of
 
 @runtime_checkable
 class Pinhole(Protocol):
-    """What a picture needs of a camera, such as `withe.perception.Camera`.
+    """Camera of a picture, such as `withe.perception.Camera`.
 
     A point X of the world is seen at R X + t = (x, y, z) from the camera, z forwards, and at the pixel whose
     coordinates are the first two rows of the matrix times (x / z, y / z, 1): (0, 0) is the middle of the first pixel.

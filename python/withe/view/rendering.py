@@ -185,7 +185,7 @@ class Stage:
             self._label.input = text
 
     def image(self) -> npt.NDArray[np.uint8]:
-        """What the camera sees, shape (height, width, 3)."""
+        """Return the image of the camera, shape (height, width, 3)."""
         self.plotter.render()
         fine = self.plotter.screenshot(return_img=True)[..., :3]
         step, area = self._fineness, self._fineness**2

@@ -54,7 +54,7 @@ def patch(outline: ObstacleOutline, place: FloatArray, points: FloatArray, share
 
 
 def framing(outline: ObstacleOutline, places: FloatArray, points: FloatArray) -> FloatArray:
-    """What of an obstacle a picture should have in view: nothing of one that is far away or much larger than the rods.
+    """Return the part of an obstacle that a picture should show; none if it is far away or much larger than the rods.
 
     Parameters
     ----------
@@ -164,5 +164,5 @@ def zigzag(ends: FloatArray, width: float, normal: FloatArray) -> FloatArray:
 
 
 def spring_width(ends: FloatArray) -> float:
-    """How wide a spring is drawn [m], from where its ends are in all frames, shape (frames, 2, 3) [m]."""
+    """Return the drawn width of a spring [m], from its ends in all frames, shape (frames, 2, 3) [m]."""
     return 0.08 * float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=-1).max())

@@ -16,7 +16,7 @@ FloatArray = npt.NDArray[np.float64]
 
 
 def tendon_points(record: Frames, tendon: TendonOutline) -> FloatArray:
-    """Where its guides are in each frame, shape (frames, guides, 3) [m]."""
+    """Return the positions of the guides in each frame, shape (frames, guides, 3) [m]."""
     rods = {rod: record.rods[rod] for rod, _, _ in tendon.guides}
     positions = {index: record.positions(rod) for index, rod in rods.items()}
     return tendon.points(positions, {index: record.directors(rod) for index, rod in rods.items()})
