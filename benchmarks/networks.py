@@ -16,7 +16,7 @@ PUBLISHED_SIZE = "1900"  # of a source's network [kB]
 
 
 def torch_is_there() -> bool:
-    """Whether networks can be asked; says so if not."""
+    """True if networks can be asked; prints a note if not."""
     there = importlib.util.find_spec("torch") is not None
     if not there:
         print("\nNetworks: torch is not installed")

@@ -72,7 +72,7 @@ def _tags(report: Report, step: int) -> None:
 
 
 def _stiffness(report: Report) -> None:
-    """Stills of limbs whose curvatures are unknown do not tell their modulus, and the fit says so."""
+    """Stills of limbs whose curvatures are unknown do not determine their modulus, and the fit reports it."""
     pixels, limbs, rows = log().pixels, ("upper", "lower"), []
     for factor in (0.25, 1.0, 100.0):
         simulation, places = robot()

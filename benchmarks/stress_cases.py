@@ -27,7 +27,7 @@ __all__ = [
 
 SEED = 20_240_917
 EVENTS = ("load", "jump", "flip", "curl", "drawn curl", "weight")
-# The default twice. Plain midpoint steps gain energy in such scenes, and say so (`EnergyDriftWarning`).
+# The default twice. Plain midpoint steps gain energy in such scenes, and warn (`EnergyDriftWarning`).
 METHODS = ("static", "energy_momentum", "backward_euler", "energy_momentum", "error-controlled")
 
 

@@ -1,4 +1,4 @@
-"""Scenes that lie in a plane and would buckle out of it: their equilibria say so at the loads of the literature."""
+"""Planar scenes that would buckle out of their plane: equilibria warn at the loads of the literature."""
 
 import warnings
 

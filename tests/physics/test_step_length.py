@@ -1,4 +1,4 @@
-"""Steps that are too long for what moves are said so, once, with the step that would do; others are not."""
+"""Time steps that are too long for a motion give one warning with a suitable step; others give none."""
 
 import re
 import warnings
@@ -28,7 +28,7 @@ def string(step, integrator="implicit_midpoint", mode=1):
 
 
 def heard(simulation, steps=64):
-    """Warnings of steps, with the step that would do."""
+    """Warnings of steps, with the suitable step."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         simulation.step(steps)

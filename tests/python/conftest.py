@@ -13,7 +13,7 @@ def pytest_configure():
 
 @pytest.fixture
 def renderer():
-    """Skips, and says so, where nothing can be rendered."""
+    """Skips with a reason where nothing can be rendered."""
     pytest.importorskip("pyvista")
     from withe.view.graphics import probe_rendering
 

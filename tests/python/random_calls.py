@@ -364,7 +364,7 @@ def main() -> None:
     faulthandler.enable()
     warnings.simplefilter("error")
     warnings.simplefilter("ignore", category=DeprecationWarning)
-    # Four nodes under forces of any size are coarse, and are right to say so.
+    # Four nodes under forces of any size are coarse, and the warnings are right.
     warnings.simplefilter("ignore", category=withe.CoarseMeshWarning)
     warnings.simplefilter("ignore", category=withe.RingLeftWarning)
     warnings.filterwarnings("ignore", "the ramp of .* has not begun")

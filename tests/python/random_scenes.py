@@ -10,7 +10,7 @@ import withe
 
 SOFT = withe.Material(youngs_modulus=1e6, density=1000.0, viscosity=100.0)
 ELASTIC = withe.Material(youngs_modulus=2e6, poisson_ratio=0.3, density=800.0)
-# Statics seldom: where there is no equilibrium, it takes long to say so.
+# Statics seldom: where there is no equilibrium, finding this takes long.
 INTEGRATORS = (
     *("implicit_midpoint",) * 3,
     *("backward_euler", "energy_momentum", "fourth_order") * 2,
@@ -164,7 +164,7 @@ def draw_scene(number: int):
     integrator = r.choice(INTEGRATORS)
     scene = withe.Scene(gravity=(0, 0, -9.81) if r.random() < 0.7 else (0, 0, 0))
     planar = r.choice([None, None, None, False, True]) if flat else None  # True takes no functions of time
-    static = integrator == "static"  # mechanisms have no equilibrium, and take long to say so
+    static = integrator == "static"  # mechanisms have no equilibrium, and finding this takes long
     fourth = integrator == "fourth_order"  # goes back in time: no viscosity, no contact, no fluid
     material = ELASTIC if fourth else r.choice([SOFT, ELASTIC])
     a, b, floor = add_rods(scene, r, flat, material, ["rigid"] if static else JOINTS)
@@ -178,7 +178,7 @@ def draw_scene(number: int):
     }
     if integrator not in ("static", "verlet"):
         options["adaptive"] = r.random() < 0.85
-        options["max_halvings"] = r.choice([6, 2])  # or what cannot be solved takes long to say so
+        options["max_halvings"] = r.choice([6, 2])  # or a step without solution takes long to fail
         if r.random() < 0.15:
             options["tolerance"] = r.choice([1e-3, 1e-4])
     return scene, options

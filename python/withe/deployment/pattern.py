@@ -292,7 +292,7 @@ class Pattern:
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Pattern:
-        """The pattern of which `to_dict` says so, to the last digit: it is not smoothed again.
+        """Return the pattern of a `to_dict`, to the last digit: it is not smoothed again.
 
         Raises
         ------

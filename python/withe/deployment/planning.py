@@ -214,42 +214,45 @@ def plan(
     time_step: float = 0.02,
     progress: bool = True,
 ) -> Plan:
-    """Plan the whole motion: hang, touch down by pivoting on the free end, lay, let go.
+    """Plan the whole motion of a gripper that lays a cable along a pattern: hang, touch down, lay, release.
 
-    While the cable is laid, the jaw is where `grasp` puts it for the place of the pattern that lifts off (Choi,
-    dissertation, Alg. 12). Before, the cable hangs with its free end above the pattern's beginning, is lowered, and
-    leans over until it lies, without a force along the floor; a round end rolls by its radius times the angle, so that
-    it stands that much before its place. Behind the pattern the cable is laid straight on until the jaw lets go.
+    First, the cable hangs with its free end above the start of the pattern, is lowered, and pivots on its end until it
+    lies on the floor. Then the jaw follows the poses of `grasp` for each lift-off point of the pattern (Choi,
+    dissertation, Alg. 12). Behind the pattern the cable is laid straight on until the jaw releases it.
 
     Parameters
     ----------
     cable : Cable
+        Cable to lay.
     pattern : Pattern
+        Curve on the floor.
     controller : {"exact", "least_friction", "optimised", "network", "intuitive"}
-        No force along the cable where it lifts off; the push that needs least friction; the better of these along a
-        path that is shifted until the cable lies on its pattern in the rod engine, some 40 quasi-static runs; "exact"
-        from the small network that comes with withe, which asks nothing of friction and knows thin cables only, turned
-        as thick ones are (it needs torch); or the jaw straight above the lift-off point at the height of what still
-        hangs, upright, the baseline of the dissertation (figure 9.2).
+        * "exact": no force along the cable at the lift-off point.
+        * "least_friction": the push along the cable that needs the least friction.
+        * "optimised": the better of these, on a path that is shifted until the cable lies on its pattern in the rod
+          engine (about 40 quasi-static runs).
+        * "network": "exact" for thin cables from a small network, without friction. Needs torch.
+        * "intuitive": the jaw upright above the lift-off point, at the height of the suspended length; the baseline of
+          the dissertation (figure 9.2).
     friction : float
-        Coefficient between cable and floor: "optimised" plans for it, of "exact" and "least_friction" it is told where
-        it does not hold the cable. The others know no forces.
+        Friction coefficient between cable and floor. Needed by "optimised"; "exact" and "least_friction" warn where it
+        is too low.
     speed : float [m/s]
-        Of the lift-off point.
+        Speed of the lift-off point.
     tail : float [m]
-        How much cable is laid beyond the pattern: the middle of the jaw is pattern.length + tail from its free end.
-        None: 4 Lgb, or all that there is, or less where that would cross the pattern.
+        Length of cable beyond the pattern: the middle of the jaw is at pattern.length + tail from the free end. By
+        default 4 Lgb, or less if the cable is shorter or the tail would cross the pattern.
     start : {"free", "held"}
-        Whether the cable's free end stands on the floor by itself, or is held so that it slides up and down only, and
-        does not roll, until the jaw opens.
+        Free end of the cable: "free" stands on the floor. "held" may slide vertically only and does not roll, until the
+        jaw opens.
     crossings : {"refuse", "over"}
-        Whether pattern and tail may cross: the cable is then laid over itself, as if it had no thickness.
+        "over" allows crossings of pattern and tail, without the thickness of the cable.
     posts : sequence of Post
-        Between which the cable is laid. They help to hold it: such a pattern may need more friction than any floor has.
+        Posts between which the cable is laid. Posts help to hold the cable, so the needed friction may be high.
     time_step : float [s]
-        Between the rows of the plan.
+        Interval between the rows of the plan.
     progress : bool
-        Whether "optimised" shows a bar.
+        True to show a progress bar with "optimised".
 
     Returns
     -------
@@ -258,14 +261,19 @@ def plan(
     Raises
     ------
     ValueError
-        The cable is shorter than pattern and tail, or cannot bend so tightly; pattern or tail cross; a post stands in
-        the way; no floor has the friction that the pattern needs; speed, tail, time step or friction not positive;
-        "optimised" without friction; "network" for a cable or pattern beyond what it has learned.
+        The cable is shorter than pattern and tail, or the pattern bends too tightly; pattern or tail cross; a post is
+        too close; no friction is enough; a speed, tail, time step or friction is not positive; "optimised" without
+        friction; or "network" outside of its range.
 
     Warns
     -----
     UserWarning
-        The pattern needs more than the given friction, and neither posts nor "optimised" make up for it.
+        The pattern needs more than the given friction, without posts or "optimised".
+
+    Notes
+    -----
+    While the cable pivots, no force acts along the floor. A round end rolls by its radius times the angle, so it stands
+    that much before its place.
 
     Examples
     --------

@@ -47,44 +47,46 @@ def plan(
     ----------
     paper : Paper
     target : float [m] or str
-        Where the lifted edge comes down, from where it lay (the dissertation's C); the crease is in the middle. Or the
-        share of the sheet that is folded over: "half", "third", "quarter", or a fraction up to a half such as "2/5",
-        whose C is twice that share of the length. "half" is on the far edge, which long sheets do not reach without a
-        moment: what is refused says which targets can be.
+        Distance from the lifted edge in the flat sheet to its target (C of the dissertation); the crease is in the
+        middle. Or the share of the sheet that is folded over: "half", "third", "quarter", or a fraction up to a half
+        such as "2/5". Long sheets do not reach "half" without a moment; the error then names the possible targets.
     method : {"ucs", "slip", "local", "intuitive"}
-        "ucs": least accumulated ratio of the table's tangential to its normal force, on a grid of positions
-        [dissertation, Alg. 7, with costs that accumulate]. "slip": no predicted slide where such a way exists, or else
-        as little as can be, to 2e-3 Lgb; then short and little bent. "local": from each pose to the next one of least
-        tangential force, after Petrik et al. 2016, with the right stiffness. "intuitive": half a circle [dissertation,
-        (7.18)].
+        * "ucs": path of least accumulated ratio of tangential to normal force of the table, on a grid of positions
+          [dissertation, Alg. 7, with costs that accumulate].
+        * "slip": path without predicted slide, if one exists, or else with the least slide, to 2e-3 Lgb. Among these
+          the path is short, with little curvature.
+        * "local": from each pose to the next one of least tangential force, after Petrik et al. 2016.
+        * "intuitive": half a circle [dissertation, (7.18)].
     grasp : {"moment_free", "free"}
-        "moment_free": the angle of the jaw is that at which the sheet ends without curvature [dissertation, (7.6)].
-        "free", of method "slip": the jaw turns the edge as it likes, and curvature is bounded.
+        "moment_free": the jaw holds the edge at the angle without moment [dissertation, (7.6)]. "free", for method
+        "slip" only: the jaw may apply any moment, and the curvature of the sheet is bounded.
     uncertainty : pair of float
-        Of method "slip": shares by which Lgb may be more or less, and friction less, than the paper's. With a free
-        moment a way without slide is one on which no such sheet slides.
+        For method "slip": relative error of Lgb (either sign) and of friction (less) of the paper. With a free moment,
+        a path without slide is one on which no such paper slides.
     ending : {"auto", "slow", "plunge"}
-        "auto": of method "slip" with a free moment, a `plunge` where any paper within the uncertainty is predicted to
-        slide by more than 1 mm (`Plan.worst_slide`) on the way that comes down slowly, which it does where that asks
-        for more friction than there may be; elsewhere slow. A plunge is tried on simulated sheets, which takes some
-        8 s. Where none is found either, the plan comes down slowly, and its `blocked` says why. "plunge": always.
-        Of other methods "auto" is slow, but for sheets that will be looked at on the way: there it is a plunge where
-        the last part, which no look mends, needs more friction than there may be.
+        "plunge" always ends in a `plunge`; "slow" never does. "auto" depends on the method:
+
+        * method "slip" with a free moment: a plunge if some paper within the uncertainty would slide by more than 1 mm
+          (`Plan.worst_slide`) on the slow way.
+        * other methods, with `replans`: a plunge if the last part, which no camera corrects, needs more friction than
+          there may be. Without `replans`: slow.
+
+        A plunge is tested on simulated sheets, for about 8 s. If no plunge is found, the plan is slow, and its
+        `blocked` states the reason.
     replans : int
-        How often that will be, by `fold`. Sheets on which plunges are tried are led so.
+        Number of camera corrections that `fold` will make. Simulated sheets for plunges are corrected as often.
     curvature : float [1/Lgb]
-        Bound of the sheet's curvature with grasp "free", by default 2.5; without moment there is none.
+        Bound on the curvature of the sheet with grasp "free". By default 2.5.
     jaw : Jaw, optional
-        How it holds the sheet; by default 10 mm of it.
+        Jaw that holds the sheet. By default it holds 10 mm of the sheet.
     manifold : {"exact", "network"}
-        Of grasps without moment: where equilibria come from, each from its equations, or all from the network that
-        comes with withe (`SheetNetwork`), as the dissertation has them. No slower without it; it needs torch.
+        Source of equilibria without moment: their equations, or the network `SheetNetwork`, which needs torch.
     speed, acceleration : float [m/s], [m/s^2]
-        At most; of the sheet's outer edge.
+        Maximum speed and acceleration of the sheet's outer edge.
     turning : float [rad/s]
-        Rate of turning, at most.
+        Maximum rate of rotation.
     progress : bool
-        Whether to show a progress bar while plunges are tried.
+        True to show a progress bar while plunges are tested.
 
     Returns
     -------
@@ -93,16 +95,15 @@ def plan(
     Raises
     ------
     ValueError
-        A target outside the sheet, or one that no pose of the grasp has, with those that some have; sizes and limits
-        that are not positive; a bound of curvature without a moment to keep it, or one that is too low, with the least
-        that would do; no path, with what blocks it; with ending "plunge", that none is within bounds.
+        A target outside of the sheet, or one that the grasp cannot reach; the message names the possible targets. A
+        size or limit that is not positive. A curvature without ``grasp="free"``, or one that is too low. No path, with
+        the reason. No plunge within bounds, with ending "plunge".
 
     Warns
     -----
     UserWarning
-        Every way of method "slip" slides: with the least friction at which one would not. Also where the paper does not
-        slide, but another within the uncertainty: with which, and by how much. And where the sheet will jump
-        (`Plan.jumps_at`), but for method "intuitive", which often does.
+        The sheet slides on every path of method "slip"; the message names the friction that would be enough. Or
+        another paper within the uncertainty slides. Or the sheet jumps (`Plan.jumps_at`), except with "intuitive".
 
     Examples
     --------

@@ -125,8 +125,8 @@ def train_network(
     Returns
     -------
     Network
-        As it was after the epoch of least loss on the data held out. Ctrl-C, too, ends training with that; the
-        network's ``training.stopped`` says so.
+        Network after the epoch with the least loss on held-out data. Ctrl-C ends training with this network, and sets
+        its ``training.stopped``.
 
     Raises
     ------

@@ -68,8 +68,8 @@ def train_policy(
     -------
     stable_baselines3.SAC
         ``action, _ = policy.predict(observation, deterministic=True)``; its ``save`` and ``load`` keep it. Rewards of
-        episodes that ended last are in ``policy.ep_info_buffer``. Ctrl-C ends training with what has been learned by
-        then, and a warning that says so.
+        episodes that ended last are in ``policy.ep_info_buffer``. Ctrl-C ends training with a warning, and the
+        present policy is returned.
 
     Raises
     ------

@@ -91,9 +91,9 @@ def calibrate(
     The picture is x right, y down, and the camera looks straight at the plane, held nearly upright: a point (x, y) of
     the plane, right and up against gravity, is seen at offset + scale R(roll) (x, -y). The offset is always found.
 
-    Cameras on both sides of the plane are tried, and the one with the smaller residuals is kept. Where the other's are
-    as small, as for a robot that is drawn straight down, `Calibration.unobservable` says so, and the side is that from
-    which the robot appears, on the mean, as it is drawn.
+    Cameras on both sides of the plane are tried, and the one with the smaller residuals is kept. If both residuals are
+    equally small, as for a robot that is drawn straight down, `Calibration.unobservable` names the side, and the side
+    is the one from which the robot appears, on the mean, as it is drawn.
 
     What is found has errors, which `Fit.covariance` of a fit through this camera does not know of; all frames share
     them. With natural curvature constant along an arm, calibrated and fitted in the same frames, errors were 1.5 times

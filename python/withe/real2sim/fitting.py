@@ -42,45 +42,49 @@ def fit(
     max_iterations: int | None = None,
     progress: bool | Literal["always"] = True,
 ) -> Fit:
-    """Find unknowns with which equilibria look like targets, frame after frame.
+    """Fit parameters so that equilibria match targets, frame by frame.
 
-    Least squares over the residuals of all targets divided by their sigma. Every frame begins with what the frame
-    before it found. Natural curvature and twist are of each frame, all else of all of them.
+    The fit minimises the squares of the residuals of all targets, divided by their sigma. Each frame begins with the
+    result of the frame before. Natural curvature and twist belong to each frame; all other unknowns are shared.
 
-    The search ends in the local minimum that the first guess leads to; the covariance does not know of others. Where
-    sigma is given and residuals are far beyond it, `Fit.reasons` says so: try other first guesses.
+    The result is the local minimum near the initial guess. If sigma is given and residuals are much larger than sigma,
+    `Fit.reasons` reports it: try another initial guess.
 
     Parameters
     ----------
     simulation : Simulation
-        Its numbers are the first guess. It is left as it is; `Fit.apply` sets what was found.
+        Simulation whose values are the initial guess. It is not changed; `Fit.apply` sets the result.
     targets : Curvatures, Tags, Centrelines, or several
+        Targets of the fit.
     unknowns : sequence of tuples
-        ``(rod, "natural_curvature", basis)``, with basis "constant", "linear" (its values at both ends), "segment" (one
-        a stencil), or functions along the rod, array_like of shape (stencils, n); in space these count twice, for
-        both directors. ``(rod, "natural_twist", basis)`` in space. ``(part, word)`` for a positive parameter of a part
-        or of a tuple of parts, all multiplied by one factor: youngs_modulus, density, bend_stiffness, line_density, ...
-        of rods, mass, friction of an obstacle, stiffness and damping of revolute joints and springs.
-        ``(rod, "points", basis)`` for a rod as it was drawn, in a plane: by how much its edges are turned, over
-        functions of the same kinds, (edges, n), as if the scene were built anew: natural curvature follows, and
-        supports go where its nodes are drawn. ``(support, "position")`` and ``(support, "rotation")`` for poses.
-        Where one sets another (see `Simulation.set`), as youngs_modulus does twist_stiffness, it acts through what is
-        left to it.
+        * ``(rod, "natural_curvature", basis)``: basis "constant", "linear" (values at both ends), "segment" (one per
+          stencil), or functions along the rod of shape (stencils, n). In space each function counts for both directors.
+        * ``(rod, "natural_twist", basis)``: in space only.
+        * ``(part, word)``: a positive parameter of a part, or of a tuple of parts that share one factor, such as
+          youngs_modulus, density or bend_stiffness of rods, mass, friction of an obstacle, stiffness and damping of
+          revolute joints and springs.
+        * ``(rod, "points", basis)``: the drawn shape of a rod in a plane, by rotations of its edges over functions of
+          shape (edges, n). Natural curvature and supports follow the drawing.
+        * ``(support, "position")`` and ``(support, "rotation")``: pose of a support.
+
+        If one unknown sets another (see `Simulation.set`), as youngs_modulus sets twist_stiffness, it acts on the
+        remaining values only.
     method : {"gauss_newton", "lbfgs", "source"}
         "source" is gradient descent by forward differences on the sum of absolute residuals [Choi, doctoral
-        dissertation, University of California, Los Angeles, Algorithm 6], for constant natural curvature in a plane;
-        its unknown is a limb's whole turn in radians, its first step 0.1.
+        dissertation, University of California, Los Angeles, Algorithm 6]. It fits constant natural curvature in a
+        plane, as the whole turn of a limb in radians, with a first step of 0.1.
     shared : sequence of tuples
-        Further unknowns that all frames share: natural curvature of one rod under several loads.
+        Further unknowns that all frames share, such as the natural curvature of one rod under several loads.
     conditions : callable, optional
-        Called with a simulation and the frame before each equilibrium, to set loads or to move supports. Once more
-        with a copy and the first frame, so that a ValueError in it is heard.
+        Called with a simulation and the frame before each equilibrium, to set loads or move supports. It is called once
+        more with a copy and the first frame, so that its errors are raised early.
     tolerance : float, optional
-        Norm of residuals below which a frame is done, 1e-10; the sum of their sizes with "source", 2.5e-3.
+        Norm of residuals below which a frame has converged. By default 1e-10; with "source" the sum of absolute
+        residuals, 2.5e-3.
     max_iterations : int, optional
-        Of each frame; 50, or 1000 with the other methods.
+        Maximum number of iterations per frame. By default 50, or 1000 with "lbfgs" and "source".
     progress : bool or "always"
-        Whether to show a progress bar; True shows one on a terminal and in a notebook.
+        True to show a progress bar on a terminal and in a notebook.
 
     Returns
     -------
@@ -89,8 +93,8 @@ def fit(
     Raises
     ------
     ValueError
-        Targets of unlike lengths, with no frame in which anything was seen, or what cannot be unknown, or not together
-        with the others.
+        Targets with different numbers of frames or without any data, or an unknown that cannot be fitted, or not
+        together with the others.
 
     Examples
     --------

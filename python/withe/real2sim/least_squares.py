@@ -35,9 +35,9 @@ _SMALL = 1e-5  # a step that would lessen the residual by less than this share o
 _TRIALS = 8
 _TRIALS_OF_INEXACT = 2  # with derivatives that are updated or of another frame; then they are asked for anew
 _WORTH = 0.01
-_SMALL_OF_SECANTS = 1e-2  # likewise, of what each number that was seen leaves
-# Distances from lines of noisy points have kinks: likewise where a step lessens the square of the residual by less than
-# this share of what new derivatives promise.
+_SMALL_OF_SECANTS = 1e-2  # share of the residual of each observed number below which a step with secants is the last
+# Distances from lines of noisy points have kinks: a step is the last if it reduces the square of the residual by less
+# than this share of what new derivatives predict.
 _SMALL_AT_KINK, _USEFUL = 5e-2, 0.1
 
 

@@ -52,62 +52,64 @@ def fit_motion(
     max_iterations: int = 50,
     progress: bool | Literal["always"] = True,
 ) -> Fit:
-    """Find unknowns with which a run looks like targets, all frames together.
+    """Fit parameters so that a run matches targets in all frames.
 
-    Gauss-Newton on the residuals of all frames. Derivatives are differences of runs at the beginning and at the end,
-    one run an unknown (those by the delay are velocities); secants update them in between. Between time steps
-    positions are those of cubic polynomials through positions and velocities.
-
-    With ``method="lbfgs"`` the sum of squares has its gradient by one way back through each run (`Record.gradient`),
-    for however many unknowns; at the end comes one run an unknown, for the covariance.
-
-    Both end in a local minimum; the covariance does not know of others. There are many where a rod rings: with a
-    stiffness that is two or three times the true one, a run is soon a whole swing ahead. Where sigma is given and
-    residuals are far beyond it, `Fit.reasons` says so: fit the first swings alone and begin with what they tell, or try
-    other first guesses, or ``method="lbfgs"``, which takes other steps.
-
-    The covariance counts errors of the discretisation. A further run with half the time step tells that of the step.
-    Residuals that are correlated from frame to frame are not noise: they tell that of the mesh, or of the model. Where
-    either may move an unknown by more than a hundredth of its scale (by 1 % for parameters), `Fit.reasons` names it.
+    The result is the local minimum near the initial guess. A ringing rod has many minima: with two or three times the
+    true stiffness, the run is soon a whole period ahead. If sigma is given and residuals are much larger than sigma,
+    `Fit.reasons` reports it: fit the first periods only and begin with their result, try another initial guess, or use
+    ``method="lbfgs"``.
 
     Parameters
     ----------
     simulation : Simulation
-        In the state in which the motion begins; its numbers are the first guess. It is left as it is.
+        Simulation in the initial state of the motion; its values are the initial guess. It is not changed.
     targets : Tags, Centrelines, Curvatures, or several
-        With the times of their frames, from the start of the motion.
+        Targets with the times of their frames, from the start of the motion.
     unknowns : sequence
-        As in `fit`; viscosity, viscous_time, drag, damping and friction show here too, and natural curvature is one for
-        the whole motion. Where supports are unknown, `begin` has to go to an equilibrium. Or "delay": how much later
-        than the run's the clock of the targets began, so that their time t is t + delay in the run, never less than 0.
+        Unknowns as in `fit`, also viscosity, viscous_time, drag, damping and friction. Natural curvature is constant
+        during the motion. With unknown supports, `begin` must find an equilibrium. "delay" is the delay of the clock of
+        the targets: their time t is t + delay in the run, never less than 0.
     begin : callable, optional
-        Called with a simulation before each run, when its numbers are set: to find the equilibrium from which it is let
-        go, which depends on them, and to let it go.
+        Called with a simulation before each run, after its parameters are set, to find the initial equilibrium and to
+        release it.
     delay : float [s]
-        Of the clocks; the first guess if it is unknown.
+        Delay of the clocks, or its initial guess.
     method : {"gauss_newton", "lbfgs"}
-        The latter needs a run with a gradient; a planar scene, where `begin` is given; no unknown poses of supports or
+        "lbfgs" needs a run with a gradient, a planar scene if `begin` is given, and no unknown poses of supports or
         drawn nodes.
     max_iterations : int
+        Maximum number of iterations.
     progress : bool or "always"
+        True to show a progress bar on a terminal and in a notebook.
 
     Returns
     -------
     Fit
-        With one row of values, for the whole motion; `solves` counts runs. Outliers are not looked for.
+        Result with one row of values for the whole motion. `solves` counts runs. Outliers are not detected.
 
     Raises
     ------
     ValueError
-        Targets without times, in which nothing was seen, or what cannot be unknown.
+        Targets without times or data, or an unknown that cannot be fitted.
     ConvergenceError
-        The run fails with the first guess.
+        The run fails with the initial guess.
 
     Warns
     -----
     UserWarning
-        Frames are more than ten periods of the slowest mode apart, and a run has 100,000 time steps or more: times
-        that are not in seconds look so.
+        Frames are more than ten periods of the slowest mode apart, and a run has 100,000 time steps or more: the times
+        may not be in seconds.
+
+    Notes
+    -----
+    "gauss_newton" finds derivatives by finite differences at the beginning and at the end, one run per unknown, and
+    updates them by secants in between. Derivatives by the delay are velocities. Positions between time steps follow
+    from cubic polynomials. "lbfgs" finds the gradient by one pass backwards through each run (`Record.gradient`) for
+    any number of unknowns, and makes one run per unknown at the end, for the covariance.
+
+    The covariance includes errors of the discretisation. A run with half the time step estimates the error of the time
+    step. Residuals that are correlated from frame to frame indicate an error of the mesh or model. `Fit.reasons` names
+    an error that may change an unknown by more than 1 % of its scale.
 
     Examples
     --------

@@ -280,11 +280,10 @@ def _nothing_to_set(part: Part) -> str:
     if isinstance(part, JoinPart):
         first, second = part.node_names
         return (
-            f"joint {part.name!r} is {part.kind} and has nothing to set; revolute ones have a motor, a spring and a "
-            "damper. To drive it: equal and opposite moments on the rods "
-            f"at both sides, scene.add_moment({first}, ...) and scene.add_moment({second}, ...), which "
-            "set(load, moment=...) changes or makes a function of time; set_natural_curvature or set_natural_twist of "
-            "a rod beside it; or, to prescribe where it is, clamp or pin its node and move that"
+            f"joint {part.name!r} is {part.kind} and has nothing to set: only revolute joints have a motor, a spring "
+            f"and a damper. To drive the joint, add opposite moments, scene.add_moment({first}, ...) and "
+            f"scene.add_moment({second}, ...), and change them by set(load, moment=...). Or actuate a rod beside it by "
+            "set_natural_curvature, or clamp its node and move the clamp"
         )
     return f"{part.name!r} has nothing to set. {_SETTABLE}"
 

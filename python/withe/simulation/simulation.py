@@ -181,25 +181,24 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
         Parameters
         ----------
         stable : bool
-            If False, an equilibrium that is not stable is returned where the path leads to one: the straight shape of a
-            column that carries more than Euler's load, an arch in the shape of an M. The result says so in
-            `Equilibrium.stable`. Draw or set the rods near the shape that is wanted. At a limit point, where no
-            equilibrium is near, the scene goes on dynamically all the same. A path by arc length follows branches that
-            are not stable in any case.
+            False to allow unstable equilibria: the straight shape of a column above Euler's load, or an arch in the
+            shape of an M. `Equilibrium.stable` of the result is then False. Draw or set the rods near the desired
+            shape. At a limit point the scene moves dynamically all the same. A path by arc length follows unstable
+            branches in any case.
         path : "arc_length", optional
+            Follow the branch by arc length, and return its points.
         load : Load, str, or several, optional
-            Loads whose present values the load factor multiplies. Without any, the factor is that of all that has been
-            changed since the last equilibrium (in the drawn state: of all loads), 0 before and 1 as it is asked for:
-            supports that were moved, loads, gravity, natural shapes; the last three as forces out of balance.
+            Loads whose present values are multiplied by the load factor. Without loads, the factor multiplies all
+            changes since the last equilibrium (in the drawn state: all loads), from 0 to 1. Changed loads, gravity and
+            natural shapes then act as residual forces.
         start : float
-            Load factor at which the path begins, with the equilibrium to which the present state leads there. Needs
-            loads.
+            Load factor at the start of the path. Needs loads.
         to : float
-            Load factor at which the path ends, the first time that it is met. The loads keep that factor.
+            Load factor at the end of the path. The loads keep this factor.
         steps : int
-            The path also ends after so many steps.
+            Maximum number of steps of the path.
         turn : float [rad]
-            Greatest turn of an edge from one point of the path to the next.
+            Greatest rotation of an edge from one point of the path to the next.
 
         Returns
         -------
@@ -209,9 +208,9 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
         Raises
         ------
         ConvergenceError
-            None was found, or there is none (a free rod under gravity).
+            No equilibrium was found, or none exists (a free rod under gravity).
         ValueError
-            A load that is a function of time, or a load factor or number of steps that cannot be.
+            A load that is a function of time, or a load factor or number of steps out of range.
 
         Examples
         --------

@@ -20,42 +20,45 @@ FloatArray = npt.NDArray[np.float64]
 
 
 class StateSpace:
-    """Methods of `Simulation` that take its state as a vector.
+    """Methods of `Simulation` for differences of states as vectors.
 
-    A state has no coordinates of its own, since directors and joints turn; its difference from another state has. It
-    has twice as many numbers as there are free unknowns: displacements of nodes [m], turns of edges' directors about
-    their tangents (in space) and of joints [rad], less what supports hold; then their rates [m/s], [rad/s]. The order
-    is that of ``linearise()``, whose ``displacement`` makes displacements of nodes of the first half, and velocities
-    of nodes of the second.
+    The difference of two states is a vector with two numbers per free unknown. The first half has displacements of
+    nodes [m], rotations of directors about their tangents (in space) and rotations of joints [rad]. The second half has
+    their rates [m/s], [rad/s]. The order is that of ``linearise()``, whose ``displacement`` converts the first half to
+    displacements of nodes, and the second half to velocities of nodes.
     """
 
     _session: Session
 
     def step_jacobian(self, wrt: Sequence[Unknown] = ()) -> tuple[Any, Any]:
-        """Derivatives of the state one time step from now, by the present state and by what acts in that step.
+        """Return the sparse matrices A and B of the next time step, linearised about the present state.
 
-        x' = A x + B u to first order, where x and x' are differences (`state_difference`) from the present state and
-        from the one that it leads to, and u are changes of the values of `wrt`. The simulation itself stays where it
-        is. By adjoints, a solve for every number of the state: exact to rounding, inner steps included.
+        To first order x' = A x + B u, with the differences x from the present state and x' from the state after the
+        step (`state_difference`), and with changes u of the values of `wrt`. The simulation is not changed.
 
         Parameters
         ----------
         wrt : list
-            Pairs of a part and a word of `set`, or "gravity", as in `Record.gradient`; none by default.
+            Parameters: pairs of a part and a word of `set`, or "gravity", as in `Record.gradient`. By default none.
 
         Returns
         -------
         A : csr_array of shape (2 unknowns, 2 unknowns)
+            Derivative by the present state.
         B : csr_array of shape (2 unknowns, inputs)
-            Columns are those of each of `wrt` in turn, its values in the order of ``get(...).ravel()``. An implicit
-            step couples all that hangs together: what is zero in either is what does not.
+            Derivative by each item of `wrt` in turn, in the order of ``get(...).ravel()``.
 
         Raises
         ------
         ConvergenceError
-            The step cannot be solved.
+            The step does not converge.
         ValueError
-            What has no gradient, as in `Record.gradient`, and natural shapes on their way (`over=`).
+            A parameter or scene without a gradient, as in `Record.gradient`, or a ramp of a natural shape (`over=`).
+
+        Notes
+        -----
+        The matrices follow from the adjoint method with one solve per row, exact to rounding, inner steps included. An
+        implicit step couples all unknowns of connected parts; other entries are zero.
 
         Examples
         --------
@@ -98,9 +101,9 @@ class StateSpace:
     def state_difference(self, reference: Any) -> FloatArray:
         """Return the difference of the present state from that of a copy of this simulation, shape (2 unknowns,).
 
-        Positions and velocities are subtracted. An edge's directors turn by at most half a turn from those of the
-        reference, taken along by the smallest turn between the two tangents; joints turn by 2 tan(angle / 2) about
-        their axis. See `step_jacobian`.
+        Positions and velocities are subtracted. Rotations of directors are relative to the reference after parallel
+        transport between the two tangents, and at most half a turn. Joints count by 2 tan(angle / 2) about their axis.
+        See `step_jacobian`.
 
         Parameters
         ----------
@@ -117,7 +120,7 @@ class StateSpace:
         return np.array(self._session.world.state_difference(reference._session.world))
 
     def displace_state(self, by: npt.ArrayLike) -> None:
-        """Add a difference of states to the present one: the inverse of `state_difference`. Contacts go on.
+        """Add a difference of states to the present state, as the inverse of `state_difference`.
 
         Parameters
         ----------
