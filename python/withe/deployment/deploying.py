@@ -78,38 +78,34 @@ def deploy(
     quasi_static: bool = False,
     progress: bool = True,
 ) -> Deployment:
-    """Carry out a plan in the rod engine: the whole cable in space, from hanging to laid, on a floor with friction.
+    """Simulate a plan in the rod engine: the whole cable in space, from hanging to laid, on a floor with friction.
 
-    Nothing of the plan but the jaw's motion is known there: the cable has thickness, weight, torsion and inertia,
-    touches the floor where it comes to, and sticks to it by anchored friction at its surface, on which it rolls.
-    Backward Euler steps; density 1180 kg/m^3, Kelvin-Voigt viscosity of 0.02 s. The jaw holds 10 mm of the cable; its
-    pads yield by 0.5 mm/N and 20 rad/(N m), and less under heavy and stiff cables, by 1e-4 Lgb^3 / EI and
-    Lgb / (300 EI); so a jaw too low rests on the floor.
+    The simulation takes only the motion of the jaw from the plan. The cable has thickness, weight, torsion and inertia,
+    and rolls on the floor with anchored friction at its surface.
 
     Parameters
     ----------
     plan : Plan
     cable : Cable
-        The true one, if it is not the planner's; held as far from its free end as the plan says.
+        True cable, if it differs from the planner's. The jaw holds it at the length of the plan.
     floor : float
         Coefficient of friction between cable and floor. Without any, nothing stays where it is laid.
     rolling_friction : float
-        Of the floor, see `Scene.add_floor`. Without any, a straight cable that is let go under tension, a little askew,
-        rolls aside by millimetres.
+        Rolling friction of the floor, see `Scene.add_floor`. Without it, a straight cable that is released under
+        tension, at a small angle, rolls aside by millimetres.
     seed : int
-        Of the trial's noise.
+        Seed of the noise.
     noise : float
-        Scale of what a planner does not know, drawn once a trial: 1 stands for standard deviations of 5 % in Lgb, 20 %
-        in friction, a natural curvature of 0.5 / m, and a jaw that is off by 0.5 mm and 0.5 degrees on each axis.
+        Scale of deviations that the planner does not know, drawn once per trial. With 1 the standard deviations are 5 %
+        in Lgb, 20 % in friction, 0.5 / m in natural curvature, and 0.5 mm and 0.5 degrees of the jaw on each axis.
     nodes : int
-        Of the rod, 20 to 2000.
+        Number of nodes of the rod, 20 to 2000.
     time_step : float [s]
-        By default 0.01, or 0.1 where the motion is quasi-static.
+        Time step. By default 0.01, or 0.1 for quasi-static motion.
     quasi_static : bool
-        Whether the cable passes through equilibria, as if everything went infinitely slowly: some four times as fast
-        to compute, and free of swing.
+        True if the cable passes through equilibria. This is about four times as fast, and without swing.
     progress : bool
-        Whether a bar is shown.
+        True to show a progress bar.
 
     Returns
     -------
@@ -118,8 +114,14 @@ def deploy(
     Raises
     ------
     ValueError
-        Friction that is not positive, negative noise or rolling friction, a cable shorter than the plan holds, wrong
-        numbers of nodes.
+        Friction that is not positive, negative noise or rolling friction, a cable shorter than the plan's, or a number
+        of nodes out of range.
+
+    Notes
+    -----
+    The simulation takes backward Euler steps with a density of 1180 kg/m^3 and a Kelvin-Voigt time of 0.02 s. The jaw
+    holds 10 mm of the cable. Its pads yield by 0.5 mm/N and 20 rad/(N m), and less under heavy and stiff cables, by
+    1e-4 Lgb^3 / EI and Lgb / (300 EI). A jaw that is too low therefore rests on the floor.
 
     Examples
     --------

@@ -75,36 +75,26 @@ def grasp(
 ) -> Grasp:
     """Find the grasp that lays a rod with a given curvature at its lift-off point.
 
-    A rod in space, straight and round, hangs between a flat floor, which it leaves along x with a curvature in the
-    floor's plane and none across it, and a jaw that bends it nowhere. In units of Lgb = (EI / 2w)^(1/3) and w,
-
-        t' = m x t / 2,  m' = -(1 + e) t x n,  n = -force + s z,  e = n.t / (2 stretch_stiffness),  r' = (1 + e) t,
-        t(0) = x,  m(0) = -2 curvature z,  m(suspended) = 0,
-
-    (Choi, dissertation, (9.1) and what (9.3) leaves of it), solved by multiple shooting with exact derivatives. The two
-    unknowns are the floor's forces across the rod, along y and z; none acts along it, or a given one.
-
-    A rod of some radius r rests on its surface, where friction acts: m(0) gains r (force_x y - force_y x), and
-    -r force_y twists what hangs. Held by a jaw that is turned as far, the rod does not roll where it lies, but for a
-    little behind the lift-off point, where it moves aside as it rolls: friction f across bends it, EI d^4y/ds^4 = f,
-    and turns it, GJ d^2y/ds^2 = r^2 f. So f dies out as exp(-s / b) with b = r sqrt(EI / GJ), force_y acts b behind
-    the lift-off point, and m(0) gains b force_y z. (Not in the dissertation, whose cables are thin.)
+    The rod is straight and round. It hangs between a flat floor, which it leaves along x with a curvature in the plane
+    of the floor, and a jaw that applies no moment. Lengths are in units of Lgb = (EI / 2w)^(1/3), forces in w Lgb, with
+    the weight w per length.
 
     Parameters
     ----------
     suspended : array_like [Lgb]
-        Length that hangs, 0.1 to 100. Beyond 7 the forces no longer depend on it.
+        Suspended length, 0.1 to 100. Forces no longer depend on it beyond 7.
     curvature : array_like [1/Lgb]
-        At lift-off, -6 to 6. **A positive one bends the rod towards -y**, to the right of its way, as in the tables of
-        the dissertation's public code; (9.1) has it the other way round.
+        Curvature at the lift-off point, -6 to 6. **A positive curvature bends the rod towards -y**, to the right of its
+        way, as in the tables of the dissertation's public code. (9.1) has the opposite sign.
     stretch_stiffness : array_like
-        EA Lgb^2 / EI, 4 (Lgb / radius)^2 of a round rod (9.10); at least 100, and 4 times the suspended length.
+        EA Lgb^2 / EI, which is 4 (Lgb / radius)^2 for a round rod (9.10). At least 100, and at least 4 times the
+        suspended length.
     axial_force : array_like [w Lgb]
-        Of the floor on the suspended part along x. Friction at the lift-off point alone is least with a push of some
-        0.82 curvature^2.
+        Force of the floor on the suspended part along x. A push of about 0.82 curvature^2 needs the least friction at
+        the lift-off point.
     radius : array_like [Lgb]
-        How far below the centreline the floor's force acts: at most 0.25; 0 in the dissertation. GJ is that of a round
-        rod of incompressible material.
+        Distance from the centreline down to the floor's force, at most 0.25; 0 in the dissertation. GJ is that of a
+        round rod of incompressible material.
 
     Returns
     -------
@@ -115,8 +105,24 @@ def grasp(
     ValueError
         Not numbers, out of range, or shapes that do not broadcast.
     ConvergenceError
-        There is no such grasp, as with an axial force that is too large, or a thick rod so bent that its twist lifts
-        it off the floor.
+        No grasp exists: the axial force is too large, or the twist of a thick bent rod lifts it off the floor.
+
+    Notes
+    -----
+    The equations are
+
+        t' = m x t / 2,  m' = -(1 + e) t x n,  n = -force + s z,  e = n.t / (2 stretch_stiffness),  r' = (1 + e) t,
+        t(0) = x,  m(0) = -2 curvature z,  m(suspended) = 0
+
+    (Choi, dissertation, (9.1) and (9.3)), solved by multiple shooting with exact derivatives. The two unknowns are the
+    forces of the floor across the rod, along y and z.
+
+    A rod of radius r rests on its surface, where friction acts: m(0) has the additional part r (force_x y - force_y x),
+    and -r force_y twists the suspended part. The jaw is turned by this twist, so that the laid rod rolls only close
+    behind the lift-off point. There it moves aside as it rolls: friction f across bends it, EI d^4y/ds^4 = f, and
+    turns it, GJ d^2y/ds^2 = r^2 f. So f decays as exp(-s / b) with b = r sqrt(EI / GJ), force_y acts b behind the
+    lift-off point, and m(0) has the additional part b force_y z. This part is not in the dissertation, whose cables are
+    thin.
 
     Examples
     --------

@@ -59,46 +59,50 @@ def fold(
     tolerance: float = TOLERANCE,
     progress: bool = True,
 ) -> Fold | WideFold:
-    """Carry out a plan in parts, and plan the rest anew after each from where a camera sees that the sheet has slid to.
+    """Carry out a plan in parts, and plan the rest again after each part from the slide that a camera sees.
 
-    Poses of the rest begin where the jaw is, and are those of the sheet where it lies now; by how much the jaw's angle
-    is off that of the manifold there goes to zero evenly along the way [dissertation, (7.14)-(7.16)]. Where the jaw
-    cannot hold a sheet that has slid so, it goes on as planned until it can. The edge comes down where the sheet is
-    now, and not where it was. A plunge is not planned anew: the sheet is looked at before it last, and it goes down
-    where the sheet is then.
+    The edge comes down on the sheet in its present place. A plunge is not planned again: the camera looks at the sheet
+    before the plunge, and the plunge is shifted to the place of the sheet.
 
     Parameters
     ----------
     plan : Plan
+        Plan to carry out.
     sheet : SimulatedSheet or WideSheet
-        Of a wide one the middle of the far edge is followed: a jaw that moves in a plane cannot turn with it.
+        Sheet to fold. For a wide sheet the camera follows the middle of the far edge.
     replans : int
-        How many times the jaw stops and the sheet is looked at, at equal distances of the way. The dissertation's N is
-        one more.
+        Number of stops at which the camera looks at the sheet, at equal distances of the way. N - 1 in the
+        dissertation.
     camera : withe.perception.Camera, optional
-        Over the table. By default an `overhead_camera` over the sheet's far edge. Its pixels are 0.5 mm on the table;
-        for an edge wider than 0.218 m the camera hangs higher, so that both corners are in the picture.
+        Camera over the table. By default an `overhead_camera` over the sheet's far edge, with pixels of 0.5 mm on the
+        table. For an edge wider than 0.218 m the camera hangs higher, so that both corners are in the picture.
     tolerance : float [m]
-        A plan stays where the sheet has slid less than this since it was made; also where its far edge is not seen.
+        Slide below which the plan is kept. The plan is also kept if the far edge is not visible.
     progress : bool
-        Whether to show a progress bar.
+        True to show a progress bar.
 
     Returns
     -------
-    Fold, or WideFold of a wide sheet
-        With the slides that were seen.
+    Fold or WideFold
+        Result with the slides that the camera saw; `WideFold` for a wide sheet.
 
     Raises
     ------
     ValueError
-        Not a plan or a sheet, a negative tolerance, no path from where the sheet has slid to.
+        Not a plan or a sheet, a negative tolerance, or no path from the place of the sheet.
     ImportError
         OpenCV is not installed.
 
     Warns
     -----
     UserWarning
-        The camera never saw the far edge, so that the plan was carried out as it was made.
+        The camera never saw the far edge, so no slide was corrected.
+
+    Notes
+    -----
+    The new poses begin at the pose of the jaw. The difference of the jaw's angle from that of the manifold decreases to
+    zero evenly along the way [dissertation, (7.14)-(7.16)]. If the jaw cannot hold the sheet after its slide, the old
+    plan continues until the jaw can.
 
     Examples
     --------

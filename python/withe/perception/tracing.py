@@ -111,12 +111,12 @@ def trace(
     Parameters
     ----------
     image : str, Path or array_like of shape (height, width, 3)
-        A file, or red, green, blue as uint8; one channel (grey) or a fourth (alpha, ignored) will do.
+        A file, or red, green and blue as uint8. One channel (grey) and a fourth (alpha, ignored) are accepted.
     mask : array_like of shape (height, width), or callable, optional
-        Which pixels belong to cables: booleans or numbers, or a function from the picture to such an array, as
-        `color_filter` and `network_mask` make. By default what differs from the border (`border_filter`).
+        Pixels of cables: booleans or numbers, or a function from the picture to such an array, as `color_filter` and
+        `network_mask` return. By default the pixels that differ from the border (`border_filter`).
     method : {"withe", "mbest"}
-        Ours, or the published one as it is described, for comparison.
+        Method of this package, or the published one for comparison.
 
     Returns
     -------

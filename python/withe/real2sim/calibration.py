@@ -86,35 +86,35 @@ def calibrate(
     unknowns: Sequence[Any] | None = None,
     progress: bool | Literal["always"] = True,
 ) -> Calibration:
-    """Find the camera that saw tags of a robot in a plane, together with the robot's shapes.
+    """Calibrate the camera that saw tags of a planar robot, together with the robot's shapes.
 
-    The picture is x right, y down, and the camera looks straight at the plane, held nearly upright: a point (x, y) of
-    the plane, right and up against gravity, is seen at offset + scale R(roll) (x, -y). The offset is always found.
+    The camera looks straight at the plane and is nearly upright. A point (x, y) of the plane, right and up against
+    gravity, is seen at offset + scale R(roll) (x, -y), with x right and y down in the picture. The offset is always
+    fitted.
 
     Cameras on both sides of the plane are tried, and the one with the smaller residuals is kept. If both residuals are
     equally small, as for a robot that is drawn straight down, `Calibration.unobservable` names the side, and the side
     is the one from which the robot appears, on the mean, as it is drawn.
 
-    What is found has errors, which `Fit.covariance` of a fit through this camera does not know of; all frames share
-    them. With natural curvature constant along an arm, calibrated and fitted in the same frames, errors were 1.5 times
-    the sigmas of the fit for nine tags in 12 frames, and 2.2 times for six tags in 6. They lessen with the root of the
-    number of frames here.
-
     Parameters
     ----------
     simulation : Simulation
-        Planar. It is left as it is.
+        Planar simulation of the robot. It is not changed.
     tags : Tags
-        In pixels, without a camera, with two places at least.
+        Tags in pixels, without a camera, with at least two places.
     frames : slice or sequence of int
-        Which to use; leave some to see how well the camera fits them.
+        Frames to use. Leave some out to test the camera on them.
     free : sequence of {"roll", "scale", "arcs", "tilt"}
-        What to find: the camera's roll; its scale, else that of the tags' distances in the picture; where the tags
-        are, but for the first, and the last if it is at the tip; the tilt of the base. What is not free is 0 or as
-        given in `tags`.
+        Fitted quantities; the others are 0 or as given in `tags`.
+
+        * "roll": roll of the camera
+        * "scale": its scale; otherwise the scale follows from the distances of the tags
+        * "arcs": places of the tags along the robot, except the first, and the last if it is at the tip
+        * "tilt": tilt of the base
     unknowns : sequence of tuples, optional
-        As in `fit`; by default every rod's natural curvature, constant along it.
+        Unknowns of the robot, as in `fit`. By default a constant natural curvature of every rod.
     progress : bool or "always"
+        True to show a progress bar on a terminal and in a notebook.
 
     Returns
     -------
@@ -123,9 +123,18 @@ def calibrate(
     Raises
     ------
     ValueError
-        A simulation that is not planar, tags that are not in pixels, or nothing seen.
+        A simulation that is not planar, tags that are not in pixels, or no visible tag.
     ConvergenceError
         The robot has no equilibrium for some frame.
+
+    Notes
+    -----
+    The calibration has errors that all frames share, and that `Fit.covariance` of a fit with this camera does not
+    include. They decrease with the root of the number of frames. With natural curvature constant along an arm,
+    calibrated and fitted in the same frames:
+
+    * nine tags in 12 frames: errors were 1.5 times the sigmas of the fit
+    * six tags in 6 frames: 2.2 times
     """
     listed = _checked(simulation, tags, free)
     chosen = _chosen(frames, tags.frames)

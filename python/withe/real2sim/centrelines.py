@@ -204,33 +204,36 @@ def rest_shape(
     sigma: float | None = None,
     progress: bool | Literal["always"] = False,
 ) -> Fit:
-    """Find the shape that a rod would have without its weight, from a photograph of it as it sags.
+    """Fit the rest shape of a rod, without its weight, to a photograph of the sagging rod.
 
     Parameters
     ----------
     simulation : Simulation
-        The rod as it is held, with its stiffness and weight; it is left as it is.
+        Simulation of the supported rod with its stiffness and weight. It is not changed.
     rod : Rod or str
+        Rod to fit.
     centreline : array_like of shape (n, 2) [px] or (n, 3) [m]
-        Seen along it, such as `perception.trace(picture).centrelines[0]`; pixels need the camera.
+        Points along the rod, such as `perception.trace(picture).centrelines[0]`. Pixels need the camera.
     camera : perception.Camera, optional
+        Camera of the photograph.
     basis : optional
-        Of natural curvature, or of the turns of edges, as in `fit`. By default "linear"; to natural curvature cosines
-        are added, twice as many functions each time, for as long as the centreline tells more: until it is followed to
-        within `sigma`, or chance explains how much closer more functions come (F test).
+        Basis of natural curvature, or of the rotations of edges, as in `fit`. By default "linear", to which cosines are
+        added for natural curvature. The number of functions doubles until the centreline is followed to within `sigma`,
+        or until more functions are not significant (F test).
     unknown : {"natural_curvature", "points"}
-        With "points", the rod as it was drawn and what holds it: also the angle at which it is clamped.
+        "points" fits the drawn shape of the rod with its supports, including the angle of a clamp.
     ends : bool
-        Whether the centreline goes from end to end.
+        True if the centreline goes from end to end.
     sigma : float, optional [px or m]
-        Standard deviation of a coordinate of the centreline; estimated from what the fit leaves by default.
+        Standard deviation of a coordinate of the centreline. By default estimated from the residuals.
     progress : bool or "always"
+        True to show a progress bar on a terminal and in a notebook.
 
     Returns
     -------
     Fit
-        Of one frame; `found.apply(simulation)` gives the rod this rest shape, and `found.points(rod)` has its nodes
-        where ``points`` were unknown. `Fit.reasons` names a basis that does not follow the centreline.
+        Result with one frame. `found.apply(simulation)` sets the rest shape. With ``unknown="points"``,
+        `found.points(rod)` returns the drawn nodes. `Fit.reasons` names a basis that does not follow the centreline.
 
     Raises
     ------
