@@ -12,7 +12,7 @@ constexpr double kMaxGrazingDepth = 0.1;
 // Lower bound of a distance to go, over its rounded value: sums of coordinates lose a few of their sixteen digits.
 constexpr double kRoundedDown = 1.0 - 1e-9;
 
-/// How far a coordinate is outside of two bounds; NaN where it is one.
+/// Distance of a coordinate outside of two bounds; NaN if it is NaN.
 double outside(double x, double low, double high) { return x < low ? low - x : x - std::min(x, high); }
 
 double way_between(const std::vector<Obstacle>& from, const std::vector<Obstacle>& to) {
@@ -23,13 +23,13 @@ double way_between(const std::vector<Obstacle>& from, const std::vector<Obstacle
   return std::sqrt(square);
 }
 
-/// How near centrelines may come: a share of how near they are as a way begins, or this, whichever is less.
+/// Least distance of centrelines: a share of their distance at the start of a motion, or this, whichever is less.
 struct Limit {
   double share, nearest;  ///< [-], [m]
 };
 Limit apart(const ContactPair& pair) { return {kMinDistance, pair.nearest()}; }
 
-/// How much of a way may be made, by conservative advancement: the distance, a function of that much, falls no faster
+/// Allowed share of a motion, by conservative advancement: the distance, a function of that much, falls no faster
 /// than by `speed`.
 template <class Distance>
 double advance(const Limit& limit, double speed, const Distance& distance_at) {
@@ -45,7 +45,7 @@ double advance(const Limit& limit, double speed, const Distance& distance_at) {
   return tau;
 }
 
-/// How much of a way a piece of a curve may make.
+/// Allowed share of the motion of a piece of a curve.
 double allowed_of_piece(const Bodies& bodies, const ContactPair& pair, const VectorX& q, const VectorX* change,
                         const Vec3d& shift, const Limit& limit) {
   Vec3d x[4], d[4] = {};
@@ -176,7 +176,7 @@ void Candidates::set_boxes(const VectorX& from, const VectorX& to, const More& m
   }
 }
 
-/// What is near at q, where edges are thicker by so many radii.
+/// Pairs that are near at q, with edges thicker by a number of radii.
 void Candidates::find_near(const VectorX& q, double radii, CandidateSearch& search) const {
   search.boxes.clear();
   if (q.size() > 0) set_boxes(q, q, [&](int e) { return radii * surfaces_.radius(e); }, search.boxes);

@@ -47,7 +47,7 @@ ContactReport report_of(const ContactProblem& problem, const Touching& t) {
   r.s = t.proximity.points.s;
   r.t = t.proximity.points.t;
   r.normal = t.proximity.normal;
-  // What acted, where that is known: contact that has yielded may press harder from here on.
+  // Forces that acted, if known: contact that has yielded may press harder from here on.
   const ContactRecord* record = problem.record_of(pair.key);
   r.force = record && record->force > 0.0 && t.energy.first < 0.0 ? record->force : -t.energy.first;
   Vec3d x[4];
@@ -63,7 +63,7 @@ ContactReport report_of(const ContactProblem& problem, const Touching& t) {
   }
   r.point = on_a - (pair.radius_a + 0.5 * r.gap) * r.normal;
   if (pair.curve()) {
-    // What presses on the nodes, in all: beside what is round, the normals of the three distances part.
+    // Total force on the nodes: beside what is round, the normals of the three distances part.
     const CurveSlopes slopes = curve_slopes(pair.piece, t.proximity.curve);
     Vec3d sum{};
     for (int i = 0; i < pair.piece.weights->nodes; ++i)

@@ -56,7 +56,7 @@ double by_tolerance(double scalar, double square, double rate, double tolerance)
   return -scalar * (1.0 - share * share) / slip_factor(square, rate) * rate / tolerance;
 }
 
-/// Of friction as its force at the end of the step has it.
+/// Derivatives of friction by its force at the end of the step.
 void add_implicit_friction(const ContactProblem& problem, const Touching& t, FrictionKind kind, const Rows& rows,
                            ContactAdjoint& out) {
   const FrictionSetting f = friction_setting(problem, t, kind, 1.0, nullptr);
@@ -149,7 +149,7 @@ void add_lagged_friction(const ContactProblem& problem, const Touching& t, const
   out.friction[0] += share.value;  // directions count the same
 }
 
-/// Of `set_mean_pressing` in pressing.cpp.
+/// Derivatives of `set_mean_pressing` in pressing.cpp.
 void add_mean_pressing(const ContactProblem& problem, const Touching& t, const Rows& rows, ContactAdjoint& out) {
   Vec3d start[4], end[4];
   const ClosestPoints first = problem.closest_at_start(t.pair, start);
@@ -167,7 +167,7 @@ void add_mean_pressing(const ContactProblem& problem, const Touching& t, const R
   for (int i = 0; i < 12; ++i) out.start[i] += scalar.slope[i];
 }
 
-/// Of `add_curve_pressing`, f (g1 + b (g0 - g1)), see `StartShare`.
+/// Derivatives of `add_curve_pressing`, f (g1 + b (g0 - g1)), see `StartShare`.
 void add_curve_pressing(const ContactProblem& problem, const Touching& t, const Rows& rows, ContactAdjoint& out) {
   const CurvePiece& piece = t.pair.piece;
   Vec3d x0[4];

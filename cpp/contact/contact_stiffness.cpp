@@ -40,7 +40,7 @@ void follow_forces(const ContactProblem& problem, const VectorX& greatest, Vecto
   }
 }
 
-/// What has yielded wears off where surfaces that separate press no more, without work, down to what their bodies'
+/// Yielded depth wears off where separating surfaces press no more, without work, down to the depth that their bodies'
 /// contacts begin with.
 double worn(const ContactProblem& problem, const Touching& t) {
   const double least = std::min(problem.offset(t.pair), t.yielded);
@@ -57,7 +57,7 @@ double faded(const ContactProblem& problem, const Touching& t) {
   return std::min(left, t.yielded - std::min(kFadingPerStep * beyond, -0.5 * t.energy.first / t.energy.second));
 }
 
-/// Of the weight of an edge what a contact holds up, where edges touch several others. Contacts of the same bodies,
+/// Share of an edge's weight that a contact holds up, where edges touch several others. Contacts of the same bodies,
 /// which follow each other, are counted once.
 class SharedWeight {
  public:
@@ -116,9 +116,9 @@ double force_at(const ContactProblem& problem, const Touching& t, double ratio, 
   return -ratio * t.stiffness * law_at(problem, t, ratio, yielded).energy(t.proximity.distance).first;
 }
 
-/// What stops an edge's mass at the speed at which the ends meet (along the normal of a plane, which is known before
-/// they do), within the step or within the depth of contact; and what stores its energy in that depth, where a step's
-/// force does as much work as contact stores.
+/// Stiffness that stops an edge's mass at the speed at which the ends meet (along the normal of a plane, which is known
+/// before they do), within the step or within the depth of contact; and what stores its energy in that depth, where a
+/// step's force does as much work as contact stores.
 double impact_stiffness(const ContactProblem& problem, const ContactPair& pair) {
   if (problem.fixed(pair)) return 0.0;
   const Model& model = problem.model();
@@ -316,7 +316,7 @@ void ContactStiffness::accept_at_rest(const ContactSet& set, bool arrived, doubl
       if (more) stiffness(rod) = std::max(stiffness(rod), kStiffnessMargin * wanted);
     }
   }
-  // What a rod has met on the way is no reason to be stiff for.
+  // Contacts that a rod met on the way are no reason for a high stiffness.
   for (Eigen::Index rod = 0; arrived && source == 0.0 && rod < greatest.size(); ++rod)
     if (stiffness(rod) >
         problem_.stiffness_to_bear_more(problem_.parameters->firm_stiffness(rod), greatest(rod), kMaxForceMargin))

@@ -3,7 +3,7 @@
 namespace withe {
 namespace {
 
-/// How much of each of the three distances there is in D.
+/// Weights of the three distances in D.
 void sample_weights(const CurveWeights& weights, const CurveDistance<double>& d, double (&w)[3]) {
   const double half = 0.5 * d.s * d.s * d.bend_share();
   for (int j = 0; j < 3; ++j) w[j] = weights.value_by[j] + d.s * weights.slope_by[j] + half * kBendBy[j];

@@ -43,7 +43,7 @@ Curve curve_of(const FrictionSetting& f, const SlippingSurfaces<double>& c) {
   return out;
 }
 
-/// Where it touches, how hard, and along which normal.
+/// Point of contact, normal force, and normal.
 void add_contact_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, const Curve& curve,
                         const Vec3d (&x)[3], Slopes& d) {
   const Vec3d nodes[4] = {x[0], x[1], x[2], {}};
@@ -84,7 +84,7 @@ void add_turn_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c
   }
 }
 
-/// Of `obstacle_arm`: of a - (delta - r) n with a = c(s), da - (n . da) n - (delta - r) dn.
+/// Derivatives of `obstacle_arm`: of a - (delta - r) n with a = c(s), da - (n . da) n - (delta - r) dn.
 Vec3d obstacle_arm_slope(const FrictionSetting& f, const Curve& curve, const Vec3d (&x)[3], const Slopes& d, int j) {
   if (f.rolling) return -f.pair->radius_a * d.normal[j];
   const PointDistance<double> point = distance_to(*f.obstacle, curve_point(curve.w, x, curve.s));
@@ -137,7 +137,7 @@ void direct_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, 
   });
 }
 
-/// What the moment m = F x n does to an edge, r m_b (m x t / |e| + (t . m) spin), and to its angle.
+/// Force of the moment m = F x n on an edge, r m_b (m x t / |e| + (t . m) spin), and to its angle.
 void add_couples(const FrictionSetting& f, const SlippingSurfaces<double>& c, const Curve& curve, int b,
                  const Slopes& d, double (&jacobian)[kContactUnknowns][kContactUnknowns]) {
   const SlippingEdge<double>& side = c.sides[b];

@@ -20,7 +20,7 @@ struct Slopes {
   Vec3d moment[kWays];  ///< m
 };
 
-/// Where they touch, and how hard they press: by all but the angles.
+/// Point of contact and normal force: derivatives by all but the angles.
 void add_contact_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, Slopes& d) {
   const ContactPair& pair = *f.pair;
   const Vec3d &u = c.sides[0].edge, &v = c.sides[1].edge;
@@ -43,7 +43,7 @@ void add_contact_slopes(const FrictionSetting& f, const SlippingSurfaces<double>
   }
 }
 
-/// Of an edge that turns, in its end's.
+/// Derivatives of a turning edge, by those of its end.
 double edge_share(const FrictionSetting& f) { return f.middle ? 0.5 : 1.0; }
 
 /// By how much edges turn and spin, and on what lever.
@@ -79,7 +79,7 @@ Vec3d turn_of(const FrictionSetting& f, const SlippingSurfaces<double>& c) {
   return turn;
 }
 
-/// Of `obstacle_arm`.
+/// Derivatives of `obstacle_arm`.
 Vec3d obstacle_arm_slope(const FrictionSetting& f, const SlippingSurfaces<double>& c, const Slopes& d, int j) {
   if (f.rolling) return -f.pair->radius_a * d.lever[j];
   return d.t[j] * c.sides[1].edge + f.pair->radius_b * d.lever[j];
@@ -122,7 +122,7 @@ void add_force_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& 
   }
 }
 
-/// What the moment m does to an edge, rho (m x t / |e| + (t . m) spin) and rho t . m, by its ways.
+/// Force of the moment m on an edge, rho (m x t / |e| + (t . m) spin) and rho t . m, by its ways.
 void add_couple_slopes(const FrictionSetting& f, const SlippingEdge<double>& side, int b, const Vec3d& m,
                        const Vec3d (&moment)[kWays], Vec3d (&couple)[kWays], double (&axial)[kWays]) {
   const Vec3d& t = side.tangent;

@@ -101,8 +101,8 @@ bool rolls(const ContactProblem& problem, const Touching& t) {
          std::abs(rate) * t.age < kRolledOffSlope * start.stiff;
 }
 
-/// What presses elastically in a step: 1 of surfaces that have just met, and where a rod rolls; 0 of those that rest on
-/// each other.
+/// Share that presses elastically in a step: 1 for surfaces that have just met, and where a rod rolls; 0 for those that
+/// rest on each other.
 double elastic_share(const ContactProblem& problem, const Touching& t) {
   const double share = share_within(problem, t, speed_of_impact(problem, t), kImpactSwings);
   return share < 1.0 && problem.pressing >= Pressing::mean && rolls(problem, t) ? 1.0 : share;

@@ -76,7 +76,7 @@ struct Ways {
   }
 };
 
-/// How far the surfaces have slipped, with J of the start.
+/// Slip of the surfaces, with J of the start.
 Vec3d lagged_slip(const ContactProblem& problem, const Touching& t) {
   const LaggedFriction& lagged = problem.lagged_friction[at(t.lagged)];
   const Ways ways(problem, t);

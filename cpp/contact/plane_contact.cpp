@@ -100,11 +100,11 @@ struct PlaneEdge {
   double lever;        ///< r m_b [m]
   double lever_slope;  ///< its derivative by s [m]
 
-  /// What a moment of its own does to its head, and, turned round, to its tail [1/m].
+  /// Force of an edge's own moment on its head, and, turned round, to its tail [1/m].
   Point arm() const { return inverse * turned(now); }
 };
 
-/// How far such a surface has slipped, and the friction on that.
+/// Slip of such a surface, and the friction on it.
 class PlaneSlip {
  public:
   // Called, it would go through memory.
@@ -215,7 +215,7 @@ class PlaneSlip {
     stick_ = force_ / stiffness;
   }
 
-  /// How the moment F r m_b acts on the ends of an edge that turns: derivative of N e / |e|^2 by e.
+  /// Action of the moment F r m_b on the ends of a turning edge: derivative of N e / |e|^2 by e.
   void add_turned_arm(int b, PlaneLocal& out) const {
     const double moment = edge_[b].lever * force_;
     const Point arm = edge_[b].arm();

@@ -58,10 +58,10 @@ void add_curve_start(const ContactProblem& problem, const Touching& t, bool geom
                       along, derivative);
 }
 
-/// Of a smooth curve, along the gradient of D at the end of the step; or, where its force is that of the whole step and
-/// the matrix need not be symmetric, along the gradients at the start and the end in those shares b and 1 - b with
-/// which it does the work f (D1 - D0): where a ring rolls, the points that touch at the end came down onto the surface
-/// within the step, and their force alone would slow it.
+/// Pressing of a smooth curve, along the gradient of D at the end of the step; or, where its force is that of the whole
+/// step and the matrix need not be symmetric, along the gradients at the start and the end in those shares b and 1 - b
+/// with which it does the work f (D1 - D0): where a ring rolls, the points that touch at the end came down onto the
+/// surface within the step, and their force alone would slow it.
 void add_curve_pressing(const ContactProblem& problem, const Touching& t, bool with_hessian, bool geometric,
                         ContactLocal& out) {
   const CurvePiece& piece = t.pair.piece;
@@ -81,7 +81,7 @@ void add_curve_pressing(const ContactProblem& problem, const Touching& t, bool w
   }
 }
 
-/// Where `ContactProblem::turns` says so, the force f (see pressing_law.hpp) pushes at the points of mean_points.hpp,
+/// If `ContactProblem::turns`, the force f (see pressing_law.hpp) pushes at the points of mean_points.hpp,
 /// between those closest at the start and at the end: pressing turns and brakes nothing, and gains no energy.
 template <class Scalar>
 void set_mean_pressing(const ContactProblem& problem, const Touching& t, Scalar (&out)[12]) {

@@ -50,7 +50,7 @@ Surfaces::Surfaces(const Model& model) : model_(model) {
   note_frictional();
 }
 
-/// Where friction varies, also where it is none for the time being: the form of the equations stays.
+/// Varying friction counts, also if it is zero for the time being: the form of the equations stays.
 void Surfaces::note_frictional() {
   const bool rods = model_.description.contact.rods;
   const SurfaceParameters& p = parameters_;

@@ -140,7 +140,7 @@ void RodProblem<end>::put_gaps(const Path& path, System& system) const {
   put_end(path, system);
 }
 
-/// Of a number that a segment ends with; what only adds up along the way sets out from its node.
+/// Residual of a number that a segment ends with; a mere sum along the way starts from its node.
 template <RodEnd end>
 double RodProblem<end>::gap(const Path& path, std::size_t segment, int i, double ends) const {
   const auto at = static_cast<std::size_t>(i);
@@ -150,7 +150,7 @@ double RodProblem<end>::gap(const Path& path, std::size_t segment, int i, double
 template <RodEnd end>
 void RodProblem<end>::put_end(const Path& path, System& system) const {
   const auto& y = path.nodes.back();
-  // Of m only two components are free, for m.t is known: not the one along which t is greatest.
+  // Only two components of m are free, for m.t is known: not the one along which t is greatest.
   std::array<std::size_t, 2> rows{6, 8};
   if constexpr (end == RodEnd::no_moment) {
     std::size_t along = 0;

@@ -121,7 +121,7 @@ std::optional<RodShape> StraightRod::at_position(double x, double z) const {
   return shape(path);
 }
 
-/// How far along a ray positions are allowed, from an allowed one.
+/// Allowed distance along a ray, from an allowed position.
 double StraightRod::extent(HeldProblem problem, Path path, double angle, double outwards) const {
   const double c = std::cos(angle), d = std::sin(angle), length = problem_.cuts.back();
   double inside = hypotenuse(path.nodes.back()[6], path.nodes.back()[8]);

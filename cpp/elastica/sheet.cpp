@@ -16,7 +16,7 @@ double longest_step(double force, double width) {
   return std::min(0.4, scale);
 }
 
-/// Of an uneven sheet, at the distance t from its tip.
+/// Slopes of an uneven sheet, at the distance t from its tip.
 double longest_step_at(const SheetWidth& width, const SheetProblem::Path& path, double t) {
   const auto& [up, forward, length] = path.values;
   const double down = width.weight_at(length) - width.weight_at(t);
@@ -240,12 +240,12 @@ void SheetProblem::put_end(const Path& path, System& system) const {
 
 namespace {
 
-/// What has a zero where something is greatest or least, and its slope along s.
+/// Function with a zero at an extreme, and its slope along s.
 struct Sign {
   double value, slope;
 };
 
-/// Of the slope of the curvature, 2 b theta''; of the curvature; and of the climb Z'.
+/// Values for extremes of the slope of the curvature, 2 b theta''; of the curvature; and of the climb Z'.
 std::array<Sign, 3> signs_at(const SheetSlope<double, double>& slope, double s, const std::array<double, 4>& y) {
   const auto [curvature, by_moment, along, climb] = slope(s, y);
   double width = 1, widening = 0, before = s;
@@ -261,7 +261,7 @@ std::array<Sign, 3> signs_at(const SheetSlope<double, double>& slope, double s, 
           Sign{y[3] == 0 ? 0.0 : climb, along * curvature}};
 }
 
-/// Where the cubic with such values and slopes at both ends of a step of 1 is zero, by false position with the value
+/// Zero of the cubic with such values and slopes at both ends of a step of 1, by false position with the value
 /// of an end that stays halved [Dowell and Jarratt 1971].
 double zero_between(const Sign& from, const Sign& to, double step) {
   double low = 0, high = 1, at_low = from.value, at_high = to.value, place = 0;

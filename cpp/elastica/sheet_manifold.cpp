@@ -39,7 +39,7 @@ double mean_width(const SheetWidth& width, double length) {
   return width.even() ? 1.0 : width.weight_at(length) / length;
 }
 
-/// Where a sheet is narrow a pull bends it the more sharply.
+/// A pull bends a narrow part of a sheet more sharply.
 bool bearable(const SheetWidth& width, const Path& path) {
   const double narrow = std::min(width.width_at(0.0), width.width_at(path.values[2]));
   return path.values[1] > -SheetManifold::kGreatestPull * narrow && path.values[0] > 0;

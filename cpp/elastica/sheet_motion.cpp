@@ -55,7 +55,7 @@ bool drag_sheet(const SheetPose& pose, const SheetFriction& friction, double& sl
   const auto some_lies = [&] { return data.path.values[2] < friction.sheet_length; };
   const bool stuck = move_to(from, {pose[0] - slide, pose[1], pose[2]}, data);
   if (stuck && excess() <= 0) return some_lies();
-  // Where it would stick it has no equilibrium, or one beyond friction: it slides as its forces push it.
+  // If a sticking sheet has no equilibrium, or one beyond friction, it slides in the direction of its forces.
   const double sign = (stuck ? data.path.values[1] : before.values[1]) > 0 ? 1.0 : -1.0;
   if (!stuck) data.path = before;
   if (!slide_to(pose_of(data.path), pose, sign * friction.coefficient, friction.sheet_length, data)) return false;

@@ -1,4 +1,4 @@
-// What supports hold is prescribed: q1 there, and so z; velocities at the end of a step, which follow from the mean
+// Held unknowns are prescribed: q1 there, and so z; velocities at the end of a step, which follow from the mean
 // ones of this step and the last (integrators/dynamics.cpp); and so accelerations.
 
 #include "gradients/held_gradient.hpp"
@@ -91,8 +91,8 @@ Vector3 arm_of(const Model& model, const VectorX& q, const Support& support) {
   return node_vector(model, q, support.other_node) - node_vector(model, q, support.node);
 }
 
-/// Of a hand that does not yield. An edge beside another hand has a node of that: its director is what this hand says,
-/// carried from the tangent t that it has there to that which it has.
+/// Derivatives by the pose of a rigid hand. An edge beside another hand has a node of that: its director is what this
+/// hand says, carried from the tangent t that it has there to that which it has.
 void add_hand(const Model& model, const VectorX& q, VectorX& held, const Support& hand, const HandsHeld& hands,
               std::size_t support, Vector3& rotation) {
   for (std::size_t i = 0; i < hand.touched.size() && !model.planar(); ++i) {

@@ -8,7 +8,7 @@
 namespace withe {
 namespace {
 
-/// How much of an edge a stencil has to either side: of its length as it bends and as it twists, once for each
+/// Share of an edge that a stencil has to either side: of its length as it bends and as it twists, once for each
 /// stiffness.
 struct EdgePart {
   int edge;
@@ -174,7 +174,7 @@ class Chain {
     }
   }
 
-  /// What natural strains say of the curvature and twist that they are made of, and of the length.
+  /// Derivatives by the natural curvature and twist of a stencil, and by its length, from those by its natural strains.
   struct ByShape {
     Vector2 curvature;
     double twist, length;
@@ -201,8 +201,8 @@ class Chain {
     return {voronoi * by_bent, voronoi * by_turn, curvature.dot(by_bent) + twist * by_turn, components};
   }
 
-  /// What a stencil's natural strains say of the natural shape that a rod has at one of its own.
-  /// Returns what they say of its length.
+  /// Derivatives by the natural shape of a rod at one of its stencils, from those by the stencil's natural strains.
+  /// Returns the derivative by its length.
   double add_shape(int rod, int stencil, double voronoi, const Vector3& by) {
     if (rod < 0 || stencil < 0) return 0.0;
     const auto r = static_cast<std::size_t>(rod);
@@ -214,7 +214,7 @@ class Chain {
     return found.length;
   }
 
-  /// Likewise of the natural shape as it was drawn.
+  /// Derivatives by the natural shape as it was drawn.
   double add_drawn_shape(int rod, int stencil, double voronoi, const Vector3& by) {
     const RodDescription& drawn = model_.description.rods[at(rod)];
     const ByShape found =

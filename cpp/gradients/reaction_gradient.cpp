@@ -68,7 +68,7 @@ void StepGradient::add_reaction(const Support& s, const Vector3& by_force, const
   add_to_node(model, s.node, -by_arm, by_z_);
 }
 
-/// Of the torque on an edge along `arm`. Returns the derivative by that.
+/// Adjoint of the torque on an edge along `arm`. Returns the derivative by that.
 Vector3 StepGradient::add_angle_reaction(int edge, const Vector3& arm, const Vector3& by_moment, const VectorX& held) {
   const int angle = equations_.model().edge_dof[at(edge)];
   const Vector3 t = arm.normalized();

@@ -105,8 +105,8 @@ class Readouts {
     add_halves(rod, stencil, place.half, by_curvature, by_twist);
   }
 
-  /// Of a frame: the mean over both halves, by their lengths V, of k0 (1 - V / C) + S / C, and the sum of twists tau
-  /// over both lengths. What a half carries is a fixed part of its edge.
+  /// Curvature of a frame: the mean over both halves, by their lengths V, of k0 (1 - V / C) + S / C, and the sum of
+  /// twists tau over both lengths. What a half carries is a fixed part of its edge.
   void add_halves(int rod, int stencil, const int (&halves)[2], const Vector2& by_curvature, double by_twist) {
     const Vector2 natural = p_.natural_curvature[at(rod)].row(stencil);
     StrainGradients strains;
@@ -148,7 +148,7 @@ class Readouts {
     return {strains.strain[0], strains.strain[1]};
   }
 
-  /// What is read out of a stencil goes by rest lengths too: the curvature k0 (1 - V / C) + S / C, with C what the
+  /// Read-outs of a stencil depend on rest lengths too: the curvature k0 (1 - V / C) + S / C, with C what the
   /// stencil carries and S its turn, and the twist tau / V.
   void add_lengths(int rod, int stencil, int bend, double carried, const StrainGradients& strains,
                    const Vector2& by_curvature, double by_twist) {

@@ -75,7 +75,7 @@ void StepGradient::begin(const StepTaken& step) {
   bool solved = solver.factorize().status == FactorStatus::ok;
   shifted_ = !solved;
   if (shifted_) {
-    // What is free to spin or to move is held by little; see `solve`.
+    // Free motions are held by a small stiffness; see `solve`.
     rows_.setConstant(model.dof_count, kNeutral * assembler.greatest_diagonal());
     solved = solver.factorize({rows_.data(), static_cast<std::size_t>(rows_.size())}).status == FactorStatus::ok;
   }
@@ -221,7 +221,7 @@ void StepGradient::add_frames(const StateAdjoint& state, const StepAdjoint& adjo
   }
 }
 
-/// What turns directors and leaves nodes their part of torques, as far as it depends on the edges of the start.
+/// Transport of directors, with its torques on nodes, as far as it depends on the edges of the start.
 void StepGradient::add_transport(const StateAdjoint& state, const StepAdjoint& adjoint, VectorX& start) const {
   const Model& model = equations_.model();
   for (int e = 0; e < model.edge_count; ++e) {
@@ -230,7 +230,7 @@ void StepGradient::add_transport(const StateAdjoint& state, const StepAdjoint& a
     const EdgeFrame<double>& last = end_->edge[at(e)];
     const Vec3d e0 = edge_vector(model, step_->start.q, e);
     const double inverse0 = 1.0 / std::sqrt(dot(e0, e0));
-    // Where all of an edge's angles, of the start too, grow alike and its reference director turns back, nothing
+    // If all of an edge's angles, of the start too, grow alike and its reference director turns back, nothing
     // changes.
     const double turns = columns_[angle] + adjoint.start[angle],
                  at_z = turns + adjoint.middle_turn[e] - adjoint.end_turn[e] - adjoint.start_turn[e];

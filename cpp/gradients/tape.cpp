@@ -80,7 +80,7 @@ class Tape::Player {
     state.contacts = step.contacts;
   }
 
-  /// Where hands are at the end of a step from a state.
+  /// Poses of hands at the end of a step from a state.
   static std::vector<SupportPose> hands_after(const Step& step, const State& start) {
     return step.hands.empty() ? poses_of(start) : step.hands;
   }
@@ -249,7 +249,7 @@ void Tape::walk_back(Player& player, const std::function<void(const Passage&)>& 
   }
 }
 
-/// What a scalar depends on, by the number of steps before, and by the steps whose reactions it takes.
+/// Moments that a scalar depends on, by the number of steps before, and by the steps of its reactions.
 class Tape::Moments {
  public:
   Moments(const Tape& tape, const std::vector<MomentAdjoint>& moments, const ParameterVisitor& visit, bool by_poses)

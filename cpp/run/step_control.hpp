@@ -30,7 +30,7 @@ constexpr bool accepts(Verdict verdict) { return verdict == Verdict::hard || ver
 /// Easy parts before longer ones are tried, at least.
 inline constexpr int kLeastPatience = 4;
 
-/// What is remembered from part to part.
+/// Memory from part to part.
 struct StepLengths {
   int level = 0;                  ///< present halvings of the time step, in `StepControl::levels_per_halving` to each
   int easy_steps = 0;             ///< since the level changed

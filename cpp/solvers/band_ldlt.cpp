@@ -72,7 +72,7 @@ class SymmetricBand : public LinearSolver {
   bool factorized_ = false;
 };
 
-/// Of rods and chains: as wide as kernels know; narrower bands are padded with zeros.
+/// Band of rods and chains: as wide as kernels support; narrower bands are padded with zeros.
 class BandLdlt final : public SymmetricBand {
  public:
   BandLdlt(const SparsityPattern& pattern, const BandKernels& kernels)
@@ -92,7 +92,7 @@ class BandLdlt final : public SymmetricBand {
   BandStorage storage_;
 };
 
-/// Of any width, column after column of L. For comparison: the sparse solver is faster.
+/// Band of any width, column after column of L. For comparison: the sparse solver is faster.
 class WideBandLdlt final : public SymmetricBand {
  public:
   explicit WideBandLdlt(const SparsityPattern& pattern)

@@ -169,12 +169,12 @@ class Multifrontal final : public LinearSolver {
     values_.assign(static_cast<std::size_t>(value_starts_.back()) + kPadding, 0.0);
   }
 
-  /// Of entry p of the pattern, the place in values_.
+  /// Place in values_ of entry p of the pattern.
   std::ptrdiff_t number_of(std::ptrdiff_t p, int column) const {
     return p - pattern_.column_starts[column + 1] + value_starts_[column + 1];
   }
 
-  /// Of each entry of the pattern, the one across the diagonal; rows being sorted, those of a row come up in the order
+  /// Entry across the diagonal for each entry of the pattern; rows being sorted, those of a row come up in the order
   /// of their columns.
   std::vector<int> find_mirrors() const {
     std::vector<int> mirror, next(pattern_.column_starts);
@@ -183,7 +183,7 @@ class Multifrontal final : public LinearSolver {
     return mirror;
   }
 
-  /// Where values go in L and W, and the rests of children in their parents' fronts.
+  /// Places of values in L and W, and of the rests of children in their parents' fronts.
   void find_places() {
     const std::vector<int> mirror = find_mirrors();
     std::vector<int> place(size()), row_of(size());

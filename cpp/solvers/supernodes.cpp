@@ -27,7 +27,7 @@ std::vector<int> inverse(const std::vector<int>& order) {
   return place;
 }
 
-/// Of each column the first row below its diagonal in L, or -1 [Liu 1990, sec. 3].
+/// First row below the diagonal of each column in L, or -1 [Liu 1990, sec. 3].
 std::vector<int> elimination_tree(const SparsityPattern& pattern, const std::vector<int>& order) {
   const std::vector<int> place = inverse(order);
   std::vector<int> parent(pattern.size, -1), ancestor(pattern.size, -1);

@@ -10,7 +10,7 @@
 namespace withe {
 namespace {
 
-/// Of stretching: EA (eps - n) and kv times the change of eps act along an edge.
+/// Adjoint of stretching: EA (eps - n) and kv times the change of eps act along an edge.
 void add_stretch(const StepProblem& problem, const StepData& data, StepAdjoint& adjoint) {
   const Model& model = problem.model;
   const ElasticCoefficients &k = problem.elastic, &kv = problem.viscous;
@@ -45,7 +45,7 @@ void add_stretch(const StepProblem& problem, const StepData& data, StepAdjoint& 
   }
 }
 
-/// Of ordinary stencils in space, all at once: see StencilAdjoint.
+/// Adjoint of ordinary stencils in space, all at once: see StencilAdjoint.
 void add_regular(const StepProblem& problem, const StepData& data, const Assembler& assembler,
                  const TurningNumbers& numbers, StepAdjoint& adjoint) {
   const Model& model = problem.model;
@@ -75,7 +75,7 @@ void add_regular(const StepProblem& problem, const StepData& data, const Assembl
   if (middle) add(data.end_configuration, end, 1.0, -1.0, adjoint.end_turn);
 }
 
-/// How turns of a half stencil's frame enter, beyond its unknowns, and those of what is attached to it.
+/// Derivatives by rotations of a half stencil's frame, beyond its unknowns, and of the parts attached to it.
 void add_half_turns(const StepProblem& problem, const StepData& data, int h, const StencilAdjoint& part,
                     StepAdjoint& adjoint) {
   const Model& model = problem.model;

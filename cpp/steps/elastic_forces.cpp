@@ -97,7 +97,7 @@ void ElasticForces::add_elastic(const StepProblem& problem, const ElasticCoeffic
   add_others(problem, k, data, assembler, values, axial_force);
 }
 
-/// What the kernels do not take: edges and stencils of joints and of rods' ends at walls.
+/// Elements without kernels: edges and stencils of joints and of rods' ends at walls.
 void ElasticForces::add_others(const StepProblem& problem, const ElasticCoefficients& k, StepData& data,
                                const Assembler& assembler, std::span<double> values, const double* axial_force) const {
   const Model& model = problem.model;

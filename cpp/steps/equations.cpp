@@ -108,7 +108,7 @@ void Equations::clear(const VectorX& z, StepData& data) const {
   data.z = z;
 }
 
-/// What acts, with room for it in the matrix.
+/// Active terms, with entries in the matrix.
 void Equations::find(StepData& data, bool with_matrix) {
   for (const std::unique_ptr<Term>& term : terms_.all) {
     const int before = assembler_.generation();

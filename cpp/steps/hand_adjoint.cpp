@@ -14,7 +14,7 @@
 namespace withe {
 namespace {
 
-/// What multiplies a force at the point that is held.
+/// Multiplier of a force at the held point.
 Vector3 rows_of_point(const Model& model, const VectorX& rows, const TouchedEdge& touched) {
   return (1.0 - touched.place) * node_vector(model, rows, model.edge_tail[at(touched.edge)]) +
          touched.place * node_vector(model, rows, model.edge_head[at(touched.edge)]);

@@ -105,7 +105,7 @@ HandForces::Piece HandForces::piece(const StepProblem& problem, const StepData& 
   return {touched, hand, shift, stiffness, elastic, shift.grip * slope * last.transpose()};
 }
 
-/// What an edge that is held feels of the turn between it and what the hand has grasped.
+/// Moment on a held edge by its rotation against its pose when it was grasped.
 struct HandForces::Turn {
   Vector3 moment = Vector3::Zero();  ///< on the hand's side
   double energy = 0.0;
@@ -149,7 +149,7 @@ HandForces::Turn HandForces::put_turn(const StepProblem& problem, const StepData
   return turn;
 }
 
-/// What a held edge is attached to over an energy-momentum step, and how stiffly.
+/// Attachment of a held edge over an energy-momentum step, and its stiffness.
 HandForces::Grip HandForces::grip_over(const StepProblem& problem, const StepData& data, const Held& held) const {
   const Support& support = model_.supports[at(held.support)];
   const TouchedEdge& touched = support.touched[at(held.touched)];
@@ -251,7 +251,7 @@ double HandForces::dissipated(const StepProblem& problem, const StepData& data, 
     const Vector3 u1 = problem.in_middle() ? Vector3(2.0 * there - shift(problem.start->q, to)) : there;
     const CappedForce last = capped(p.stiffness.cwiseProduct(u1), p.touched.share * p.hand.force_limit);
     if (last.share >= 1.0 && p.elastic.share >= 1.0) continue;
-    // What both sides put in, without what is stored of it; at a step's end, its force times the slip.
+    // Energy that both sides add, less the stored energy; at a step's end, the force times the slip.
     const Vector3 kept = last.share * u1;
     lost += problem.in_middle()
                 ? p.elastic.force.dot(u1 - u0) - 0.5 * p.stiffness.dot(kept.cwiseAbs2() - u0.cwiseAbs2())

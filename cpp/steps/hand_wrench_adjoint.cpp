@@ -37,8 +37,8 @@ void HandForces::add_wrench_adjoint(const StepProblem& problem, const StepData& 
   adjoint.hands_end.positions.row(support) -= force.cross(by_moment).transpose();
 }
 
-/// Of m. Where edge and hand turn alike it turns with them, so that derivatives by the hand follow from those by the
-/// edge.
+/// Derivatives of m. Where edge and hand turn alike it turns with them, so that derivatives by the hand follow from
+/// those by the edge.
 void HandForces::add_moment_adjoint(const StepProblem& problem, const StepData& data, int element,
                                     const Vector3& by_moment, StepAdjoint& adjoint, VectorX& by_z) const {
   const Piece p = piece(problem, data, element);
@@ -47,7 +47,7 @@ void HandForces::add_moment_adjoint(const StepProblem& problem, const StepData& 
   const BendMeasure& measure = problem.parameters->measure;
   const BendTwistStrain<double> strain =
       bend_twist_strain(grip, edge, problem.start->hands[at(support)].twist(held_[at(element)].touched));
-  // What is grasped turns as an edge of unit length would, and about itself.
+  // The grasped part turns as an edge of unit length would, and about itself.
   const Vector3 T = p.shift.grip.col(2);
   const Vec3d way = to_vec3(Vector3(by_moment.cross(T)));
   const double angle = by_moment.dot(T);

@@ -225,7 +225,7 @@ void Inertia::add_adjoint(const StepProblem& problem, const StepData& data, cons
   for (int e = 0; e < model.edge_count; ++e) add_turning_adjoint(problem, data, unit, e, adjoint);
 }
 
-/// What couples nodes off the diagonal is less on it.
+/// Coupling of nodes off the diagonal reduces the diagonal.
 void add_mass_matrix(const StepProblem& problem, const MassMatrix& mass, double factor, const Assembler& assembler,
                      std::span<double> values) {
   const Model& model = problem.model;
@@ -255,7 +255,7 @@ void add_explicit_spin_couple(const StepProblem& problem, StepData& data, int ed
 
 namespace {
 
-/// Of every angle whose rate is that of a finite rotation: joints' in a plane, edges' in space.
+/// Visits every angle whose rate is that of a finite rotation: joints' in a plane, edges' in space.
 template <class Set>
 void for_each_turn(const Model& model, const Set& set) {
   if (model.planar())
@@ -301,7 +301,7 @@ void set_velocity_rates(const Model& model, const VectorX& change, double dt, Ve
   });
 }
 
-/// How much of the mean of an edge's tangents at both ends of a step lies along it in the middle.
+/// Component of the mean of an edge's tangents at both ends of a step along the edge in the middle.
 double mean_along_middle(const StepProblem& problem, const StepData& data, int edge) {
   const Vec3d mean =
       0.5 * (problem.start_configuration.edge[at(edge)].tangent + data.end_configuration.edge[at(edge)].tangent);

@@ -31,7 +31,7 @@ RingStep step_of(const Model& model, const StepProblem& problem, int support) {
   return {ring_of(s, centre.norm()), s.curve, start.ring, from, centre, fed, to.fed};
 }
 
-/// Where forces of a step act that ends at q1.
+/// Place where forces act in a step that ends at q1.
 NodePlaces middle_of(const StepProblem& problem, const VectorX& q1) {
   if (!problem.in_middle()) return {problem.model, q1};
   return {problem.model, q1, 0.5, &problem.start->q};
@@ -147,7 +147,7 @@ double RingForces::dissipated(const StepProblem& problem, const VectorX& z) cons
     const double kept = kept_way(step.ring, step.curve, place, point_at(step.curve, place, last, step.to), u1);
     lost += with_found(problem, step, acting, [&](const auto& found, const auto& /*axes*/) {
       if (!found.slips && kept == u1) return 0.0;
-      // What both sides put in, without what is stored of it; at a step's end, T times the slip.
+      // Energy that both sides add, less the stored energy; at a step's end, T times the slip.
       return problem.in_middle() ? found.tension * (u1 - u0) - 0.5 * k * (kept * kept - u0 * u0)
                                  : found.tension * (u1 - kept);
     });

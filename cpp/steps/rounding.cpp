@@ -1,4 +1,4 @@
-// What rounding leaves of a residual, which no iteration removes: positions, angles and strains carry errors of a few
+// Rounding error of a residual, which no iteration removes: positions, angles and strains carry errors of a few
 // eps, and stiffness, or inertia over a short step, turns them into forces.
 
 #include "steps/rounding.hpp"
@@ -16,7 +16,7 @@ void add_to_node(const Model& model, int node, double bound, VectorX& floor) {
   for (int k = dof; k < dof + model.dimension; ++k) floor(k) += bound;
 }
 
-/// What rounding leaves of inertia. What spins for long has turned by many radians. Sets the greatest coordinate, and
+/// Rounding error of inertia. A part that spins for long has turned by many radians. Sets the greatest coordinate, and
 /// returns the greatest angle, one radian at least.
 double set_inertial_bounds(const StepProblem& problem, const StepData& data, RoundingBounds& out) {
   const Model& model = problem.model;

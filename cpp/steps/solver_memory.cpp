@@ -1,4 +1,4 @@
-// What solves leave for those to come: the matrix in use, contacts and the order of elimination, the fluid's force.
+// Memory of solves for later ones: the matrix in use, contacts and the order of elimination, the fluid's force.
 
 #include <algorithm>
 

@@ -21,7 +21,7 @@ struct Direction {
   }
 };
 
-/// What follows the edge's vector at z (`by`) and that at the start (`by_start`).
+/// Derivatives by the edge's vector at z (`by`) and by that at the start (`by_start`).
 struct VectorSlopes {
   Vector3 value;
   Matrix3 by, by_start;

@@ -50,7 +50,7 @@ std::vector<Vector2> grow_end(const BitImage& mask, const Branch& tip) {
     points.push_back(point);
     way += 1;
   }
-  // How far the mask goes beyond the point, along the middle and nearer to the flanks.
+  // Extent of the mask beyond the point, along the middle and nearer to the flanks.
   const Vector2 normal(-tangent.y(), tangent.x());
   const double limit = 3 * half_width + 2;
   const auto ahead = [&](double aside) {

@@ -139,7 +139,7 @@ struct Place {
   Flanks flanks;
 };
 
-/// Where the flank that shows changes: in the middle of where the mask is hardly wider than at its narrowest place.
+/// Place where the visible flank changes: in the middle of where the mask is hardly wider than at its narrowest place.
 std::size_t find_waist(const std::vector<Place>& places, double half_width) {
   const std::size_t size = places.size();
   if (size <= 8) return size / 2;
@@ -185,7 +185,7 @@ std::vector<FitSample> CableOutline::flank_samples(const BitImage& mask, const M
     const double from = i > 0 ? station[i - 1] : station.back();
     const double to = i > 0 ? station[i] : spacing * static_cast<double>(n);
     const double half_width = 0.5 * ((i > 0 ? points_[i - 1] : points_.back()).half_width + points_[i].half_width);
-    // What the same measurement gives for the whole cable, just outside.
+    // Result of the same measurement for the whole cable, just outside.
     const double margin = half_width;
     double width = 0;
     int count = 0;
@@ -296,7 +296,7 @@ void CableOutline::describe_rows(const std::vector<double>& places, const std::v
       stretches.push_back({gap, number, row, row});
     }
   }
-  // Of a ring a stretch across its first row is one, and goes on beyond its last.
+  // A stretch of a ring across its first row is one, and goes on beyond the last row.
   if (!cable.closed || stretches.size() < own + 2) return;
   const HiddenStretch first = stretches[own];
   HiddenStretch& last = stretches.back();

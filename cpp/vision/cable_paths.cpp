@@ -26,7 +26,7 @@ void bridge_gaps(Continuations& links, const std::vector<std::vector<Vector2>>& 
     double reach = longest;
     for (const HalfEdge half : {a, b}) {
       const auto h = static_cast<std::size_t>(half);
-      // Where it may be round, an end is assumed a little before the mask ends.
+      // An end that may be round is assumed a little before the mask ends.
       reach += (links.zone_of[h] >= 0 ? 4.0 : 0.25) * links.branches[h].half_width;
     }
     return reach;

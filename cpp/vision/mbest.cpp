@@ -236,7 +236,7 @@ Rows rows_of(const SkeletonGraph& graph, const Meeting& meeting, const CablePath
   return rows;
 }
 
-/// Where two strands run over the same middle they cross.
+/// Two strands that run over the same middle cross.
 void find_crossings(const std::vector<Intersection>& intersections, Tracing& tracing) {
   for (const Intersection& intersection : intersections) {
     std::vector<CableRow> visits;

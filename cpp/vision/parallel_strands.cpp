@@ -71,7 +71,7 @@ std::optional<SideBySide> find_side_by_side(const SkeletonGraph& graph, int link
   const double full = 0.5 * both + 0.5;
   int wide = 0;
   for (int i = margin; i < line.count() - margin; ++i) wide += line.half_width(i) > 0.8 * full ? 1 : 0;
-  // Of two cables that cross at a small angle less than half of the link is as wide as that.
+  // If two cables cross at a small angle, less than half of the link is as wide as that.
   if (wide < 0.6 * (line.count() - 2 * margin)) return std::nullopt;
   return SideBySide{link, {{{leaving[0][0], leaving[0][1]}, {leaving[1][0], leaving[1][1]}}}};
 }

@@ -35,10 +35,10 @@ Eigen::Vector3f mean(const Lanes& lanes, int first, int last) {
   return sum / static_cast<float>(std::max(last - first, 1));
 }
 
-/// What remains of a colour without its grey.
+/// Colour without its grey.
 Eigen::Vector3f without_grey(const Eigen::Vector3f& color) { return color.array() - color.mean(); }
 
-/// How much of the weaker colour's hue is not that of the other one, brighter or darker [grey levels].
+/// Part of the weaker colour's hue that differs from the other one, brighter or darker [grey levels].
 float hue_difference(const Eigen::Vector3f& a, const Eigen::Vector3f& b) {
   Eigen::Vector3f weak = without_grey(a), strong = without_grey(b);
   if (weak.squaredNorm() > strong.squaredNorm()) std::swap(weak, strong);

@@ -14,7 +14,7 @@ namespace {
 
 bool is_junction(const SkeletonGraph& graph, int node) { return node >= 0 && graph.nodes[at(node)].edges.size() >= 3; }
 
-/// How a line goes on where a wide run becomes narrower.
+/// Continuation of a line where a wide run becomes narrower.
 struct Narrowing {
   enum class Side { left, middle, right } side = Side::middle;
   double width = 0;
@@ -37,7 +37,7 @@ std::optional<Narrowing> narrowing(const SkeletonLine& line, const WidthRun& wid
   return Narrowing{aside > 0 ? Narrowing::Side::left : Narrowing::Side::right, narrow.width};
 }
 
-/// Where strands meet across a run, as fractions of its width from the left.
+/// Seams of strands across a run, as fractions of its width from the left.
 class Borders {
  public:
   explicit Borders(double width) : width_(width) {}
@@ -125,7 +125,7 @@ class SeamCutter {
     return image_ == nullptr ? std::nullopt : shading_misfit(*image_, line, run, count);
   }
 
-  /// Where branches meet into which the run forks at an end of its edge, if they are together as wide as it.
+  /// Node of the branches into which the run forks at an end of its edge, if they are together as wide as it.
   std::vector<double> fork_borders(const WidthRun& run, const SkeletonLine& line) {
     const SkeletonEdge& edge = graph_.edges[at(run.edge)];
     for (const int end : {0, 1}) {

@@ -103,7 +103,7 @@ struct CableEnd {
   HalfEdge half;
 };
 
-/// What is known of lines before they are followed.
+/// Data of lines before they are followed.
 struct Found {
   const BitImage& mask;
   const TraceOptions& options;
