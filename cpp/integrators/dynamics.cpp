@@ -19,7 +19,7 @@ namespace {
 // for equal steps, 2 where the step before was three times as long.
 constexpr double kMaxUsualTime = 2.0;
 
-/// How far a force that acts over a step moves things [m]: filtered by (M / h^2 + K)^-1, so that modes which the step
+/// Displacement by a force that acts over a step [m]: filtered by (M / h^2 + K)^-1, so that modes which the step
 /// does not resolve, and which it therefore leaves bounded, count for as little as they move [Hosea and Shampine 1996].
 double moved_by(VectorX& force, Equations& equations, const Newton& newton, double h, StepWorkspace& work) {
   equations.assembler().project(force);
@@ -177,7 +177,7 @@ bool solve_flow(Equations& equations, const VectorX& q, const VectorX& v, Counte
 
 namespace {
 
-/// Whether the step to q1 may stay: no edge turns by much, and contact found what it met.
+/// True if the step to q1 is acceptable: no edge turns by much, and contact detection missed nothing.
 bool acceptable(Equations& equations, const StepPlan& plan, const State& state, const VectorX& q1, StepWorkspace& work,
                 StepResult& result) {
   result.largest_turn = largest_turn(equations.model(), state.q, q1);
@@ -209,8 +209,8 @@ void find_end_velocity(const Equations& equations, const StepPlan& plan, const S
   equations.assembler().set_held_part(work.held_velocity, v1);
 }
 
-/// What acted, and what was lost; full residuals become minus the reactions. Returns what friction and restitution
-/// took [J].
+/// Account of the forces and of the dissipated energy; full residuals become minus the reactions. Returns what friction
+/// and restitution took [J].
 double account(Equations& equations, const Parameters& parameters, const StepPlan& plan, const State& state,
                const VectorX& q1, StepWorkspace& work, StepResult& result) {
   const bool conserves = plan.rule == StepRule::energy_momentum;

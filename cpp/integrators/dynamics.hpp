@@ -68,7 +68,7 @@ StepResult verlet_step(Equations& equations, const Parameters& parameters, const
 double stable_step(Equations& equations, const Parameters& parameters, const Prescribed& prescribed, const State& state,
                    StepWorkspace& work);
 
-/// Whether a mean velocity of what a support holds, which gained so much on that of the step before, goes on like that;
+/// True if the mean velocity of held nodes, which has changed by `gain` since the step before, goes on like that;
 /// else it jumps. From rest at an even acceleration, the second step is 2/3 faster.
 inline bool carries_on(const Vector3& now, const Vector3& gain) { return gain.norm() <= 0.75 * now.norm(); }
 

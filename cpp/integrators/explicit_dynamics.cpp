@@ -33,8 +33,8 @@ void explicit_acceleration(Equations& equations, const Parameters& parameters, c
   set_acceleration(equations, work, acceleration);
 }
 
-/// Where nothing resists motion but inertia: `work.next` at q = work.z, with accelerations there, velocities being
-/// work.velocity. Returns by how much edges turn at most [rad].
+/// Accelerations with inertia alone against motion: `work.next` at q = work.z, with accelerations there, velocities
+/// being work.velocity. Returns by how much edges turn at most [rad].
 double free_acceleration(Equations& equations, const Parameters& parameters, const Prescribed& prescribed,
                          const State& state, StepWorkspace& work) {
   State& next = work.next;
@@ -139,7 +139,7 @@ StepResult verlet_step(Equations& equations, const Parameters& parameters, const
     result.load_work = 0.5 * (state.load_force + next.load_force).dot(work.change);
   }
   if (Contact* contact = equations.contact()) {
-    // What surfaces store by pressing Verlet keeps on the whole, which the force at the end alone does not show.
+    // Verlet conserves the contact energy on the whole, which the force at the end alone does not show.
     contact->friction_force(next.friction_force);
     result.dissipated += contact->mean_friction_loss(work.change, state.friction_force, next.friction_force);
     result.support_work += contact->obstacle_work();

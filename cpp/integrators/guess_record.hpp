@@ -1,12 +1,12 @@
 #pragma once
-/// What is remembered of initial guesses from one time step to the next.
+/// Record of initial guesses from one time step to the next.
 
 #include <algorithm>
 #include <array>
 
 namespace withe {
 
-/// How often a guess that need not lead to the solution has done so: what misses time and again is tried ever more
+/// Success rate of a guess that need not lead to the solution: a guess that fails repeatedly is tried more
 /// rarely.
 struct GuessRecord {
   int misses = 0;  ///< in a row

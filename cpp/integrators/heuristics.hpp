@@ -1,5 +1,5 @@
 #pragma once
-/// What Newton's method does beyond full steps, by name, so that each can be switched off and measured
+/// Heuristics of Newton's method beyond full steps, by name, so that each can be switched off and measured
 /// (benchmarks/ablation.py).
 
 namespace withe {

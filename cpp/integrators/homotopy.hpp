@@ -32,7 +32,7 @@ ActingPath growing(Equations& equations, Parameters& parameters, const Prescribe
 
 class Homotopy {
  public:
-  /// What acts, among the parameters, is that of the factor last gone to.
+  /// Parameters that act are those of the last factor.
   Homotopy(Equations& equations, const Newton& newton, Parameters& parameters, Boundary boundary, ActingPath acting,
            State& state, NewtonWorkspace& work)
       : equations_(equations),
@@ -51,12 +51,12 @@ class Homotopy {
   const Prescribed& prescribed() const { return boundary_.prescribed; }
   /// From here on tangents leave alone what is neutral.
   void hold_neutral() { hold_neutral_ = true; }
-  /// Whether supports did so where a tangent was last found.
+  /// True if supports moved where a tangent was last found.
   bool supports_move() const { return moves_; }
-  /// What grad V - f is to be at the factor last gone to.
+  /// Target of grad V - f at the last factor.
   const VectorX& target() const { return target_; }
 
-  /// Where the path leads from the present state, and how firmly it stands.
+  /// Tangent of the path at the present state, and its stability.
   struct Tangent {
     VectorX rate;                 ///< dq / ds
     double turn = 0;              ///< of edges, per factor [rad]
@@ -80,7 +80,7 @@ class Homotopy {
   void evaluate(const VectorX& z, bool with_matrix, const double* axial_force);
 
  private:
-  /// What acts at a factor, and hands, with which equations begin anew.
+  /// Parameters and hands at a factor, with which equations begin anew.
   void apply(double factor);
 
   Equations& equations_;

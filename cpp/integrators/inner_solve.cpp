@@ -146,9 +146,10 @@ class InnerSolve {
         work_.newton);
   }
 
-  /// Where surfaces stop or turn round, friction jumps within a slip far smaller than an iteration, and Newton's method
-  /// goes to and fro across it. So the slip over which it grows is made great first, and small little by little: what
-  /// sticks slips in proportion to it, which leads from one solution to the next.
+  /// Continuation in the slip tolerance: where surfaces stop or turn round, friction jumps within a slip far smaller
+  /// than an iteration, and Newton's method goes to and fro across it. So the slip over which it grows is made great
+  /// first, and small little by little: what sticks slips in proportion to it, which leads from one solution to the
+  /// next.
   NewtonResult solve_by_continuation() {
     NewtonResult found;
     int spent = 0;

@@ -10,7 +10,7 @@
 
 namespace withe {
 
-/// Where the matrix of an iteration was made: there, at an earlier iterate, or in an earlier time step.
+/// Age of the matrix of an iteration: made there, at an earlier iterate, or in an earlier time step.
 enum class MatrixAge { fresh, within, across };
 
 /// Contraction rates of chord iterations with earlier factorisations.
@@ -23,7 +23,7 @@ struct MatrixHistory {
   bool slow = false;  ///< the last time step took many iterations with one
 };
 
-/// What the factorisation in a solver belongs to, and that history.
+/// Matrix that the factorisation in a solver belongs to, and its history.
 struct MatrixRecord : MatrixHistory {
   const Equations* owner = nullptr;  ///< nothing: not to be used again
   int generation = 0;                ///< of the solver
@@ -39,13 +39,13 @@ class MatrixReuse {
   /// `tolerance`: of the solution [m].
   MatrixReuse(MatrixRecord& record, Equations& equations, double interval, double tolerance, const Without& heuristics);
 
-  /// Whether the coming iteration makes a matrix.
+  /// True if the coming iteration makes a matrix.
   bool fresh() const { return fresh_; }
-  /// Whether the one before it has to be factorised: it was made for an iteration that was not needed.
+  /// True if the one before it has to be factorised: it was made for an iteration that was not needed.
   bool pending() const { return !fresh_ && !record_.factorized; }
-  /// Whether the residual alone is looked at first: it may show the end, and a matrix would have been made in vain.
+  /// True if the residual alone is looked at first: it may show the end, and a matrix would have been made in vain.
   bool near_end() const;
-  /// Whether it is within the tolerance, by what is known of the matrix.
+  /// True if it is within the tolerance, by what is known of the matrix.
   bool at_end() const { return distance_ <= tolerance_; }
   /// Length of the last step and of the one before [m]; infinite where it was shortened, or there was none.
   double step() const { return step_; }

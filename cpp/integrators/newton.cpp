@@ -18,7 +18,7 @@ constexpr int kMaxStalls = 4;
 // kink, or rounding, may stop that, and no other path is.
 constexpr double kMaxSettledShare = 0.05, kMaxSettledTolerances = 1e4;
 
-/// Whether corrections of a prediction are too long, or do not shrink, for what they lead to to lie on the same path.
+/// True if corrections of a prediction are too long, or do not shrink, for what they lead to to lie on the same path.
 bool loses_path(const Prediction& predicted, const MatrixReuse& reuse, bool first, double length) {
   if (predicted.strict)
     return leaves_path(reuse.step(), first ? predicted.length : kMaxContraction * reuse.last_step(), predicted.length,
@@ -175,7 +175,7 @@ class Newton::Solve {
            ++kinks_met_ <= how_.predicted->kinks;
   }
 
-  /// Whether nothing touches where the step begins and ends: then it is one as in a scene without surfaces.
+  /// True if nothing touches where the step begins and ends: then it is one as in a scene without surfaces.
   bool leaves_surfaces_alone() {
     if (contact_->count() > 0) return false;
     work_.trial = z_ + work_.step;

@@ -17,7 +17,7 @@ struct NewtonResult {
   double step = 0;  ///< greatest displacement of the last iteration [m]
 };
 
-/// How small the residuals are.
+/// Size of the residuals.
 struct Balance {
   bool finite = false;  ///< all are numbers; else none of the below holds
   bool floor = false;   ///< all within what rounding leaves
@@ -70,7 +70,7 @@ struct Prediction {
   double enough = 0;   ///< a correction after which no other is needed, for a point on the way [m]
 };
 
-/// How one solve goes about it.
+/// Options of one solve.
 struct SolveOptions {
   const VectorX* target = nullptr;  ///< what F(z) is to be; nothing: zero
   int max_iterations = 40;
@@ -90,9 +90,9 @@ class Newton {
   const StepNorms& norms() const { return norms_; }
   /// Finds z with F(z) = target, starting at z.
   NewtonResult solve(Equations& equations, VectorX& z, const SolveOptions& how, NewtonWorkspace& work) const;
-  /// Whether residuals are small enough; also notes the greatest one in `result`.
+  /// Size of the residuals against their bounds; also notes the greatest one in `result`.
   Balance balance(const StepData& evaluation, NewtonResult& result) const;
-  /// Where the greatest one is.
+  /// Row of the greatest residual.
   int worst_row(const VectorX& residual) const;
 
  private:

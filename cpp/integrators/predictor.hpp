@@ -17,7 +17,7 @@ class Predictor {
  public:
   static constexpr int kDepth = 4, kSlots = 5;
 
-  /// What is extrapolated, through how many of the last steps; accelerations through none: v0 goes on.
+  /// Quantity that is extrapolated, and the number of last steps; accelerations through none: v0 goes on.
   struct Choice {
     bool velocities = false;
     int points = 1;

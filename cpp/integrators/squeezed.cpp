@@ -22,7 +22,7 @@ double excess(const Touching& t, double allowed) {
   return t.pair.radii() - t.proximity.distance - allowed * t.pair.small_radius();
 }
 
-/// How a distance changes with the unknowns that are free; returns the size of the whole slope.
+/// Derivative of a distance by the free unknowns; returns the size of the whole slope.
 double free_slope(const Equations& equations, int contact, VectorX& out) {
   double slope[12];
   int dofs[kContactUnknowns];
@@ -36,8 +36,9 @@ double free_slope(const Equations& equations, int contact, VectorX& out) {
   return all;
 }
 
-/// What relieves one contact presses on the other by the share `c`: neither is relieved where the sum of their depths
-/// is too great, whatever moves. Such a contact moves what moves the first most, which few do.
+/// Contact opposite to one: a motion that relieves one contact presses on the other by the share `c`: neither is
+/// relieved where the sum of their depths is too great, whatever moves. Such a contact moves what moves the first most,
+/// which few do.
 int opposite_contact(const Equations& equations, int contact, double allowed, double free, const VectorX& slope,
                      VectorX& other) {
   const ContactSet& set = equations.contact()->contacts();

@@ -138,7 +138,7 @@ class Statics {
         }
         was_stable = firm();
       }
-      // Of a mechanism, which nothing holds, the tangent is rounding: its path ends where it begins.
+      // The tangent of an unsupported mechanism is rounding: its path ends where it begins.
       const bool singular = tangent_.found && tangent_.turn > kMinSingularTurn;
       tangent_.found = tangent_.found && !singular;
       const double by_turn = tangent_.found ? kMaxPointTurn / tangent_.turn : 1.0;
@@ -166,8 +166,9 @@ class Statics {
 
   int most_iterations() const { return std::min(kMaxPathIterations, options_.max_iterations); }
 
-  /// Where Coulomb's friction holds a limp rod, the border of what slips goes on by a contact an iteration, and the
-  /// solution follows when it has arrived: so many iterations are no sign that there is none.
+  /// Iterations of the border of slip: where Coulomb's friction holds a limp rod, the border of what slips goes on by a
+  /// contact an iteration, and the solution follows when it has arrived: so many iterations are no sign that there is
+  /// none.
   int border_iterations() const {
     return equations_.contact() && !equations_.has_potential() ? equations_.contact()->count() : 0;
   }
@@ -176,7 +177,7 @@ class Statics {
     return tangent_.factorization.status == FactorStatus::ok && tangent_.factorization.negative_pivots == 0;
   }
 
-  /// Whether what the present state is out of balance by would not hold it: it falls then, as what is let go between
+  /// True if the residual force of the present state would not hold it: it falls then, as what is let go between
   /// two wells does, and a path on which that force fades would lead back to the saddle between them. Surfaces that an
   /// obstacle has been pushed into are to leave each other, not to fall.
   bool falls() {
@@ -200,7 +201,7 @@ class Statics {
   /// The point of the path at the factor `next`, predicted along the tangent.
   bool reach(double next, double increment, NewtonResult& last) {
     path_.go_to(next);
-    // Where surfaces meet, corrections shrink less than on smooth paths, but lead no farther than the prediction does:
+    // With contact, corrections shrink less than on smooth paths, but lead no farther than the prediction does:
     // what slides without friction would go off. Rings have kinks.
     const bool touching = equations_.contact() && equations_.contact()->count() > 0;
     const int rings = equations_.hands() ? equations_.hands()->rings().count() : 0;
@@ -244,12 +245,12 @@ class Statics {
     last.worst_row = r.worst_row;
   }
 
-  /// Whether the scene may go at once to z without pushing surfaces through each other.
+  /// True if the scene may go at once to z without pushing surfaces through each other.
   bool clear_way(const VectorX& z) {
     return !equations_.contact() || equations_.allowed(state_.q, z - state_.q) == 1.0;
   }
 
-  /// Where the path has ended: goes on dynamically, to what the scene settles in a little behind.
+  /// Jump at the end of the path: goes on dynamically, to what the scene settles in a little behind.
   bool jump(double next, double increment, StaticResult& result) {
     path_.go_to(next);
     const VectorX before = state_.q;
@@ -288,7 +289,7 @@ class Statics {
     double near = kMaxNearMove * equations_.model().length_scale;
     for (int k = 0; k < kMaxIntervals && h > shortest; ++k) {
       state_.v.setZero();
-      // What is neutral keeps intervals from growing further.
+      // A neutral motion keeps intervals from growing further.
       const bool still = neutral_ && h >= of_waves && moved < near;
       const bool at_rest = h >= longest || (still && (!conservative || stable(factor)));
       const double beyond = conservative ? 1.0 : std::exp2(k / kIntervalsPerDoubling);
@@ -298,7 +299,7 @@ class Statics {
       const double found = work_.data.potential - path_.target().dot(z_);
       const double sum = std::abs(potential) + std::abs(found), rise = found - potential - least_energy();
       const double way = newton_.norms().displacement(z_ - state_.q);
-      // What goes farther is neutral, or was at a saddle, which lies higher now that waves have run out.
+      // A motion that goes farther is neutral, or was at a saddle, which lies higher now that waves have run out.
       const bool leads_away = at_rest && way > slow && rise > 1e-14 * sum;
       const bool downhill = rise <= 1e-10 * sum && !leads_away;
       if (r.converged && (!conservative || downhill)) {
@@ -444,7 +445,8 @@ class Statics {
     path_.accept(falls_ahead == first ? ahead : behind);
   }
 
-  /// What the potential rounds to where little of it is left: a coil that relaxes into its natural shape ends at none.
+  /// Rounding error of the potential where little of it is left: a coil that relaxes into its natural shape ends at
+  /// none.
   double least_energy() const { return 1e-14 * energy_scale_; }
 
   Equations& equations_;

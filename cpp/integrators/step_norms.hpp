@@ -1,5 +1,5 @@
 #pragma once
-/// How far a step of Newton's method moves and turns what a scene is made of.
+/// Norms of a step of Newton's method: displacements and rotations of the parts of a scene.
 
 #include <vector>
 
@@ -17,7 +17,7 @@ class StepNorms {
   double turn(const VectorX& step) const;
   /// Factor by which a step is shortened, so that nothing moves or turns too far at once.
   double cap(const VectorX& step) const;
-  /// Whether `cap` surely leaves a step alone in which no node moves, and nothing turns, by more than `most`.
+  /// True if `cap` surely leaves a step alone in which no node moves, and nothing turns, by more than `most`.
   bool leaves_alone(double most) const;
 
   /// Per unknown: 1 where it is a coordinate of a node, 1 where it is an angle, else 0; and what makes a force of a

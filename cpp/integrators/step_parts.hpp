@@ -1,5 +1,5 @@
 #pragma once
-/// What implicit and explicit steps share: how far edges turn, and the energy that goes in and out.
+/// Parts that implicit and explicit steps share: rotations of edges, and the energy that goes in and out.
 
 #include "integrators/dynamics.hpp"
 
@@ -17,8 +17,8 @@ void add_work(const Equations& equations, const Parameters& parameters, const Ve
 void add_support_work(const Equations& equations, const VectorX& v0, const VectorX& v1, double dt, double held_time,
                       StepWorkspace& work, StepResult& result);
 
-/// Of an explicit step from a state to q: the configuration there, and that of `next`. Returns by how much edges turn
-/// at most [rad].
+/// Advance of an explicit step from a state to q: the configuration there, and that of `next`. Returns by how much
+/// edges turn at most [rad].
 double advance(const Model& model, const State& state, const VectorX& q, Configuration& configuration, State& next);
 
 /// Finds the fluid's force at q on velocities v, and the time that takes.

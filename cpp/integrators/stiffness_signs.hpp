@@ -1,5 +1,5 @@
 #pragma once
-/// What the signs of a stiffness's eigenvalues say of an equilibrium: whether it is stable, and where it falls to.
+/// Stability of an equilibrium, and the direction of its fall, from the signs of the eigenvalues of its stiffness.
 
 #include <memory>
 
@@ -18,16 +18,16 @@ class StiffnessSigns {
   LinearSolver& symmetric_part();
   /// Factorises a symmetric matrix plus `damping` of the weight; whether all its eigenvalues are positive.
   bool definite(LinearSolver& stiffness, double damping, const VectorX& weight);
-  /// Whether no motion lowers the potential; of unsymmetric equations where there is none, whether they can be solved.
+  /// True if no motion lowers the potential; of unsymmetric equations where there is none, whether they can be solved.
   /// `data`: of the evaluation, and scratch.
   bool stable(const State& state, StepData& data);
-  /// Whether a motion is neutral, as of a free body, or of a rod that may spin about its axis; of unsymmetric
+  /// True if a motion is neutral, as of a free body, or of a rod that may spin about its axis; of unsymmetric
   /// equations, whether one may be.
   bool neutral(const State& state, StepData& data);
-  /// Where there is a potential, that motion, of length 1, or nothing. `slack`: times what is rounded here, as what was
-  /// given may be: a drawing that is straight but for its last digits prefers one side.
+  /// Neutral motion of length 1 where there is a potential, or nothing. `slack`: times what is rounded here, as what
+  /// was given may be: a drawing that is straight but for its last digits prefers one side.
   VectorX neutral_motion(const State& state, StepData& data, double slack = 1.0);
-  /// Likewise the direction of most negative curvature against mass, by inverse iteration on a matrix that is shifted
+  /// Direction of the most negative curvature against mass, by inverse iteration on a matrix that is shifted
   /// until it is definite.
   VectorX lowest_mode(int seed);
 

@@ -27,11 +27,11 @@ class SurfaceSearch {
   bool run(const VectorX& z, double& shorten);
   void forget() { evaluated_ = solved_ = remade_ = false; }
 
-  /// Whether the end of the step is in `work.trial`, and evaluated without matrix.
+  /// True if the end of the step is in `work.trial`, and evaluated without matrix.
   bool evaluated() const { return evaluated_; }
-  /// Whether `work.next_step` is the step from there with the same matrix.
+  /// True if `work.next_step` is the step from there with the same matrix.
   bool solved() const { return solved_; }
-  /// Whether the step was made anew, with a matrix that lacks geometric stiffness.
+  /// True if the step was made anew, with a matrix that lacks geometric stiffness.
   bool remade() const { return remade_; }
 
  private:
