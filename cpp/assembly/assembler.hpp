@@ -111,7 +111,7 @@ class Assembler {
   /// Takes in the unknowns of contacts, one after the other (-1: none), and finds a new order of elimination where they
   /// couple what was not coupled yet. The solver is then another one.
   void couple(const std::vector<int>& contact_unknowns, int width);
-  /// Takes in contacts likewise, with an order of elimination for these and no others.
+  /// Couples the unknowns of contacts, with an order of elimination for these contacts and no others.
   void order_for(const std::vector<int>& contact_unknowns, int width);
   /// Takes in groups of unknowns that custom forces couple, as far as they are not coupled yet.
   void couple_groups(const std::vector<std::vector<int>>& groups);

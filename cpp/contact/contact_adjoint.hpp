@@ -12,7 +12,7 @@ struct ContactAdjoint {
   double start[kContactUnknowns] = {}, velocity[kContactUnknowns] = {};
   double approach = 0;        ///< by the speed of approach that its record had at the start [s/m]
   double friction[3] = {};    ///< by its coefficients, see `SurfaceParameters::obstacle_friction`
-  double rolling = 0;         ///< likewise
+  double rolling = 0;         ///< by its coefficient of rolling friction
   double slip_tolerance = 0;  ///< [s/m]
   double gravity = 0;         ///< by its size [s^2/m]
   double mass = 0;            ///< by what the contact holds up, `ContactProblem::mass_of` [1/kg]

@@ -38,7 +38,7 @@ struct Touching {
   double turn = 0;  ///< of an impact that begins: between directions to each other at both ends of the step [rad]
   PressingLaw law;
   PressingForce pressing;
-  Vec3d stick{}, roll{};  ///< likewise
+  Vec3d stick{}, roll{};  ///< elastic slips, see ContactRecord
   int lagged = -1;        ///< friction of the start and no pressing: index in ContactProblem::lagged_friction
 
   /// Ends of edges as `Bodies::end_points` has them.
@@ -90,7 +90,7 @@ struct ContactProblem {
   double duration = 0;                 ///< the time in which slip happens [s]
   Bodies bodies;                       ///< with obstacles where they are at the end
   std::vector<Vec3d> shift;            ///< of each obstacle in the step [m]; empty: none moves
-  std::vector<Vec3d> turn;             ///< likewise [rad]; empty: none turns
+  std::vector<Vec3d> turn;             ///< of each obstacle in the step [rad]; empty: none turns
   std::vector<Vec3d> velocity;         ///< of each obstacle, as its points move in the step [m/s]; empty: none moves
   bool starting = false;               ///< what touches as the step begins is about to be found
   std::vector<BodyOffset> offsets;     ///< of bodies that have any

@@ -36,7 +36,7 @@ struct StencilBatch {
   double* values;     ///< null: no Hessian; padded by kPadding
 
   const double* velocity;      ///< per unknown: of an explicit step in space, else null
-  const double* edge_inertia;  ///< per edge, of theta [kg m^2]: likewise
+  const double* edge_inertia;  ///< per edge, of theta [kg m^2]: of an explicit step in space, else null
 };
 
 /// Data of an energy-momentum step besides its middle, see discrete_elements.hpp. The batch's `force` is

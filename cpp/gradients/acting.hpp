@@ -42,7 +42,7 @@ class ActingNumbers {
     std::size_t first = 0;
     std::shared_ptr<const Parameters> base;
     long natural_version = 0;
-    std::vector<MatrixX2> natural_curvature;  ///< empty: that of the base; likewise below
+    std::vector<MatrixX2> natural_curvature;  ///< empty: that of the base, here and below
     std::vector<VectorX> natural_twist;
     VectorX natural_stretch;
     MatrixX3 loads;

@@ -16,7 +16,7 @@ namespace {
 
 /// States are kept this many steps apart; those between are played again.
 constexpr std::size_t kStretch = 100;
-constexpr double kRounding = 1e-12;  // by which supports that rest move, of the scene's length; angles likewise
+constexpr double kRounding = 1e-12;  // by which supports that rest move, of the scene's length; and angles
 
 MatrixX3 at_nodes(const Model& model, const VectorX& by) {
   MatrixX3 out(model.node_count, 3);

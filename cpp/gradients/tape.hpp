@@ -106,7 +106,7 @@ class Tape {
     VectorX gain;  ///< see `StepTaken::held_gain`; none: nothing
     Reached reached;
     std::vector<SupportPose> hands;        ///< at its end; none: where they were before it
-    std::vector<ObstaclePlace> obstacles;  ///< likewise
+    std::vector<ObstaclePlace> obstacles;  ///< at its end; none: where they were before it
     std::vector<ContactRecord> contacts;   ///< at its end
     bool begins;
     const char* unknown;  ///< why no gradient goes through it, if so
@@ -149,7 +149,7 @@ class Tape {
   std::map<long, NaturalShape> natural_;  ///< by the number of steps
   std::vector<State> starts_;             ///< of every stretch of steps that are played again together
   VectorX last_, last_velocity_;          ///< what the last step led to
-  std::vector<SupportPose> last_hands_;   ///< likewise
+  std::vector<SupportPose> last_hands_;   ///< poses of hands after the last step
   std::vector<ObstaclePlace> last_obstacles_;
   std::string refused_;
   bool frictional_;

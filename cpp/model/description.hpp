@@ -11,7 +11,7 @@
 
 namespace withe {
 
-/// A rod as a chain of nodes. Arrays have one row per edge, or per stencil where said so.
+/// A rod as a chain of nodes. Arrays have one row per edge, unless their comment names stencils.
 /// An open rod of N nodes has N - 1 edges and N - 2 stencils (the inner nodes); a closed one has N, N
 /// and N (stencil i sits at node i, between edges i - 1 and i).
 struct RodDescription {

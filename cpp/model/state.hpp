@@ -24,7 +24,7 @@ struct ContactRecord {
   double approach = 0;   ///< speed at which the surfaces met [m/s]; 0: they rest on each other
   double age = 0;        ///< time since then [s]
   Vec3d stick{};         ///< elastic slip of an anchored contact, of a's surface over b's [m]
-  Vec3d roll{};          ///< likewise of rolling friction, by a's turning alone [m]
+  Vec3d roll{};          ///< elastic slip of anchored rolling friction, by a's turning alone [m]
   Vec3d friction{};      ///< on a [N]
   bool sticking = false;
 };
@@ -104,7 +104,7 @@ struct State {
   VectorX acceleration;                 ///< of the last step, to predict the next one (explicit: to begin it)
   bool acceleration_current = false;    ///< explicit scheme: `acceleration` belongs to q and the present forces
   VectorX load_force;                   ///< explicit scheme: of loads and custom forces there, for their work; or empty
-  VectorX friction_force;               ///< likewise, against that of friction
+  VectorX friction_force;               ///< explicit scheme: of friction there, for its work; or empty
   std::vector<Vec3d> tangent;           ///< per edge: source of the reference director
   std::vector<Vec3d> director;          ///< per edge: reference director, normal to `tangent`
   std::vector<Matrix3> frame;           ///< per joint frame (in a plane: not used, q holds the angle)

@@ -108,10 +108,10 @@ using ApproachAdjoint = std::map<ContactKey, double>;
 struct StepAdjoint {
   /// Multipliers of the residual; of frames in space, where a step's rows are moments, those of their J^T moment.
   const VectorX& rows;
-  VectorX start, velocity;                     ///< by q0 (its angles: of directors) and v0
-  VectorX acceleration;                        ///< by the acceleration of what supports hold; meaningful where held
-  VectorX start_turn, end_turn;                ///< per edge: by the angle of its directors at the start, at q1 [rad]
-  VectorX middle_turn;                         ///< likewise, at z, of what is no part of the residual
+  VectorX start, velocity;       ///< by q0 (its angles: of directors) and v0
+  VectorX acceleration;          ///< by the acceleration of what supports hold; meaningful where held
+  VectorX start_turn, end_turn;  ///< per edge: by the angle of its directors at the start, at q1 [rad]
+  VectorX middle_turn;  ///< per edge: by the angle of its directors at z, of numbers that are no part of the residual
   MatrixX3 start_spin, middle_spin, end_spin;  ///< per frame: by its rotation vector at the start, at z, at q1 [rad]
   const ApproachAdjoint& approach_after;       ///< by what is remembered at the end
   ApproachAdjoint approach;                    ///< by what was remembered at the start

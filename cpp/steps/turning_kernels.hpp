@@ -14,7 +14,7 @@ struct TurningBatch {
   const double* inertia;                    ///< per edge [kg m^2]
   const double *frames, *start_tangent;     ///< per edge: at z, kFrameNumbers; 3 numbers
   const double *start_length, *end_length;  ///< per edge, of energy-momentum steps [m]
-  const double* end_frames;                 ///< likewise, kFrameNumbers
+  const double* end_frames;                 ///< per edge, of energy-momentum steps, kFrameNumbers
   double *force, *torque;                   ///< per edge, what comes out: at its head, 3 numbers [N]; [N m]
 };
 
