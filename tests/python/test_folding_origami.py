@@ -97,7 +97,7 @@ def test_it_slides_as_the_continuum_says(paper):
 
 def test_a_plan_that_another_paper_within_its_uncertainty_slides_on_says_so(paper):
     with pytest.warns(
-        UserWarning, match=r"the sheet slides by 2\d\d.* mm within its uncertainty, where Lgb is 0.0473 m"
+        UserWarning, match=r"the sheet slides by 2\d\d.* mm for a paper within the uncertainty, with Lgb 0.0473 m"
     ):
         plan(paper, 0.30, method="slip")
     with warnings.catch_warnings():

@@ -112,7 +112,7 @@ def test_curvature_of_2_11_folds_a4_in_half():
 
 
 def test_us_letter_is_folded_in_half_without_slide_if_it_is_as_thought():
-    with pytest.warns(UserWarning, match=r"within its uncertainty the sheet slides .*, for Lgb 0\.066 m"):
+    with pytest.warns(UserWarning, match=r"the sheet slides .* for a paper within the uncertainty, with Lgb 0\.066 m"):
         folded = freely("us_letter")
     assert 0 < folded.slip_ratio.max() < 0.12
     assert np.abs(folded.slide).max() == 0.0
