@@ -163,7 +163,10 @@ def _slides(slow: Plan) -> str | None:
         return None
     how = f"by {1e3 * slide:.1f} mm" if np.isfinite(slide) else "and jumps"
     lgb = paper.gravito_bending_length
-    return f"the sheet slides {how} for a paper within the uncertainty, with Lgb {lgb:.4g} m and friction {paper.friction:.3g}"
+    return (
+        f"the sheet slides {how} for a paper within the uncertainty, with Lgb {lgb:.4g} m and friction "
+        f"{paper.friction:.3g}"
+    )
 
 
 def _jumps(slow: Plan) -> str:
