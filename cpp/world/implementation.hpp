@@ -249,6 +249,7 @@ struct World::Implementation : Running {
 
   // step_length.cpp
   void watch_step(double dt, const Equations& system);
+  void sum_motion(double dt, bool first, const Equations& system);
   void forget_component(int component);
   std::string unresolved_in_time(double dt, int component) const;
   std::string unresolved_impact(double dt, const Equations& system);

@@ -306,6 +306,17 @@ void restore_loads(const std::vector<LoadDescription>& added, World::Implementat
   self.remake_equations();
 }
 
+void check_parts(const Parameters& p) {
+  for (const VectorX* v : {&p.spring_stiffness, &p.spring_rest_length, &p.spring_damping})
+    require(v->allFinite() && (v->array() >= 0.0).all(), "snapshot is damaged: impossible spring");
+  for (const VectorX* v : {&p.joint_stiffness, &p.joint_damping})
+    require(v->allFinite() && (v->array() >= 0.0).all(), "snapshot is damaged: impossible joint");
+  for (const VectorX* v : {&p.joint_rest_angle, &p.joint_moment})
+    require(v->allFinite(), "snapshot is damaged: impossible joint");
+  require(p.tendon_tension.allFinite() && (p.tendon_tension.array() >= 0.0).all(),
+          "snapshot is damaged: impossible tendon");
+}
+
 /// Refuses values that no simulation would have left.
 void check_running(const World::Implementation& self) {
   const StepLengths& lengths = self.lengths;
@@ -317,15 +328,7 @@ void check_running(const World::Implementation& self) {
           "snapshot is damaged: impossible viscosity");
   if (self.description.fluid.model == FluidModel::stokeslets)
     check_regularization(self.model, self.parameters.fluid_regularization);
-  for (const VectorX* v :
-       {&self.parameters.spring_stiffness, &self.parameters.spring_rest_length, &self.parameters.spring_damping})
-    require(v->allFinite() && (v->array() >= 0.0).all(), "snapshot is damaged: impossible spring");
-  for (const VectorX* v : {&self.parameters.joint_stiffness, &self.parameters.joint_damping})
-    require(v->allFinite() && (v->array() >= 0.0).all(), "snapshot is damaged: impossible joint");
-  for (const VectorX* v : {&self.parameters.joint_rest_angle, &self.parameters.joint_moment})
-    require(v->allFinite(), "snapshot is damaged: impossible joint");
-  require(self.parameters.tendon_tension.allFinite() && (self.parameters.tendon_tension.array() >= 0.0).all(),
-          "snapshot is damaged: impossible tendon");
+  check_parts(self.parameters);
   for (std::size_t s = 0; s < self.model.supports.size(); ++s) {
     const Support& support = self.model.supports[s];
     if (!support.active || !support.slides()) continue;

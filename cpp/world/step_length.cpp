@@ -51,16 +51,31 @@ void World::Implementation::watch_step(double dt, const Equations& system) {
     warnings.report(Warning::impact, unresolved_impact(of_part, system));
   const std::int64_t place = steps_taken % kPeriod;
   if (warnings.has_reported(Warning::steps) || place >= kLooked) return;
+  sum_motion(of_part, place == 0, system);
+  if (const Contact* contact = system.contact())
+    for (const Touching& t : contact->contacts()) {
+      forget_component(model.component_of_edge(t.pair.key.a));
+      if (t.pair.key.b >= 0) forget_component(model.component_of_edge(t.pair.key.b));
+    }
+  if (place + 1 < kLooked) return;
+  VectorX& greatest = step_watch.greatest;
+  greatest = greatest.cwiseMax(step_watch.motion);
+  for (int c = 0; c < model.component_count && !warnings.has_reported(Warning::steps); ++c)
+    warnings.report(Warning::steps, unresolved_in_time(of_part, c));
+}
+
+/// Adds a step of dt to the sums over steps, from which the first one begins anew.
+void World::Implementation::sum_motion(double dt, bool first, const Equations& system) {
   auto& [change, motion, greatest, pull, moved, before] = step_watch;
-  if (place == 0 || change.size() != model.component_count)
+  if (first || change.size() != model.component_count)
     for (VectorX* sum : {&change, &motion, &pull, &moved}) sum->setZero(model.component_count);
   if (greatest.size() != change.size()) greatest.setZero(change.size());
-  const bool euler = integrator == Integrator::backward_euler,
-             follows = euler && place > 0 && before.size() == state.v.size();
+  const bool euler = options.integrator == Integrator::backward_euler,
+             follows = euler && !first && before.size() == state.v.size();
   const VectorX& mass = system.mass().rows;
   for (Eigen::Index i = 0; i < state.v.size(); ++i) {
     const int component = model.dof_component[at(static_cast<int>(i))];
-    const double after = state.v(i), within = of_part * state.acceleration(i), own = mass(i) * after * after;
+    const double after = state.v(i), within = dt * state.acceleration(i), own = mass(i) * after * after;
     change(component) += mass(i) * within * within;
     if (!euler) {
       motion(component) += 2.0 * (mass(i) * (after - within) * (after - within) + own);
@@ -68,20 +83,10 @@ void World::Implementation::watch_step(double dt, const Equations& system) {
     }
     motion(component) += own;
     if (!follows || std::isnan(before(i))) continue;
-    pull(component) -= of_part * mass(i) * after * (state.acceleration(i) - before(i));
+    pull(component) -= dt * mass(i) * after * (state.acceleration(i) - before(i));
     moved(component) += own;
   }
   if (euler) before = state.acceleration;
-  if (const Contact* contact = system.contact()) {
-    for (const Touching& t : contact->contacts()) {
-      forget_component(model.component_of_edge(t.pair.key.a));
-      if (t.pair.key.b >= 0) forget_component(model.component_of_edge(t.pair.key.b));
-    }
-  }
-  if (place + 1 < kLooked) return;
-  greatest = greatest.cwiseMax(motion);
-  for (int c = 0; c < model.component_count && !warnings.has_reported(Warning::steps); ++c)
-    warnings.report(Warning::steps, unresolved_in_time(of_part, c));
 }
 
 void World::Implementation::forget_component(int component) {
