@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from reporting import Report, bar
 
-from withe.deployment import Cable, Deployment, Plan, deploy, plan
+from withe.deployment import Cable, Deployment, LayPlan, deploy, plan
 
 # Pattern and friction, cable 2: each kind of curve, from what friction holds to what slips.
 CELLS = (("line", 0.2), ("circle", 0.4), ("sine", 0.4), ("letterU", 0.4), ("letterL", 0.7))
@@ -16,15 +16,15 @@ SPEEDS = (0.025, 0.0125)  # [m/s]
 MESH, SPEED = 0.2, 1.0  # [mm] by which a mean may change
 
 
-def refine(report: Report, motion_of: Callable[[str, int, str, float], Plan]) -> None:
+def refine(report: Report, motion_of: Callable[[str, int, str, float], LayPlan]) -> None:
     """Lay five cells by ever more nodes, quasi-statically, and at the usual and half the speed, in time."""
     rows, by_mesh, by_speed = [], [], []
     with bar(len(CELLS) * (len(NODES) + len(SPEEDS)), "refining", "runs") as shown:
         for name, friction in CELLS:
             motion = motion_of(name, NUMBER, "exact", friction)
 
-            def laid(planned: Plan, floor: float = friction, **options: object) -> float:
-                found: Deployment = deploy(planned, floor=floor, progress=False, **options)  # type: ignore[arg-type]
+            def laid(planned: LayPlan, floor: float = friction, **options: object) -> float:
+                found: Deployment = deploy(planned, friction=floor, progress=False, **options)  # type: ignore[arg-type]
                 shown.advance(1)
                 return 1e3 * found.error
 

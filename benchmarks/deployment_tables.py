@@ -30,7 +30,7 @@ from deployment_measuring import looped
 from deployment_refining import refine
 from reporting import OUT, RESUME, Lines, Report, arguments, bar
 
-from withe.deployment import Cable, Deployment, Pattern, Plan, Slip, deploy, place, plan
+from withe.deployment import Cable, Deployment, LayPlan, Pattern, Slip, deploy, place, plan
 from withe.errors import ConvergenceError
 
 Key = tuple[str, int, float, str]  # pattern, cable, friction, way
@@ -123,7 +123,7 @@ class Cell:
     """A way to lay a cable along a pattern on a floor: without noise, and in noisy trials."""
 
     run: Run
-    motion: Plan
+    motion: LayPlan
     noisy: tuple[Run, ...] = ()
 
     @property
@@ -185,7 +185,7 @@ class Patterns:
     def __init__(self, nodes: int) -> None:
         self.nodes = nodes
         self._patterns: dict[str, Pattern] = {}
-        self._plans: dict[tuple[str, int, str, int | None], Plan] = {}
+        self._plans: dict[tuple[str, int, str, int | None], LayPlan] = {}
 
     def pattern(self, name: str) -> Pattern:
         """As published, smoothed by at most a millimetre."""
@@ -194,7 +194,7 @@ class Patterns:
             self._patterns[name] = Pattern(points, nodes=self.nodes)
         return self._patterns[name]
 
-    def plan(self, name: str, number: int, way: str, friction: float, seed: int | None = None) -> Plan:
+    def plan(self, name: str, number: int, way: str, friction: float, seed: int | None = None) -> LayPlan:
         """The published circle ends on its own beginning: laid over itself."""
         key = (name, number, way if way != "optimised" else f"{way} {friction}", seed)
         if key not in self._plans:
@@ -216,12 +216,12 @@ def carried_out(run: Run, patterns: Patterns) -> Run:
     try:
         motion = patterns.plan(run.pattern, run.cable, run.planned, run.friction, run.seed)
         if run.way == "placed":
-            return run.of(place(motion, floor=run.friction, nodes=run.nodes, progress=False))
+            return run.of(place(motion, friction=run.friction, nodes=run.nodes, progress=False))
         static = run.seed is None and run.way != "intuitive"
         found = deploy(
             motion,
             Cable.dlo(run.cable),
-            floor=run.friction,
+            friction=run.friction,
             noise=0.0 if run.seed is None else 1.0,
             seed=run.seed or 0,
             quasi_static=static,

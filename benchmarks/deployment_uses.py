@@ -76,9 +76,9 @@ class Knots:
         plans, steps = tie_knot.TYING[name](way)
         if name not in self._picks:
             rehearsed = tie_knot.TYING[name]("exact")
-            self._picks[name] = tie(*rehearsed, floor=tie_knot.FRICTION, nodes=self.nodes).picks
+            self._picks[name] = tie(*rehearsed, friction=tie_knot.FRICTION, nodes=self.nodes).picks
         found = tie(
-            plans, steps, floor=tie_knot.FRICTION, picks=self._picks[name], seed=seed, noise=noise, nodes=self.nodes
+            plans, steps, friction=tie_knot.FRICTION, picks=self._picks[name], seed=seed, noise=noise, nodes=self.nodes
         )
         return tie_knot.is_tied(name, found), f"{len(found.missed)} moves missed"
 

@@ -270,7 +270,7 @@ def replace_invalid(pose: Elastica, there: np.ndarray) -> Elastica:
     )
 
 
-def poses_of_jaw(plan: folding.Plan) -> np.ndarray:
+def poses_of_jaw(plan: folding.FoldPlan) -> np.ndarray:
     """Where a plan has the jaw's inner edge [m]: x from where that lay, z."""
     depth, angle = plan.jaw.depth, plan.angles
     x = plan.poses[:, 0] + depth * np.cos(angle) - depth

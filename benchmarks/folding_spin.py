@@ -86,7 +86,7 @@ def turned(plan: folding.Plan, seed: int, replans: int) -> Turned:
     return Turned(np.degrees(found.spin), found.slides, found.failure, time.thread_time() - begin)
 
 
-def planned(case: Case) -> folding.Plan:
+def planned(case: Case) -> folding.FoldPlan:
     """By the paper, as it is thought to be."""
     paper = replace(PAPERS[case.paper], friction=case.friction, width=case.width)
     with warnings.catch_warnings():

@@ -136,7 +136,7 @@ def run(wanted: dict[Key, list[folding.Trial]], options: argparse.Namespace) -> 
     left.sort(key=lambda trial: trial.seed)  # what is interrupted has as many folds in every line, or nearly
     keys = {name_of(key): key for key in wanted}
     try:
-        for outcome in folding.run_trials(left, processes=options.processes):
+        for outcome in folding.run_trials(left, workers=options.processes):
             folds.append(Folded.of(keys[outcome.trial.name], outcome))
             lines.add(asdict(folds[-1]))
             print(folds[-1], flush=True)

@@ -57,7 +57,7 @@ def laid(
         progress=False,
     )
     return deploy(
-        motion, cable, floor=FRICTION, seed=seed, noise=noise, quasi_static=static, nodes=nodes, progress=False
+        motion, cable, friction=FRICTION, seed=seed, noise=noise, quasi_static=static, nodes=nodes, progress=False
     )
 
 

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 import withe
-from withe.deployment import Cable, Move, Pattern, Plan, Tying, plan, tie
+from withe.deployment import Cable, LayPlan, Move, Pattern, Tying, plan, tie
 
 FRICTION = 0.8
 TAIL = 0.05  # [m]
@@ -45,12 +45,12 @@ def arc(centre: float, radius: float, first: float, last: float) -> list[tuple[f
     return [(centre + radius * np.cos(angle), radius * np.sin(angle)) for angle in angles]
 
 
-def laid(number: int, pattern: Pattern, way: str) -> Plan:
+def laid(number: int, pattern: Pattern, way: str) -> LayPlan:
     """Of a cable of the dissertation, over itself where it crosses."""
     return plan(Cable.dlo(number), pattern, way, crossings="over", tail=TAIL)
 
 
-def trefoil(way: str = "exact") -> tuple[list[Plan], list[list[Move]]]:
+def trefoil(way: str = "exact") -> tuple[list[LayPlan], list[list[Move]]]:
     """A loop, crossed once, the end beside it; then that end goes under the loop, and over it."""
     loop = [(-0.108, -0.0045), (-0.063, 0), (-0.018, 0), (0.027, 0), (0.072, 0.018), (0.09, 0.063), (0.072, 0.108)]
     back = [(0.027, 0.126), (-0.018, 0.108), (-0.038, 0.0675), (-0.0315, 0.027), (-0.009, -0.0135), (0.036, -0.0495)]
@@ -68,7 +68,7 @@ def trefoil(way: str = "exact") -> tuple[list[Plan], list[list[Move]]]:
     return [rope], [[lifted, led], [Move(0, end, over)], pulled]
 
 
-def reef(way: str = "exact") -> tuple[list[Plan], list[list[Move]]]:
+def reef(way: str = "exact") -> tuple[list[LayPlan], list[list[Move]]]:
     """A bight, another over its legs; then the first one's head goes over the ends of the other, and these over it."""
     x = np.linspace(-0.275, 0.0, 10)[:-1]
     width, middle, wide = 0.045, -0.06, 0.08
@@ -147,7 +147,7 @@ def main() -> None:
     found = {}
     for name in arguments.knots:
         plans, steps = TYING[name]()
-        found[name] = tie(plans, steps, floor=FRICTION, nodes=arguments.nodes)
+        found[name] = tie(plans, steps, friction=FRICTION, nodes=arguments.nodes)
         print(
             f"{name}: tied {int(is_tied(name, found[name]))} of 1, moves that missed {len(found[name].missed)}",
             flush=True,

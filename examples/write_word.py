@@ -56,7 +56,11 @@ def main() -> None:
         motion = plan(thread, pattern, way, crossings="over")
         static = way != "intuitive"  # a row of equilibria does not follow a thread that buckles and falls
         found = deploy(
-            motion, floor=arguments.friction, nodes=arguments.nodes, quasi_static=static, progress=sys.stdout.isatty()
+            motion,
+            friction=arguments.friction,
+            nodes=arguments.nodes,
+            quasi_static=static,
+            progress=sys.stdout.isatty(),
         )
         print(f"{way}: {1e3 * found.error:.1f} mm off on the mean, word of {1e3 * pattern.length:.0f} mm", flush=True)
         panel.plot(*(1e3 * pattern.raw.T), color="0.6", lw=0.8, ls=":")

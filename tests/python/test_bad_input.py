@@ -234,7 +234,7 @@ SIMULATIONS = [
     (lambda s, a: s.run(NAN), "duration must be finite, got nan"),
     (lambda s, a: s.run(1, record_every=-1), "record_every must be positive, got -1"),
     (lambda s, a: s.run(1e9, record_every=1e-3), "record_every must fit the duration, 1e+09 s, got 0.001"),
-    (lambda s, a: s.run(0.1, progress="often"), 'progress must be True, False or "always", got'),
+    (lambda s, a: s.run(0.1, progress="often"), "progress must be True or False, got"),
     (lambda s, a: s.run(0.1, until=3), "until must be a function, got 3"),
     (lambda s, a: s.run(0.1, before_step="x"), "before_step must be a function, got 'x'"),
     (lambda s, a: s.run(0.1, record=[len]), "record must be a mapping of names to functions, got list"),

@@ -367,10 +367,10 @@ def test_bad_input_is_a_value_error_that_says_what_was_expected(call, message):
     batch.step()
 
 
-@pytest.mark.parametrize(("n", "workers"), [(0, None), (2.5, None), (2, 0)])
-def test_a_batch_of_none_or_without_workers_is_refused(n, workers):
+@pytest.mark.parametrize(("count", "workers"), [(0, None), (2.5, None), (2, 0)])
+def test_a_batch_of_none_or_without_workers_is_refused(count, workers):
     with pytest.raises(ValueError, match=r"must"):
-        cantilever()[0].build_batch(n, workers=workers)
+        cantilever()[0].build_batch(count, workers=workers)
 
 
 def test_discrete_curvatures_mean_the_angles_of_each_simulations_own_nodes():

@@ -109,7 +109,7 @@ def bend():
 def test_a_plan_from_the_network_is_that_of_exact_grasps_nearly():
     cable = Cable.dlo(2)
     exact, learned = (plan(cable, bend(), controller) for controller in ("exact", "network"))
-    assert learned.controller == "network"
+    assert learned.method == "network"
     s = np.linspace(0.01, 0.95, 50) * exact.pattern.length
 
     def along(motion, rows):
@@ -127,7 +127,7 @@ def test_a_plan_from_the_network_is_that_of_exact_grasps_nearly():
 def test_the_network_lays_as_well_as_exact_grasps():
     cable, pattern = Cable(0.42, 1.6e-3, 0.03), bend()
     exact, learned = (
-        deploy(plan(cable, pattern, controller), floor=0.6, quasi_static=True, nodes=70, progress=False)
+        deploy(plan(cable, pattern, controller), friction=0.6, quasi_static=True, nodes=70, progress=False)
         for controller in ("exact", "network")
     )
     assert abs(learned.error - exact.error) < 5e-4

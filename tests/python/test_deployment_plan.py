@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import withe
 from withe.__main__ import main
-from withe.deployment import Cable, Pattern, Plan, Post, deploy, plan
+from withe.deployment import Cable, LayPlan, Pattern, Post, deploy, plan
 from withe.deployment.motion import lengthened
 
 CABLE = Cable.dlo(2)
@@ -130,12 +130,12 @@ def test_plans_are_pickled_and_copied(copied, motion):
     np.testing.assert_array_equal(again.feasibility(0.3).needed, motion.feasibility(0.3).needed)
 
 
-@pytest.mark.parametrize("options", [{}, {"controller": "intuitive"}, {"start": "held", "posts": (Post(0.1, -0.1),)}])
+@pytest.mark.parametrize("options", [{}, {"method": "intuitive"}, {"start": "held", "posts": (Post(0.1, -0.1),)}])
 def test_a_plan_is_read_back_as_it_was(options, tmp_path):
     cable = Cable(0.885, 1.6e-3, 0.032, natural_curvature=(0.3, -0.1))
     motion = plan(cable, Pattern(wave(), lead_in=0.02), **options)
     motion.save(tmp_path / "motion.json")
-    again = Plan.load(tmp_path / "motion.json")
+    again = LayPlan.load(tmp_path / "motion.json")
     assert vars(again).keys() == vars(motion).keys()
     for name in vars(motion).keys() - {"pattern"}:
         np.testing.assert_array_equal(getattr(again, name), getattr(motion, name))
@@ -143,7 +143,9 @@ def test_a_plan_is_read_back_as_it_was(options, tmp_path):
         np.testing.assert_array_equal(value, getattr(again.pattern, name))
     assert str(again.feasibility(0.1)) == str(motion.feasibility(0.1))
     if not options:
-        laid = [deploy(each, floor=0.4, nodes=40, quasi_static=True, progress=False).laid for each in (again, motion)]
+        laid = [
+            deploy(each, friction=0.4, nodes=40, quasi_static=True, progress=False).laid for each in (again, motion)
+        ]
         np.testing.assert_array_equal(*laid)
 
 
@@ -165,7 +167,7 @@ def test_a_plan_that_is_damaged_is_refused(damage, message, motion, tmp_path):
     assert damage(text) != text
     (tmp_path / "motion.json").write_text(damage(text))
     with pytest.raises(ValueError, match=message):
-        Plan.load(tmp_path / "motion.json")
+        LayPlan.load(tmp_path / "motion.json")
 
 
 def test_the_command_line_plans_and_says_what_holds(tmp_path, capsys):
@@ -216,7 +218,7 @@ def test_a_table_of_points_is_in_the_unit_that_its_header_says(header, size, tmp
     (tmp_path / "points.csv").write_text(header + "\n" + "\n".join(f"{x},{y}" for x, y in (wave() / size).tolist()))
     out = ["--dlo", "2", "--out", str(tmp_path), "--no-picture"]
     assert main(["deploy", str(tmp_path / "points.csv"), *out]) == 0
-    found = Plan.load(tmp_path / "points_plan.json").pattern
+    found = LayPlan.load(tmp_path / "points_plan.json").pattern
     np.testing.assert_allclose(found.raw, wave(), atol=1e-12)
 
 
@@ -231,7 +233,7 @@ def test_the_command_line_warns_and_refuses_in_one_line(tmp_path, capsys):
     np.savetxt(source, wave(), delimiter=",")
     assert main(["deploy", str(source), *out, "--friction", "0.05", "--nodes", "101"]) == 0
     assert capsys.readouterr().err.startswith("withe: the cable slips: ")
-    assert len(Plan.load(tmp_path / "wave_plan.json").pattern.points) == 101
+    assert len(LayPlan.load(tmp_path / "wave_plan.json").pattern.points) == 101
     source.write_text("x [km],y [km]\n0,0\n1,1\n")
     assert main(["deploy", str(source), *out]) == 2
     assert capsys.readouterr().err == "withe: a pattern must be in m, mm, cm, in, got a column 'x [km]'\n"
@@ -250,12 +252,12 @@ def loop(count=300):
         (lambda: plan(Cable(0.4, 1.6e-3, 0.032), Pattern(wave())), "the cable must be longer than the pattern, 0.5"),
         (lambda: plan(CABLE, Pattern(wave()), tail=0.5), "pattern and tail"),
         (lambda: plan(CABLE, Pattern(wave()), tail=-0.1), "tail must not be negative"),
-        (lambda: plan(CABLE, Pattern(wave()), "clever"), "controller must be"),
+        (lambda: plan(CABLE, Pattern(wave()), "clever"), "method must be"),
         (lambda: plan(CABLE, Pattern(wave()), speed=0.0), "speed must be positive"),
         (lambda: plan(CABLE, Pattern(wave()), friction=-5.0), "friction must be positive, got -5"),
         (lambda: plan(CABLE, Pattern(wave()), "intuitive", friction="a"), "friction must be a number, got 'a'"),
         (lambda: plan(CABLE, Pattern(wave()), "optimised"), "'optimised' needs friction"),
-        (lambda: plan(CABLE, Pattern(wave()), time_step=-1.0), "time_step must be positive"),
+        (lambda: plan(CABLE, Pattern(wave()), sampling_interval=-1.0), "sampling_interval must be positive"),
         (lambda: plan(CABLE, Pattern(loop())), "must not cross itself"),
         (lambda: plan(Cable.dlo(5), Pattern(wave(0.12))), "no friction is enough to keep this cable on this pattern"),
         (

@@ -66,8 +66,8 @@ def test_what_stands_in_the_way_is_refused(bend):
 def test_a_bend_without_friction_is_held_by_posts_alone(bend):
     posts = posts_along(bend, CABLE, np.linspace(0.2, 0.95, 5) * bend.length, gap=0.001)
     motion = plan(CABLE, bend, posts=posts)
-    free = deploy(plan(CABLE, bend), floor=0.02, quasi_static=True, nodes=70, progress=False)
-    held = deploy(motion, floor=0.02, quasi_static=True, nodes=70, progress=False)
+    free = deploy(plan(CABLE, bend), friction=0.02, quasi_static=True, nodes=70, progress=False)
+    held = deploy(motion, friction=0.02, quasi_static=True, nodes=70, progress=False)
     assert held.passed.all()
     assert held.nearest_error < 2e-3 < free.nearest_error
     assert motion.to_dict()["posts"][0] == {"x": posts[0].x, "y": posts[0].y, "radius": 0.004, "height": 0.008}

@@ -15,7 +15,9 @@ def line(y=0.0):
 @pytest.fixture(scope="module")
 def carried():
     """The free end is taken up and put down beside where it lay; time steps of 20 ms."""
-    return tie([line()], [[Move(0, 0.0, [(0.0, 0.03, 0.03), (0.0, 0.06, 0.001)])]], floor=0.8, nodes=40, time_step=0.02)
+    return tie(
+        [line()], [[Move(0, 0.0, [(0.0, 0.03, 0.03), (0.0, 0.06, 0.001)])]], friction=0.8, nodes=40, time_step=0.02
+    )
 
 
 def test_a_cable_is_laid_and_its_end_put_where_it_was_asked_for(carried):
@@ -35,7 +37,7 @@ def test_a_cable_is_laid_and_its_end_put_where_it_was_asked_for(carried):
 def test_a_gripper_that_reaches_to_where_the_cable_is_not_moves_nothing(carried):
     laid = carried.shapes[0][0]
     move = Move(0, 0.0, [(0.0, 0.03, 0.03)])
-    found = tie([line()], [[move]], floor=0.8, nodes=40, time_step=0.02, picks=[[laid[0] + (0.0, 0.02, 0.0)]])
+    found = tie([line()], [[move]], friction=0.8, nodes=40, time_step=0.02, picks=[[laid[0] + (0.0, 0.02, 0.0)]])
     assert found.missed == ((0, 0),)
     np.testing.assert_allclose(found.centrelines[0], laid, atol=1e-5)
 
@@ -43,7 +45,7 @@ def test_a_gripper_that_reaches_to_where_the_cable_is_not_moves_nothing(carried)
 def test_a_later_cable_is_laid_over_an_earlier_one():
     x = np.linspace(0.0, 0.1, 20)
     across = plan(CABLE, Pattern(np.stack([0.05 + 0 * x, x - 0.05], 1)), speed=0.1, tail=0.05)
-    found = tie([line(), across], [], floor=0.8, nodes=40, time_step=0.02)
+    found = tie([line(), across], [], friction=0.8, nodes=40, time_step=0.02)
     first, second = found.centrelines
     over = second[np.abs(second[:, 1]).argmin(), 2] - first[np.abs(first[:, 0] - 0.05).argmin(), 2]
     assert over == pytest.approx(2 * CABLE.radius, rel=0.2)
@@ -60,7 +62,7 @@ def test_a_later_cable_is_laid_over_an_earlier_one():
 )
 def test_bad_steps_are_named(plans, steps, message):
     with pytest.raises(ValueError, match=message):
-        tie([line()] * plans, steps, floor=0.5)
+        tie([line()] * plans, steps, friction=0.5)
 
 
 def test_what_is_no_list_of_plans_or_moves_is_named():
@@ -70,7 +72,7 @@ def test_what_is_no_list_of_plans_or_moves_is_named():
         ([line()], [[(0, 0.0, [(0, 0, 1)])]], "step 0 must hold withe.deployment.Move"),
     ):
         with pytest.raises(ValueError, match=message):
-            tie(plans, steps, floor=0.5)
+            tie(plans, steps, friction=0.5)
 
 
 def test_bad_moves_and_picks_are_named():
@@ -81,6 +83,6 @@ def test_bad_moves_and_picks_are_named():
     with pytest.raises(ValueError, match="at of a move must not be negative"):
         Move(0, -0.1, [(0, 0, 1)])
     with pytest.raises(ValueError, match="picks must be one for each move"):
-        tie([line()], [[Move(0, 0.0, [(0, 0, 1)])]], floor=0.5, picks=[[]])
+        tie([line()], [[Move(0, 0.0, [(0, 0, 1)])]], friction=0.5, picks=[[]])
     with pytest.raises(ValueError, match="floor must be positive"):
-        tie([line()], [[Move(0, 0.0, [(0, 0, 1)])]], floor=0.0)
+        tie([line()], [[Move(0, 0.0, [(0, 0, 1)])]], friction=0.0)

@@ -36,7 +36,7 @@ def arc():
 
 @pytest.fixture(scope="module")
 def laid(arc):
-    return deploy(plan(CABLE, arc, speed=0.04), floor=0.6, nodes=NODES, progress=False)
+    return deploy(plan(CABLE, arc, speed=0.04), friction=0.6, nodes=NODES, progress=False)
 
 
 def test_a_bend_is_laid_within_a_millimetre(laid):
@@ -79,7 +79,7 @@ def test_a_drawing_is_photographed_traced_laid_and_read_back():
     image, corner = photographed(drawn, 4e-3)
     pattern = Pattern(image=image, scale=PIXEL)  # from the left upper corner; it may begin at either end
     motion = plan(CABLE, pattern)
-    found = deploy(motion, floor=0.6, nodes=NODES, quasi_static=True, progress=False)
+    found = deploy(motion, friction=0.6, nodes=NODES, quasi_static=True, progress=False)
     s = np.linspace(0.0, motion.cable.length, NODES)
     away = distances(drawn, corner + read_back(found.laid[s <= pattern.length + 5e-3]))
     assert away.mean() < 2e-3
@@ -87,14 +87,14 @@ def test_a_drawing_is_photographed_traced_laid_and_read_back():
 
 
 def test_the_intuitive_way_is_worse(arc, laid):
-    guessed = deploy(plan(CABLE, arc, "intuitive", speed=0.04), floor=0.6, nodes=NODES, progress=False)
+    guessed = deploy(plan(CABLE, arc, "intuitive", speed=0.04), friction=0.6, nodes=NODES, progress=False)
     assert guessed.error > 4 * laid.error
 
 
 def test_noise_is_drawn_from_the_seed(arc):
     motion = plan(CABLE, Pattern(bend(0.0)), speed=0.06)
     first, again, other = (
-        deploy(motion, floor=0.5, noise=1.0, seed=seed, nodes=30, progress=False) for seed in (1, 1, 2)
+        deploy(motion, friction=0.5, noise=1.0, seed=seed, nodes=30, progress=False) for seed in (1, 1, 2)
     )
     np.testing.assert_array_equal(first.laid, again.laid)
     assert np.abs(first.laid - other.laid).max() > 1e-4
@@ -105,7 +105,7 @@ def test_the_cable_of_a_trial_is_that_which_is_laid(monkeypatch):
     monkeypatch.setattr(deploying, "lay", lambda setup, plan, progress: seen.append(setup) or ([], [], None))
     monkeypatch.setattr(deploying, "_compared", lambda *given: None)
     for seed in (3, 4):
-        deploy(motion, floor=0.5, noise=0.7, seed=seed, nodes=30, progress=False)
+        deploy(motion, friction=0.5, noise=0.7, seed=seed, nodes=30, progress=False)
         true = trial_cable(CABLE, seed, 0.7)
         assert seen[-1].cable.gravito_bending_length == true.gravito_bending_length
         assert abs(np.log(true.gravito_bending_length / CABLE.gravito_bending_length)) < 0.15
@@ -129,14 +129,14 @@ def test_the_world_imports_no_planner():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"floor": -0.1}, "floor must be positive"),
-        ({"floor": 0.0}, "floor must be positive"),
-        ({"floor": 0.4, "noise": -1.0}, "noise must not be negative"),
-        ({"floor": 0.4, "nodes": 5}, "nodes must lie in"),
-        ({"floor": 0.4, "time_step": 0.0}, "time_step must be positive"),
-        ({"floor": 0.4, "seed": -1}, "seed"),
-        ({"floor": 0.4, "cable": Cable(0.1, 1e-3, 0.02)}, "must be as long as planned"),
-        ({"floor": 0.4, "cable": 0.4}, "cable must be a withe.deployment.Cable, got 0.4"),
+        ({"friction": -0.1}, "friction must be positive"),
+        ({"friction": 0.0}, "friction must be positive"),
+        ({"friction": 0.4, "noise": -1.0}, "noise must not be negative"),
+        ({"friction": 0.4, "nodes": 5}, "nodes must lie in"),
+        ({"friction": 0.4, "time_step": 0.0}, "time_step must be positive"),
+        ({"friction": 0.4, "seed": -1}, "seed"),
+        ({"friction": 0.4, "cable": Cable(0.1, 1e-3, 0.02)}, "must be as long as planned"),
+        ({"friction": 0.4, "cable": 0.4}, "cable must be a withe.deployment.Cable, got 0.4"),
     ],
 )
 def test_bad_input_says_what_is_wrong(arc, arguments, message):
@@ -146,8 +146,8 @@ def test_bad_input_says_what_is_wrong(arc, arguments, message):
 
 def test_quasi_static_laying_is_what_slow_laying_tends_to(arc):
     motion = plan(CABLE, arc, speed=0.01)
-    slow = deploy(motion, floor=0.6, nodes=NODES, progress=False)
-    still = deploy(motion, floor=0.6, nodes=NODES, quasi_static=True, progress=False)
+    slow = deploy(motion, friction=0.6, nodes=NODES, progress=False)
+    still = deploy(motion, friction=0.6, nodes=NODES, quasi_static=True, progress=False)
     assert np.linalg.norm(slow.laid - still.laid, axis=1).max() < 4e-4
     assert not np.any(still.record.energy().kinetic)
 
@@ -155,7 +155,7 @@ def test_quasi_static_laying_is_what_slow_laying_tends_to(arc):
 def test_bends_of_a_thick_cable_are_laid_where_they_should_lie():
     """Had friction across acted where the cable lifts off, and not behind it, 0.97 mm."""
     sine = np.genfromtxt(PATTERNS / "sine.csv", delimiter=",", skip_header=1)
-    found = deploy(plan(Cable.dlo(1), Pattern(sine)), floor=0.4, quasi_static=True, progress=False)
+    found = deploy(plan(Cable.dlo(1), Pattern(sine)), friction=0.4, quasi_static=True, progress=False)
     assert found.error < 0.7e-3
 
 
@@ -165,7 +165,7 @@ def test_a_push_holds_on_floors_on_which_a_bend_slips_without():
     for controller in ("exact", "least_friction"):
         motion = plan(Cable.dlo(2), pattern, controller)
         assert (motion.feasibility(0.25).lift_off[3:-3].max() < 0.25) == (controller == "least_friction")
-        slips[controller] = deploy(motion, floor=0.25, nodes=200, quasi_static=True, progress=False).slipped.max()
+        slips[controller] = deploy(motion, friction=0.25, nodes=200, quasi_static=True, progress=False).slipped.max()
     assert slips["exact"] > 1e-3
     assert slips["least_friction"] < 4e-4
 
@@ -175,7 +175,7 @@ def test_equilibria_follow_a_cable_of_any_mesh_that_slips_along_its_length(nodes
     """The border of what slips goes on by a node an iteration: the finer the mesh, the more of them it takes."""
     sine = np.genfromtxt(PATTERNS / "sine.csv", delimiter=",", skip_header=1)
     motion = plan(Cable.dlo(2), Pattern(sine))
-    found = deploy(motion, floor=0.2, nodes=nodes, quasi_static=True, progress=False)
+    found = deploy(motion, friction=0.2, nodes=nodes, quasi_static=True, progress=False)
     assert found.slipped.max() > 5e-3
     assert found.error == pytest.approx(4.07e-3, abs=1e-4)  # in time, at 6 mm/s, 80 nodes: 4.12 mm
 
@@ -185,17 +185,17 @@ def test_equilibria_are_found_where_the_border_of_slip_has_many_nodes_to_go():
     letter = np.genfromtxt(PATTERNS / "letterL.csv", delimiter=",", skip_header=1)
     motion = plan(Cable.dlo(3), Pattern(letter))
     coarse, fine = (
-        deploy(motion, floor=0.2, nodes=nodes, quasi_static=True, progress=False).error for nodes in (100, 200)
+        deploy(motion, friction=0.2, nodes=nodes, quasi_static=True, progress=False).error for nodes in (100, 200)
     )
     assert fine == pytest.approx(coarse, abs=5e-5)
 
 
 def test_a_cable_put_on_its_pattern_moves_only_where_friction_fails(arc):
     motion = plan(CABLE, arc)
-    rough, smooth = (place(motion, floor=friction, nodes=NODES, progress=False) for friction in (0.6, 0.02))
+    rough, smooth = (place(motion, friction=friction, nodes=NODES, progress=False) for friction in (0.6, 0.02))
     assert rough.error < 2e-4
     assert smooth.error > 5 * rough.error
-    still, moving = (place(motion, floor=0.1, nodes=NODES, quasi_static=q, progress=False) for q in (True, False))
+    still, moving = (place(motion, friction=0.1, nodes=NODES, quasi_static=q, progress=False) for q in (True, False))
     assert np.abs(still.laid - moving.laid).max() < 1e-4
 
 
@@ -207,7 +207,7 @@ def test_optimising_makes_up_for_what_slips():
     )
     assert exact.needed_friction[5:].max() > 0.35
     slipped, laid, moving = (
-        deploy(motion, floor=0.25, quasi_static=still, nodes=100, progress=False)
+        deploy(motion, friction=0.25, quasi_static=still, nodes=100, progress=False)
         for motion, still in ((exact, True), (better, True), (better, False))
     )
     assert slipped.error > 1e-3
@@ -218,7 +218,7 @@ def test_optimising_makes_up_for_what_slips():
 def test_a_quick_plan_does_not_lose_the_free_end_where_it_touches_down():
     """The jaw swings the cable no faster than it may, however fast it lays."""
     line = Pattern(np.stack([np.linspace(0.0, 0.25, 101), np.zeros(101)], 1))
-    found = deploy(plan(CABLE, line, speed=0.15), floor=0.6, nodes=NODES, progress=False)
+    found = deploy(plan(CABLE, line, speed=0.15), friction=0.6, nodes=NODES, progress=False)
     assert found.error < 1e-3
 
 
@@ -237,7 +237,7 @@ def test_a_jaw_that_is_a_millimetre_low_yields_to_the_floor(arc):
 
 def test_a_held_end_stays_where_the_pattern_begins(arc):
     motion = plan(CABLE, arc, start="held")
-    found = deploy(motion, floor=0.6, nodes=NODES, quasi_static=True, progress=False)
+    found = deploy(motion, friction=0.6, nodes=NODES, quasi_static=True, progress=False)
     assert np.linalg.norm(found.laid[0, :2] - arc.points[0]) < 3e-4
     assert found.error < 1e-3
     ends = found.record.positions("cable")[:, 0]
@@ -253,7 +253,7 @@ def test_a_cable_as_thick_as_a_hose_is_laid_as_exactly_for_its_size():
         cable = Cable(0.36 * scale, 1.6e-3 * scale, 0.03 * scale)
         pattern = Pattern(scale * bend(1.0), smoothing=3e-4 * scale)
         motion = plan(cable, pattern, speed=0.04 * np.sqrt(scale), progress=False)
-        found = deploy(motion, floor=0.6, nodes=NODES, quasi_static=True, progress=False)
+        found = deploy(motion, friction=0.6, nodes=NODES, quasi_static=True, progress=False)
         errors.append(found.error / scale)
     print("error over size [mm]:", 1e3 * np.array(errors))
     assert errors[1] == pytest.approx(errors[0], rel=0.1)

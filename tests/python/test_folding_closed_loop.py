@@ -120,7 +120,7 @@ def test_a_hidden_edge_is_said_and_not_guessed(half):
 
 def test_nonsense_is_refused(half):
     sheet = SimulatedSheet(A4, **COARSE)
-    with pytest.raises(ValueError, match="plan must be a Plan"):
+    with pytest.raises(ValueError, match="plan must be a FoldPlan"):
         fold("half", sheet)
     with pytest.raises(ValueError, match="sheet must be a SimulatedSheet or a WideSheet"):
         fold(half, A4)

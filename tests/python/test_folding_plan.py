@@ -10,7 +10,7 @@ import pytest
 import withe
 from planned_folds import PAPERS, freely, planned
 from withe.__main__ import main
-from withe.folding import Jaw, Paper, Plan, elastica, plan, replan
+from withe.folding import FoldPlan, Jaw, Paper, elastica, plan, replan
 from withe.folding.grid import make_grid
 from withe.folding.sheets import at_poses, forces_of
 
@@ -320,7 +320,7 @@ def test_the_command_says_what_a_target_may_be(capsys):
 def test_the_command_takes_any_size_of_paper_and_warns_in_one_line(tmp_path, capsys):
     sizes = ["--length", "0.28", "--width", "0.1", "--thickness", "2e-4", "--lgb", "0.05", "--friction", "0.2"]
     assert main(["fold", *sizes, "--method", "slip", "--out", str(tmp_path / "fold.json")]) == 0
-    folded = Plan.load(tmp_path / "fold.json")
+    folded = FoldPlan.load(tmp_path / "fold.json")
     assert folded.paper == Paper(0.28, 0.1, 0.05, friction=0.2, thickness=2e-4)
     said = capsys.readouterr().err
     assert said.startswith("withe: the sheet slides: the fold needs a friction coefficient of 0.")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from planned_folds import freely, planned
-from withe.folding import Jaw, Paper, Plan, plan, replan
+from withe.folding import FoldPlan, Jaw, Paper, plan, replan
 
 
 def test_saved_tables_hold_the_plan(tmp_path):
@@ -65,7 +65,7 @@ def saved_plans():
 
 def test_a_plan_is_read_back_as_it_was(tmp_path):
     for number, folded in enumerate(saved_plans()):
-        again = Plan.load(folded.save(tmp_path / f"{number}.json"))
+        again = FoldPlan.load(folded.save(tmp_path / f"{number}.json"))
         assert same(again, folded)
         np.testing.assert_array_equal(again.slide, folded.slide)
         assert repr(again) == repr(folded)
@@ -99,9 +99,9 @@ def test_a_plan_that_is_damaged_is_refused(damage, message, tmp_path):
     assert damage(text) != text
     file.write_text(damage(text))
     with pytest.raises(ValueError, match=message):
-        Plan.load(file)
+        FoldPlan.load(file)
     with pytest.raises(OSError, match="nowhere"):
-        Plan.load(tmp_path / "nowhere.json")
+        FoldPlan.load(tmp_path / "nowhere.json")
 
 
 def without(text, name):

@@ -141,7 +141,7 @@ def test_a_plunge_that_cannot_be_is_refused_with_the_friction_that_is_missing(wa
 
 
 def test_nonsense_is_refused(ways):
-    with pytest.raises(ValueError, match="plan must be a Plan"):
+    with pytest.raises(ValueError, match="plan must be a FoldPlan"):
         plunge("down")
     with pytest.raises(ValueError, match="plan must end slowly, but already plunges at"):
         plunge(ways[2])

@@ -24,7 +24,7 @@ TRIALS = [
 
 @pytest.fixture(scope="module")
 def alone():
-    return {outcome.trial.name: outcome for outcome in run_trials(TRIALS, processes=1, progress=False)}
+    return {outcome.trial.name: outcome for outcome in run_trials(TRIALS, workers=1, progress=False)}
 
 
 def figures(outcome):
@@ -52,7 +52,7 @@ def test_trials_of_one_sheet_and_one_plan_are_carried_out_by_one_process():
 
 
 def test_processes_fold_as_one_does(alone):
-    for outcome in run_trials(TRIALS, processes=2, progress=False):
+    for outcome in run_trials(TRIALS, workers=2, progress=False):
         np.testing.assert_array_equal(figures(outcome), figures(alone[outcome.trial.name]))
         assert outcome.failure == alone[outcome.trial.name].failure
 
@@ -81,7 +81,7 @@ def test_ctrl_c_ends_processes_at_once_and_keeps_what_has_come(tmp_path):
             slow = Trial(Paper.a4(), sheet={"edges": 400, "time_step": 1e-4})
             kept = []
             try:
-                for outcome in run_trials([fails, slow, slow, slow], processes=2, progress=False):
+                for outcome in run_trials([fails, slow, slow, slow], workers=2, progress=False):
                     kept.append(outcome)
                     os.kill(os.getpid(), signal.SIGINT)
             except KeyboardInterrupt:
@@ -101,9 +101,9 @@ def test_ctrl_c_ends_processes_at_once_and_keeps_what_has_come(tmp_path):
 def test_bad_input_is_named():
     with pytest.raises(ValueError, match="trials must be Trials"):
         run_trials(["a4"])
-    with pytest.raises(ValueError, match="processes and client must not be given together"):
-        run_trials(TRIALS, processes=2, client=object())
-    with pytest.raises(ValueError, match="processes must lie in"):
-        run_trials(TRIALS, processes=0)
+    with pytest.raises(ValueError, match="workers and client must not be given together"):
+        run_trials(TRIALS, workers=2, client=object())
+    with pytest.raises(ValueError, match="workers must lie in"):
+        run_trials(TRIALS, workers=0)
     with pytest.raises(ValueError, match=r"client must be a dask\.distributed\.Client"):
         run_trials(TRIALS, client="here")

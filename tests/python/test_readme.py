@@ -106,8 +106,11 @@ def test_the_cable_of_the_readme_is_laid(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names = {}
     for block in blocks("deployment.plan"):
-        assert "floor=0.4)" in block
-        exec(compile(block.replace("floor=0.4)", "floor=0.4, nodes=50, progress=False)"), str(README), "exec"), names)
+        assert "friction=0.4)" in block
+        exec(
+            compile(block.replace("friction=0.4)", "friction=0.4, nodes=50, progress=False)"), str(README), "exec"),
+            names,
+        )
     assert (tmp_path / "motion.csv").stat().st_size > 1000
     assert names["found"].error < 2e-3
 

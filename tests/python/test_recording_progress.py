@@ -31,10 +31,10 @@ def test_nothing_is_written_when_stderr_is_not_a_terminal(monkeypatch, enabled):
     assert stream.getvalue() == ""
 
 
-def test_plain_text_is_drawn_when_forced(monkeypatch, without_rich):
-    stream = io.StringIO()
+def test_plain_text_counts_to_the_end_of_a_line(monkeypatch, without_rich):
+    stream = Terminal()
     monkeypatch.setattr(sys, "stderr", stream)
-    with progress(2.0, "run", "always") as bar:
+    with progress(2.0, "run") as bar:
         bar.update(1.0)
         assert "50 %" in stream.getvalue()
         bar.update(2.0)
@@ -88,22 +88,22 @@ def test_a_task_that_ends_early_counts_as_its_whole_share():
 
 
 def test_a_bar_inside_a_bar_is_silent(monkeypatch, without_rich):
-    stream = io.StringIO()
+    stream = Terminal()
     monkeypatch.setattr(sys, "stderr", stream)
-    with progress(1.0, "outer", "always"), progress(1.0, "inner", "always") as bar:
+    with progress(1.0, "outer"), progress(1.0, "inner") as bar:
         bar.update(1.0)
     assert "inner" not in stream.getvalue()
-    with progress(1.0, "after", "always"):
+    with progress(1.0, "after"):
         pass
     assert "after" in stream.getvalue()
 
 
 def test_an_exception_closes_the_bar(monkeypatch, without_rich):
-    stream = io.StringIO()
+    stream = Terminal()
     monkeypatch.setattr(sys, "stderr", stream)
 
     def interrupted():
-        with progress(1.0, "run", "always") as bar:
+        with progress(1.0, "run") as bar:
             bar.update(0.3)
             raise KeyboardInterrupt
 

@@ -141,9 +141,11 @@ def test_there_is_no_record_before_a_run():
         _ = simulation.record
 
 
-def test_progress_counts_up_to_the_duration(capsys):
+def test_progress_counts_up_to_the_duration(capsys, monkeypatch):
     _, _, simulation = cantilever(nodes=4)
-    simulation.run(0.5, progress="always")
+    with monkeypatch.context() as on_a_terminal:
+        on_a_terminal.setattr(sys.stderr, "isatty", lambda: True)
+        simulation.run(0.5, progress=True)
     assert "0.5" in capsys.readouterr().err
     simulation.run(0.5)
     assert capsys.readouterr().err == ""
@@ -290,9 +292,10 @@ def test_run_many_stops_on_ctrl_c():
     slow.step()
 
 
-def test_run_many_shows_one_bar(capsys):
+def test_run_many_shows_one_bar(capsys, monkeypatch):
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     simulations = [tripod()[2] for _ in range(3)]
-    withe.run_many(simulations, 0.2, progress="always")
+    withe.run_many(simulations, 0.2, progress=True)
     shown = capsys.readouterr().err
     assert "0.6" in shown
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, Literal, SupportsIndex, SupportsInt, overload
+from typing import Any, SupportsIndex, SupportsInt, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -175,7 +175,7 @@ class Batch(Setting, Reading):
         duration: float,
         record_every: float | None = None,
         *,
-        progress: bool | Literal["always"] = True,
+        progress: bool = True,
         before_step: Callable[[Batch], object] | None = None,
         until: Callable[[Batch], npt.ArrayLike] | None = None,
         record: Mapping[str, Callable[[Batch], npt.ArrayLike]] | None = None,
@@ -191,7 +191,7 @@ class Batch(Setting, Reading):
             Duration of the run, a whole number of time steps.
         record_every : float [s]
             Interval of frames, a whole number of time steps. By default a hundredth of the duration, rounded up.
-        progress : bool or "always"
+        progress : bool
             True to show a progress bar on a terminal and in a notebook.
         before_step : callable
             Called with the batch once before every time step.

@@ -1,7 +1,7 @@
 """A progress bar on stderr: drawn by rich where it is installed, as plain text where it is not.
 
-Nothing is drawn when stderr is not a terminal (a log file stays readable), unless it is forced. One bar
-may serve many threads: each takes a task, a share of the bar's total.
+Nothing is drawn when stderr is not a terminal, so that a log file stays readable. One bar may serve many threads: each
+takes a task, a share of the bar's total.
 """
 
 from __future__ import annotations
@@ -11,7 +11,10 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any, Literal, TextIO
+from typing import Any, TextIO
+
+from withe.common import validation
+from withe.common.deprecation import old_word
 
 __all__ = ["Progress", "Task", "progress"]
 
@@ -165,7 +168,7 @@ class _RichProgress(Progress):
 def progress(
     total: float,
     description: str = "",
-    enabled: bool | Literal["always"] = True,
+    enabled: bool = True,
     *,
     unit: str = "s",
 ) -> Iterator[Progress]:
@@ -177,9 +180,8 @@ def progress(
         What counts as all of it, such as the duration of a run.
     description : str
         Text before the bar.
-    enabled : bool or "always"
-        True draws on a terminal or in a notebook, and nothing elsewhere; "always" draws wherever
-        stderr goes; False draws nothing.
+    enabled : bool
+        True draws on a terminal or in a notebook, and nothing elsewhere. False draws nothing.
     unit : str
         Unit of the total.
 
@@ -192,7 +194,7 @@ def progress(
     Raises
     ------
     ValueError
-        A negative total, or `enabled` that is neither a boolean nor "always".
+        A negative total, or `enabled` that is not a boolean.
 
     Examples
     --------
@@ -201,11 +203,9 @@ def progress(
     ...     bar.fraction
     0.25
     """
-    if enabled not in (True, False, "always"):
-        raise ValueError(f'progress must be True, False or "always", got {enabled!r}')
-    alone = bool(enabled) and _drawn.acquire(blocking=False)
+    force = _draws_always(enabled)
+    alone = (force or validation.truth(enabled, "progress")) and _drawn.acquire(blocking=False)
     try:
-        force = enabled == "always"
         bar = _drawing(total, description, unit, force) if alone else Progress(total, description, unit)
         bar._open()
         try:
@@ -215,6 +215,14 @@ def progress(
     finally:
         if alone:
             _drawn.release()
+
+
+def _draws_always(enabled: object) -> bool:
+    """True if the deprecated value "always" was given, which draws wherever stderr goes."""
+    if enabled != "always":
+        return False
+    old_word('progress="always"', "progress=True, which draws on a terminal and in a notebook")
+    return True
 
 
 def _drawing(total: float, description: str, unit: str, force: bool) -> Progress:

@@ -9,6 +9,9 @@ length, unless they belong to a particular cable: then in m and N.
 [ 2.505 -0.784  3.444] [0.    0.2   1.493]
 """
 
+from typing import TYPE_CHECKING
+
+from withe.common.deprecation import old_names
 from withe.deployment.cable import Cable, MeasuredCable, measure
 from withe.deployment.deploying import Deployment, deploy, hang, place, trial_cable
 from withe.deployment.feasibility import Feasibility, Slip
@@ -19,7 +22,7 @@ from withe.deployment.motion import Phase
 from withe.deployment.network_training import train
 from withe.deployment.pattern import Pattern
 from withe.deployment.placing import posts_along
-from withe.deployment.planning import Plan, plan
+from withe.deployment.planning import LayPlan, plan
 from withe.deployment.posts import Post
 from withe.deployment.straight import StraightLine, StraightPose
 from withe.deployment.tying import Move, Tying, tie
@@ -30,12 +33,12 @@ __all__ = [
     "Feasibility",
     "Grasp",
     "GraspNetwork",
+    "LayPlan",
     "MeasuredCable",
     "MeasuredCurvature",
     "Move",
     "Pattern",
     "Phase",
-    "Plan",
     "Post",
     "Slip",
     "StraightLine",
@@ -53,3 +56,6 @@ __all__ = [
     "train",
     "trial_cable",
 ]
+
+if not TYPE_CHECKING:  # an old name stays an error to type checkers
+    __getattr__ = old_names(__name__, Plan=LayPlan)

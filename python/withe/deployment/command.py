@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from withe.deployment.cable import Cable
 from withe.deployment.pattern import Pattern
-from withe.deployment.planning import PlanController, plan
+from withe.deployment.planning import PlanMethod, plan
 
 __all__ = ["add_parser", "run"]
 
@@ -42,7 +42,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument("--radius", type=float, help="of the cable [m]")
     parser.add_argument("--lgb", type=float, help="its gravito-bending length (EI / 2w)^(1/3) [m]")
     parser.add_argument("--friction", type=float, default=0.4, help="coefficient with the floor (default: %(default)s)")
-    parser.add_argument("--controller", choices=get_args(PlanController), default="exact")
+    parser.add_argument("--method", "--controller", choices=get_args(PlanMethod), default="exact")
     parser.add_argument("--speed", type=float, default=0.025, help="along the pattern [m/s] (default: %(default)s)")
     parser.add_argument(
         "--smoothing", type=float, default=1e-3, help="farthest from what is given [m] (default: %(default)s)"
@@ -63,7 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
         pattern = Pattern(_points(arguments.pattern), **shape)
     else:
         pattern = Pattern(image=arguments.pattern, scale=arguments.scale, **shape)
-    motion = plan(cable, pattern, arguments.controller, friction=arguments.friction, speed=arguments.speed)
+    motion = plan(cable, pattern, arguments.method, friction=arguments.friction, speed=arguments.speed)
     arguments.out.mkdir(parents=True, exist_ok=True)
     stem = arguments.out / f"{arguments.pattern.stem}_plan"
     written = [stem.with_suffix(".csv"), stem.with_suffix(".json")]
@@ -73,7 +73,7 @@ def run(arguments: argparse.Namespace) -> int:
         written.append(stem.with_suffix(".png"))
         motion.plot(arguments.friction).savefig(written[-1], dpi=120)
     lines = [repr(motion), f"may go at up to {1e3 * motion.fastest:.0f} mm/s"]
-    if arguments.controller != "intuitive":
+    if arguments.method != "intuitive":
         lines.append(str(motion.feasibility(arguments.friction)))
     sys.stdout.write("\n".join([*lines, *map(str, written)]) + "\n")
     return 0

@@ -8,12 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.deprecation import renamed
 from withe.common.keywords import keyword_hints
 from withe.deployment.cable import Cable
 from withe.deployment.motion import lengthened
 from withe.deployment.pattern import distances
 from withe.deployment.placing import passed
-from withe.deployment.planning import Plan
+from withe.deployment.planning import LayPlan
 from withe.deployment.world import ROLLING_FRICTION, Setup, lay
 from withe.deployment.world import hang as hang_in_world
 from withe.deployment.world import place as place_in_world
@@ -64,12 +65,12 @@ class Deployment:
     passed: npt.NDArray[np.bool_]
 
 
-@keyword_hints
+@renamed(floor="friction")
 def deploy(
-    plan: Plan,
+    plan: LayPlan,
     cable: Cable | None = None,
     *,
-    floor: float,
+    friction: float,
     rolling_friction: float = ROLLING_FRICTION,
     seed: int = 0,
     noise: float = 0.0,
@@ -85,10 +86,10 @@ def deploy(
 
     Parameters
     ----------
-    plan : Plan
+    plan : LayPlan
     cable : Cable
         True cable, if it differs from the planner's. The jaw holds it at the length of the plan.
-    floor : float
+    friction : float
         Coefficient of friction between cable and floor. Without any, nothing stays where it is laid.
     rolling_friction : float
         Rolling friction of the floor, see `Scene.add_floor`. Without it, a straight cable that is released under
@@ -129,14 +130,14 @@ def deploy(
     >>> import withe
     >>> line = withe.deployment.Pattern(np.stack([np.linspace(0.0, 0.1, 50), np.zeros(50)], 1))
     >>> motion = withe.deployment.plan(withe.deployment.Cable(0.3, 1.6e-3, 0.02), line, speed=0.06)
-    >>> found = withe.deployment.deploy(motion, floor=0.5, nodes=30, progress=False)
+    >>> found = withe.deployment.deploy(motion, friction=0.5, nodes=30, progress=False)
     >>> print(found.error < 1e-3)
     True
     """
     _require_plan(plan)
     if cable is not None and not isinstance(cable, Cable):
         raise ValueError(f"cable must be a withe.deployment.Cable, got {cable!r:.80}")
-    friction = validation.positive(floor, "floor")
+    friction = validation.positive(friction, "friction")
     noise = validation.non_negative(noise, "noise")
     nodes = validation.integer(nodes, "nodes", 20, 2000)
     true = plan.cable if cable is None else cable
@@ -158,11 +159,11 @@ def deploy(
     return _compared(plan, setup.arc_length, held, laid, record)
 
 
-@keyword_hints
+@renamed(floor="friction")
 def place(
-    plan: Plan,
+    plan: LayPlan,
     *,
-    floor: float,
+    friction: float,
     rolling_friction: float = ROLLING_FRICTION,
     nodes: int = 200,
     time_step: float | None = None,
@@ -177,9 +178,9 @@ def place(
 
     Parameters
     ----------
-    plan : Plan
+    plan : LayPlan
         Of which cable, pattern and tail are used.
-    floor, rolling_friction, nodes, time_step, quasi_static, progress
+    friction, rolling_friction, nodes, time_step, quasi_static, progress
         See `deploy`.
 
     Returns
@@ -199,14 +200,14 @@ def place(
     >>> angle = np.linspace(0.0, 1.2, 100)
     >>> arc = withe.deployment.Pattern(0.2 * np.stack([np.sin(angle), 1 - np.cos(angle)], 1))
     >>> motion = withe.deployment.plan(withe.deployment.Cable.dlo(2), arc)
-    >>> found = withe.deployment.place(motion, floor=0.4, nodes=60, progress=False)
+    >>> found = withe.deployment.place(motion, friction=0.4, nodes=60, progress=False)
     >>> print(found.error < 2e-4)
     True
     """
     _require_plan(plan)
     setup = Setup(
         cable=plan.cable,
-        friction=validation.positive(floor, "floor"),
+        friction=validation.positive(friction, "friction"),
         rolling_friction=validation.non_negative(rolling_friction, "rolling_friction"),
         nodes=validation.integer(nodes, "nodes", 20, 2000),
         time_step=_time_step(time_step, quasi_static),
@@ -279,8 +280,8 @@ def hang(cable: Cable, *, nodes: int = 200) -> FloatArray:
 
 
 def _require_plan(plan: object) -> None:
-    if not isinstance(plan, Plan):
-        raise ValueError(f"plan must be a withe.deployment.Plan, got {plan!r:.80}")
+    if not isinstance(plan, LayPlan):
+        raise ValueError(f"plan must be a withe.deployment.LayPlan, got {plan!r:.80}")
 
 
 def _drawn(seed: int, noise: float) -> FloatArray:
@@ -299,7 +300,7 @@ def _cable_of(cable: Cable, drawn: FloatArray) -> Cable:
 
 
 def drawn_setup(
-    plan: Plan,
+    plan: LayPlan,
     cable: Cable,
     friction: float,
     drawn: FloatArray,
@@ -330,7 +331,7 @@ def _time_step(given: float | None, quasi_static: bool) -> float:
     return validation.positive(given, "time_step")
 
 
-def _compared(plan: Plan, s: FloatArray, held: FloatArray, laid: FloatArray, record: Record) -> Deployment:
+def _compared(plan: LayPlan, s: FloatArray, held: FloatArray, laid: FloatArray, record: Record) -> Deployment:
     pattern = plan.pattern
     on = s <= pattern.length
     places = np.stack([np.interp(s[on], pattern.arc_length, pattern.points[:, i]) for i in range(2)], 1)
@@ -351,7 +352,7 @@ def _compared(plan: Plan, s: FloatArray, held: FloatArray, laid: FloatArray, rec
     )
 
 
-def _slipped(plan: Plan, record: Record, laid: FloatArray, s: FloatArray) -> FloatArray:
+def _slipped(plan: LayPlan, record: Record, laid: FloatArray, s: FloatArray) -> FloatArray:
     """From where each point is in the first frame from which on it lies on the floor, and behind the lift-off point."""
     frames = record.positions("cable")
     lift_off = np.interp(record.times, plan.times, plan.laid)

@@ -19,7 +19,7 @@ _MOST_DRAWN = 3.3  # and by lines: a little above what plans bear of a floor
 
 
 def draw_plan(pattern: Pattern, jaw: FloatArray, found: Feasibility, title: str) -> Any:
-    """Draw `Plan.plot`; `jaw` are the positions of the jaw, shape (n, 3) [m]."""
+    """Draw `LayPlan.plot`; `jaw` are the positions of the jaw, shape (n, 3) [m]."""
     pyplot = require("matplotlib.pyplot", "view")
     figure, (floor, needs) = pyplot.subplots(1, 2, figsize=(11.0, 5.2), layout="constrained")
     _draw_floor(figure, floor, pattern, jaw, found)

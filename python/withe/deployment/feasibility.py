@@ -24,10 +24,10 @@ from withe.deployment.grasping import (
 from withe.deployment.smoothing import least_tension
 from withe.errors import ConvergenceError
 
-__all__ = ["Controller", "Feasibility", "Slip", "examine"]
+__all__ = ["Feasibility", "Method", "Slip", "examine"]
 
 FloatArray = npt.NDArray[np.float64]
-Controller = Literal["exact", "least_friction"]
+Method = Literal["exact", "least_friction"]
 _PER_CENT = 10.0  # what is more has been given so
 _BEND_STIFFNESS = 2.0  # EI in units of w Lgb^2
 _NEIGHBOURS = 4.0  # radii along a cable within which its parts are no obstacle to each other, times pi
@@ -149,15 +149,15 @@ class Curve(Laid, Protocol):
 
 
 def examine(
-    pattern: Curve, cable: Cable, friction: float, controller: Controller, force: FloatArray | None = None
+    pattern: Curve, cable: Cable, friction: float, method: Method, force: FloatArray | None = None
 ) -> Feasibility:
     """Return `Pattern.feasibility`; `force`: forces of the grasps, shape (nodes, 3), if known."""
     friction = validation.positive(friction, "friction")
     if friction > _PER_CENT:
         raise ValueError(f"friction must be at most {_PER_CENT:g}, got {friction:g}: is it in per cent?")
-    validation.choice(controller, "controller", ("exact", "least_friction"))
+    validation.choice(method, "method", ("exact", "least_friction"))
     if force is None:
-        force = grasps_along(pattern, cable, controller).force
+        force = grasps_along(pattern, cable, method).force
     lgb = cable.gravito_bending_length
     s = pattern.arc_length / lgb
     curvature, slope, bend = (
@@ -186,7 +186,7 @@ def examine(
     return Feasibility(pattern.arc_length, floor, lift_off, free_end, tail, overlap, friction, slips)
 
 
-def grasps_along(pattern: Laid, cable: Cable, controller: str) -> Grasp:
+def grasps_along(pattern: Laid, cable: Cable, method: str) -> Grasp:
     """Grasps while each place of a pattern is the lift-off point [units of the cable], at the near side of a jaw.
 
     The middle of the jaw is at the cable's length from its free end.
@@ -224,13 +224,13 @@ def grasps_along(pattern: Laid, cable: Cable, controller: str) -> Grasp:
         )
     curvature = -lgb * pattern.curvature  # grasps bend to the right
     thick = cable.radius / lgb
-    if controller == "network":
+    if method == "network":
         network = shipped()
         return thickened(
             lambda length, bend: network(length, bend, cable.stretch_stiffness), suspended, curvature, thick
         )
     try:
-        if controller == "least_friction":
+        if method == "least_friction":
             shear = _BEND_STIFFNESS * lgb**2 * np.gradient(pattern.curvature, pattern.arc_length)
             laid = pattern.arc_length / lgb
             return least_friction(suspended, curvature, shear, laid, cable.stretch_stiffness, thick)

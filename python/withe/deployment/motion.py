@@ -185,13 +185,15 @@ def upright_way(cable: Cable, path: Path) -> Piece:
     return Piece(path.arc_length, positions, rotations, path.length, laying=True)
 
 
-def course(cable: Cable, path: Path, way: Piece, speed: float, time_step: float, start: Start) -> Course:
+def course(cable: Cable, path: Path, way: Piece, speed: float, sampling_interval: float, start: Start) -> Course:
     """Hang, touch down and go along a way, at a speed of the lift-off point [m/s] and with rows every time step [s]."""
     down = _touch_down(cable, path, way, start)
     pieces, phases, clock = [], [], 0.0
     for name, piece in (("hang", _hang(down)), ("touch down", down), ("lay", way)):
         duration = piece.duration(speed)
-        times, *rest = piece.sampled(np.linspace(0.0, 1.0, max(2, int(np.ceil(duration / time_step)) + 1)), speed)
+        times, *rest = piece.sampled(
+            np.linspace(0.0, 1.0, max(2, int(np.ceil(duration / sampling_interval)) + 1)), speed
+        )
         pieces.append((clock + times, *rest))
         phases.append(Phase(name, clock, clock + duration))
         clock += duration
@@ -221,7 +223,7 @@ def _touch_down(cable: Cable, path: Path, way: Piece, start: Start) -> Piece:
     base = np.append(path.points[0], cable.radius)
     positions = base + _turned(forward, rolled + _in_jaw(cable, found))
     quaternions = _product(forward, _from_vectors(found.rotation))
-    # The last pose is that of laying, exactly: a controller or a bent beginning may differ from the straight one.
+    # The last pose is that of laying, exactly: a method or a bent beginning may differ from the straight one.
     share = np.linspace(0.0, 1.0, _PIVOT_ANGLES)[:, None]
     blend = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
     positions = positions + blend * (way.positions[0] - positions[-1])

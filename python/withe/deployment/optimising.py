@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from withe.common.progress import Progress
 from withe.deployment.cable import Cable
-from withe.deployment.feasibility import Controller
+from withe.deployment.feasibility import Method
 from withe.deployment.motion import Path, Start, displaced
 from withe.deployment.pattern import Pattern
 from withe.deployment.world import Motion, Setup, lay
@@ -20,7 +20,7 @@ from withe.errors import ConvergenceError
 __all__ = ["Trial", "optimised", "runs"]
 
 FloatArray = npt.NDArray[np.float64]
-MotionOf = Callable[[Path, Controller], Motion]
+MotionOf = Callable[[Path, Method], Motion]
 _KNOTS = 1.0  # [Lgb] between the knots of the shift
 _COLOURS = 7  # knots so far apart are shifted at the same time: each moves the cable 3.5 knots to either side
 _PROBE = 5e-4  # [m] by which knots are shifted to see what moves
@@ -42,7 +42,7 @@ class Trial:
     """
 
     shift: FloatArray
-    controller: Controller
+    method: Method
     away: FloatArray
 
     @property
@@ -64,15 +64,15 @@ class _Engine:
         self.s = s[s <= pattern.length]
         self.places = np.stack([np.interp(self.s, pattern.arc_length, pattern.points[:, i]) for i in range(2)], 1)
 
-    def trial(self, shift: FloatArray, controller: Controller) -> Trial | None:
+    def trial(self, shift: FloatArray, method: Method) -> Trial | None:
         """None where there is no such way, or the engine finds no equilibrium on it."""
         self.shown.advance(1)
         try:
-            motion = self.motion_of(_shifted(self.path, self.basis, shift), controller)
+            motion = self.motion_of(_shifted(self.path, self.basis, shift), method)
             _, laid, _ = lay(self.setup, motion, progress=False)
         except (ConvergenceError, ValueError):
             return None
-        return Trial(shift, controller, laid[: len(self.s), :2] - self.places)
+        return Trial(shift, method, laid[: len(self.s), :2] - self.places)
 
     def aligned(self, trial: Trial) -> Trial:
         """The trial moved as a whole to where it misses least, which takes no run: the floor is the same everywhere.
@@ -88,7 +88,7 @@ class _Engine:
         angle = float(np.arctan2((turned * target).sum(), (centred * target).sum()))
         way = wanted.mean(0) - laid.mean(0) @ _turn(angle)
         shift = np.concatenate([trial.shift[:-3], way, [angle * self.path.length]])
-        return Trial(shift, trial.controller, way + laid @ _turn(angle) - wanted)
+        return Trial(shift, trial.method, way + laid @ _turn(angle) - wanted)
 
     def slopes(self, now: Trial) -> FloatArray:
         """Derivative of all distances by the shift, shape (2 nodes, knots + 3).
@@ -102,7 +102,7 @@ class _Engine:
             knots = np.arange(colour, len(self.centres), colours)
             probe = now.shift.copy()
             probe[knots] += _PROBE
-            trial = self.trial(probe, now.controller)
+            trial = self.trial(probe, now.method)
             if trial is None:
                 continue
             nearest = knots[owner[:, knots].argmin(1)]
@@ -123,7 +123,7 @@ def optimised(
     motion_of: MotionOf,
     start: Start,
     shown: Progress,
-) -> tuple[Path, Controller]:
+) -> tuple[Path, Method]:
     """Shift a path sideways so that the cable comes to lie on its pattern, friction permitting.
 
     The shift is a cubic spline with a knot each Lgb, and a motion of the whole. What the engine makes of a shift of one
@@ -146,7 +146,7 @@ def optimised(
     )
     engine = _Engine(path, setup, pattern, motion_of, shown)
     unshifted = np.zeros(len(engine.centres) + 3)
-    tried = [trial for controller in get_args(Controller) if (trial := engine.trial(unshifted, controller))]
+    tried = [trial for method in get_args(Method) if (trial := engine.trial(unshifted, method))]
     if not tried:
         raise ConvergenceError("the rod engine found no equilibrium along the path to be optimised")
     best = engine.aligned(min(tried, key=lambda trial: trial.error))
@@ -157,7 +157,7 @@ def optimised(
         best = _descended(engine, best)
         if best.error > _GAIN * before:
             break
-    return _shifted(path, _splines(path, engine.centres, engine.spacing), best.shift), best.controller
+    return _shifted(path, _splines(path, engine.centres, engine.spacing), best.shift), best.method
 
 
 def runs(path: Path, cable: Cable, pattern: Pattern) -> int:
@@ -207,7 +207,7 @@ def _descended(engine: _Engine, best: Trial) -> Trial:
         square = slopes.T @ slopes
         scale = float(square.diagonal().max())
         step = -np.linalg.solve(square + damping * scale * np.eye(len(square)), slopes.T @ best.away.ravel())
-        trial = engine.trial(best.shift + step, best.controller)
+        trial = engine.trial(best.shift + step, best.method)
         if trial is None:
             damping *= 10.0
             continue

@@ -11,10 +11,11 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.deprecation import renamed
 from withe.common.keywords import keyword_hints
 from withe.common.user_warnings import warn
 from withe.deployment.cable import Cable
-from withe.deployment.feasibility import Controller, Feasibility, examine
+from withe.deployment.feasibility import Feasibility, Method, examine
 from withe.deployment.letters import written
 from withe.deployment.smoothing import fourth_differences, smooth
 from withe.perception import trace
@@ -323,7 +324,8 @@ class Pattern:
         """Pairs of arc lengths at which the pattern crosses itself, shape (crossings, 2) [m]."""
         return crossings(self.points, self.arc_length)
 
-    def feasibility(self, cable: Cable, friction: float, controller: Controller = "exact") -> Feasibility:
+    @renamed(controller="method")
+    def feasibility(self, cable: Cable, friction: float, method: Method = "exact") -> Feasibility:
         """Say where friction holds the cable on the pattern while it is laid, and where not.
 
         Parameters
@@ -331,7 +333,7 @@ class Pattern:
         cable : Cable
         friction : float
             Coefficient between cable and floor.
-        controller : {"exact", "least_friction"}
+        method : {"exact", "least_friction"}
             How the cable is laid.
 
         Returns
@@ -352,7 +354,7 @@ class Pattern:
         >>> print(found.feasible, f"{found.lift_off.max():.2f}")
         True 0.26
         """
-        return examine(self, cable, friction, controller)
+        return examine(self, cable, friction, method)
 
     def __repr__(self) -> str:
         away = f"{1e3 * self.deviation:.1f} mm from what was given"

@@ -16,7 +16,7 @@ from withe.deployment.posts import Post
 __all__ = ["KIND", "VERSION", "parts_of"]
 
 KIND, VERSION = "plan of a deployment", 1
-_CONTROLLERS = ("exact", "least_friction", "optimised", "network", "intuitive")
+_METHODS = ("exact", "least_friction", "optimised", "network", "intuitive")
 _UNIT = 1e-9  # of quaternions
 
 
@@ -49,7 +49,7 @@ def parts_of(content: Mapping[str, Any]) -> dict[str, Any]:
         "cable": Cable(**cable),
         "pattern": pattern,
         "tail": tail,
-        "controller": validation.choice(content["controller"], "controller", _CONTROLLERS),
+        "method": validation.choice(content["controller"], "method", _METHODS),
         "start": validation.choice(content["start"], "start", get_args(Start)),
         "speed": validation.positive(content["speed"], "speed"),
         "fastest": validation.positive(content["fastest"], "fastest"),

@@ -12,12 +12,12 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
-from withe.common.keywords import keyword_hints
+from withe.common.deprecation import old_word, renamed
 from withe.common.progress import progress as bar
 from withe.common.user_warnings import warn
 from withe.deployment.cable import JAW, Cable
 from withe.deployment.drawing import draw_plan
-from withe.deployment.feasibility import Controller, Feasibility, Slip, examine, grasps_along, require_bendable
+from withe.deployment.feasibility import Feasibility, Method, Slip, examine, grasps_along, require_bendable
 from withe.deployment.grasping import Grasp, table
 from withe.deployment.motion import Course, Path, Phase, Start, course, lengthened, upright_way, way_along
 from withe.deployment.optimising import optimised, runs
@@ -28,10 +28,10 @@ from withe.deployment.plan_files import KIND, VERSION, parts_of
 from withe.deployment.posts import Post
 from withe.io import load_json, pose_path, save_json, save_poses
 
-__all__ = ["Plan", "PlanController", "plan"]
+__all__ = ["LayPlan", "PlanMethod", "plan"]
 
 FloatArray = npt.NDArray[np.float64]
-PlanController = Literal["exact", "least_friction", "optimised", "network", "intuitive"]
+PlanMethod = Literal["exact", "least_friction", "optimised", "network", "intuitive"]
 _TAIL_SHARES = (1.0, 0.5, 0.5, 0.5)  # of the one before, where a tail crosses
 _TAIL = 4.0  # [Lgb] of cable beyond the pattern, where there is so much: shorter ends need much friction
 _OPTIMISING_SPEED, _OPTIMISING_STEP = 0.025, 0.04  # [m/s], [s]: of quasi-static runs, where only the way counts
@@ -40,7 +40,7 @@ _MOST_FRICTION = 3.0  # no floor has more
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
+class LayPlan:
     """The path of a jaw that lays a cable; at its end the jaw opens. The floor is the plane z = 0.
 
     Attributes
@@ -59,7 +59,7 @@ class Plan:
     pattern : Pattern
     tail : float [m]
         How much of the cable lies beyond the pattern, straight on.
-    controller : str
+    method : str
     start : str
         "free", or "held" so that the free end slides up and down only.
     speed : float [m/s]
@@ -83,7 +83,7 @@ class Plan:
     cable: Cable
     pattern: Pattern
     tail: float
-    controller: str
+    method: str
     start: str
     speed: float
     fastest: float
@@ -95,13 +95,19 @@ class Plan:
         """Rows t, x, y, z, qw, qx, qy, qz of shape (n, 8), for hands of a simulation, which have the scalar first."""
         return pose_path(self.times, np.column_stack([self.positions, self.rotations]))
 
+    @property
+    def controller(self) -> str:
+        """Deprecated name of `method`."""
+        old_word("LayPlan.controller", "LayPlan.method")
+        return self.method
+
     def feasibility(self, friction: float) -> Feasibility:
         """Say where friction holds the cable and where it will slip; see `Pattern.feasibility`."""
         return examine(
             self.pattern,
             self.cable,
             friction,
-            "least_friction" if self.controller in ("least_friction", "optimised") else "exact",
+            "least_friction" if self.method in ("least_friction", "optimised") else "exact",
         )
 
     def save(self, path: str | os.PathLike[str]) -> None:
@@ -127,7 +133,7 @@ class Plan:
             raise ValueError(f"path must end in .csv or .json, got {path.name!r}")
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> Plan:
+    def load(cls, path: str | os.PathLike[str]) -> LayPlan:
         """Read a plan that `save` wrote as JSON: the same to the last digit, for `deploy`, `plot` and all the rest.
 
         Parameters
@@ -136,7 +142,7 @@ class Plan:
 
         Returns
         -------
-        Plan
+        LayPlan
 
         Raises
         ------
@@ -148,7 +154,7 @@ class Plan:
         Examples
         --------
         >>> motion.save("motion.json")  # doctest: +SKIP
-        >>> withe.deployment.Plan.load("motion.json").feasibility(0.4)  # doctest: +SKIP
+        >>> withe.deployment.LayPlan.load("motion.json").feasibility(0.4)  # doctest: +SKIP
         """
         return load_json(path, KIND, VERSION, lambda content: cls(**parts_of(content)))
 
@@ -164,13 +170,13 @@ class Plan:
         -------
         matplotlib.figure.Figure
         """
-        title = f"{self.controller}, {1e3 * self.speed:.0f} mm/s"
+        title = f"{self.method}, {1e3 * self.speed:.0f} mm/s"
         return draw_plan(self.pattern, self.positions, self.feasibility(friction), title)
 
     def to_dict(self) -> dict[str, object]:
         """All numbers as lists, for JSON. SI units."""
         return {
-            "controller": self.controller,
+            "controller": self.method,
             "start": self.start,
             "speed": self.speed,
             "fastest": self.fastest,
@@ -196,14 +202,14 @@ class Plan:
         }
 
     def __repr__(self) -> str:
-        return f"Plan({self.controller}, {self.pattern.length:.3f} m in {self.times[-1]:.1f} s)"
+        return f"LayPlan({self.method}, {self.pattern.length:.3f} m in {self.times[-1]:.1f} s)"
 
 
-@keyword_hints
+@renamed(controller="method", time_step="sampling_interval")
 def plan(
     cable: Cable,
     pattern: Pattern,
-    controller: PlanController = "exact",
+    method: PlanMethod = "exact",
     *,
     friction: float | None = None,
     speed: float = 0.025,
@@ -211,9 +217,9 @@ def plan(
     start: Start = "free",
     crossings: Literal["refuse", "over"] = "refuse",
     posts: Sequence[Post] = (),
-    time_step: float = 0.02,
+    sampling_interval: float = 0.02,
     progress: bool = True,
-) -> Plan:
+) -> LayPlan:
     """Plan the whole motion of a gripper that lays a cable along a pattern: hang, touch down, lay, release.
 
     First, the cable hangs with its free end above the start of the pattern, is lowered, and pivots on its end until it
@@ -226,7 +232,7 @@ def plan(
         Cable to lay.
     pattern : Pattern
         Curve on the floor.
-    controller : {"exact", "least_friction", "optimised", "network", "intuitive"}
+    method : {"exact", "least_friction", "optimised", "network", "intuitive"}
         * "exact": no force along the cable at the lift-off point.
         * "least_friction": the push along the cable that needs the least friction.
         * "optimised": the better of these, on a path that is shifted until the cable lies on its pattern in the rod
@@ -249,14 +255,14 @@ def plan(
         "over" allows crossings of pattern and tail, without the thickness of the cable.
     posts : sequence of Post
         Posts between which the cable is laid. Posts help to hold the cable, so the needed friction may be high.
-    time_step : float [s]
+    sampling_interval : float [s]
         Interval between the rows of the plan.
     progress : bool
         True to show a progress bar with "optimised".
 
     Returns
     -------
-    Plan
+    LayPlan
 
     Raises
     ------
@@ -285,9 +291,9 @@ def plan(
     >>> print([phase.name for phase in motion.phases], f"{motion.needed_friction.max():.1f}")
     ['hang', 'touch down', 'lay'] 0.1
     """
-    validation.choice(controller, "controller", get_args(PlanController))
+    validation.choice(method, "method", get_args(PlanMethod))
     speed = validation.positive(speed, "speed")
-    time_step = validation.positive(time_step, "time_step")
+    sampling_interval = validation.positive(sampling_interval, "sampling_interval")
     validation.choice(crossings, "crossings", ("refuse", "over"))
     validation.choice(start, "start", get_args(Start))
     for given, name, kind in ((cable, "cable", Cable), (pattern, "pattern", Pattern)):
@@ -302,23 +308,23 @@ def plan(
         held, tail = _held(cable, pattern, tail)
         path = lengthened(pattern, held, tail)
     unknown = np.full(len(pattern.points), np.nan)
-    if controller == "intuitive":
+    if method == "intuitive":
         needed, way = unknown, upright_way(held, path)
-    elif controller == "network":
-        needed, way = unknown, way_along(held, path, grasps_along(path, held, controller))
-    elif controller == "optimised":
+    elif method == "network":
+        needed, way = unknown, way_along(held, path, grasps_along(path, held, method))
+    elif method == "optimised":
         if friction is None:
-            raise ValueError("controller 'optimised' needs friction, the floor's coefficient")
+            raise ValueError("method 'optimised' needs friction, the floor's coefficient")
         path, followed = _improved(held, pattern, path, friction, start, progress)
         needed = _needed(pattern, held, followed, grasps_along(pattern, held, followed), bool(posts))
         way = way_along(held, path, grasps_along(path, held, followed))
     else:
-        grasps = grasps_along(path, held, controller)
-        needed, way = _needed(pattern, held, controller, grasps, bool(posts)), way_along(held, path, grasps)
+        grasps = grasps_along(path, held, method)
+        needed, way = _needed(pattern, held, method, grasps, bool(posts)), way_along(held, path, grasps)
         if friction is not None and not posts and needed.max() > friction:
             warn(_slips(pattern, needed, friction), cause="slips")
-    motion = course(held, path, way, speed, time_step, start)
-    return Plan(
+    motion = course(held, path, way, speed, sampling_interval, start)
+    return LayPlan(
         times=motion.times,
         positions=motion.positions,
         rotations=motion.rotations,
@@ -327,7 +333,7 @@ def plan(
         cable=held,
         pattern=pattern,
         tail=tail,
-        controller=controller,
+        method=method,
         start=start,
         speed=speed,
         fastest=way.fastest(),
@@ -338,25 +344,25 @@ def plan(
 
 def _improved(
     cable: Cable, pattern: Pattern, path: Path, friction: float, start: Start, progress: bool
-) -> tuple[Path, Controller]:
-    """The path that lays best in the engine, and which controller goes along it."""
+) -> tuple[Path, Method]:
+    """The path that lays best in the engine, and which method goes along it."""
 
-    def motion_of(tried: Path, controller: Controller) -> Course:
-        way = way_along(cable, tried, grasps_along(tried, cable, controller))
+    def motion_of(tried: Path, method: Method) -> Course:
+        way = way_along(cable, tried, grasps_along(tried, cable, method))
         return course(cable, tried, way, _OPTIMISING_SPEED, _OPTIMISING_STEP, start)
 
     with bar(runs(path, cable, pattern), "optimising", progress, unit="runs") as shown:
         return optimised(path, cable, pattern, friction, motion_of, start, shown)
 
 
-def _needed(pattern: Pattern, cable: Cable, controller: Controller, grasps: Grasp, helped: bool) -> FloatArray:
+def _needed(pattern: Pattern, cable: Cable, method: Method, grasps: Grasp, helped: bool) -> FloatArray:
     """Friction that each place of the pattern needs; refused if no floor has it and nothing else helps."""
     count = len(pattern.points)
     force = np.concatenate([grasps.force, np.repeat(grasps.force[-1:], count, axis=0)])[:count]
-    found = examine(pattern, cable, _MOST_FRICTION, controller, force)
+    found = examine(pattern, cable, _MOST_FRICTION, method, force)
     worst = _worst_slip(found)
     if worst is not None and not helped:
-        missing = _missing_tail(pattern, cable, controller, worst)
+        missing = _missing_tail(pattern, cable, method, worst)
         raise ValueError(f"no friction is enough to keep this cable on this pattern: {worst}{missing}")
     return found.needed
 
@@ -374,14 +380,14 @@ def _worst_slip(found: Feasibility) -> Slip | None:
     return max(slips, key=lambda slip: slip.needed, default=None)
 
 
-def _missing_tail(pattern: Pattern, cable: Cable, controller: Controller, worst: Slip) -> str:
+def _missing_tail(pattern: Pattern, cable: Cable, method: Method, worst: Slip) -> str:
     """Describe the effect of a tail of the usual length, if friction would then be enough."""
     lgb = cable.gravito_bending_length
     usual, there = _TAIL * lgb, cable.length - pattern.length
     longer = replace(cable, length=pattern.length + usual)
     if there >= usual or longer.length > table().longest * lgb:
         return ""
-    found = examine(pattern, longer, _MOST_FRICTION, controller)
+    found = examine(pattern, longer, _MOST_FRICTION, method)
     if _worst_slip(found) is not None:
         return ""
     stretch = (found.arc_length >= worst.start) & (found.arc_length <= worst.end)

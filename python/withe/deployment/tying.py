@@ -10,10 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
-from withe.common.keywords import keyword_hints
+from withe.common.deprecation import renamed
 from withe.deployment.cable import JAW
 from withe.deployment.deploying import DRAWN, drawn_setup
-from withe.deployment.planning import Plan
+from withe.deployment.planning import LayPlan
 from withe.deployment.world import Setup, hung, jaw_path, jaw_stiffness
 from withe.parts.handles import Rod
 from withe.simulation import Simulation
@@ -91,12 +91,12 @@ class Tying:
         return self.shapes[-1]
 
 
-@keyword_hints
+@renamed(floor="friction")
 def tie(
-    plans: Sequence[Plan],
+    plans: Sequence[LayPlan],
     steps: Sequence[Sequence[Move]],
     *,
-    floor: float,
+    friction: float,
     picks: Sequence[Sequence[npt.ArrayLike]] | None = None,
     seed: int = 0,
     noise: float = 0.0,
@@ -112,10 +112,10 @@ def tie(
 
     Parameters
     ----------
-    plans : sequence of Plan
+    plans : sequence of LayPlan
         A cable each; later ones are laid over earlier ones.
     steps : sequence of sequences of Move
-    floor : float
+    friction : float
         Coefficient of friction of cables with the floor and each other.
     picks : sequence of sequences of array_like of shape (3,) [m], optional
         `Tying.picks` of a rehearsal.
@@ -136,7 +136,7 @@ def tie(
         picks that do not fit, friction that is not positive, negative noise.
     """
     _check(plans, steps, picks)
-    friction = validation.positive(floor, "floor")
+    friction = validation.positive(friction, "friction")
     noise = validation.non_negative(noise, "noise")
     random = np.random.default_rng(validation.integer(seed, "seed", 0, 2**63 - 1))
     setups = [
@@ -160,10 +160,10 @@ def tie(
 
 
 def _check(
-    plans: Sequence[Plan], steps: Sequence[Sequence[Move]], picks: Sequence[Sequence[npt.ArrayLike]] | None
+    plans: Sequence[LayPlan], steps: Sequence[Sequence[Move]], picks: Sequence[Sequence[npt.ArrayLike]] | None
 ) -> None:
-    if isinstance(plans, Plan) or not plans or not all(isinstance(plan, Plan) for plan in plans):
-        raise ValueError(f"plans must be one or more withe.deployment.Plan in a list, got {plans!r:.80}")
+    if isinstance(plans, LayPlan) or not plans or not all(isinstance(plan, LayPlan) for plan in plans):
+        raise ValueError(f"plans must be one or more withe.deployment.LayPlan in a list, got {plans!r:.80}")
     for number, step in enumerate(steps):
         if isinstance(step, Move):
             raise ValueError(f"step {number} must be a list of simultaneous moves, got one Move")
@@ -187,7 +187,7 @@ def _check(
 class _Table:
     """The floor, what lies and hangs there, and what was done."""
 
-    def __init__(self, plans: Sequence[Plan], setups: Sequence[Setup]) -> None:
+    def __init__(self, plans: Sequence[LayPlan], setups: Sequence[Setup]) -> None:
         self.plans, self.setups = plans, setups
         self.heights = [_HIGHER * number for number in range(len(plans))]
         self.simulation: Simulation

@@ -9,6 +9,9 @@ the sheet per length. That makes one solution serve every paper.
 2.3762 rad, 3.4000 Lgb lifted, ratio of forces 0.3837
 """
 
+from typing import TYPE_CHECKING
+
+from withe.common.deprecation import old_names
 from withe.folding.closed_loop import fold
 from withe.folding.endings import plan
 from withe.folding.hanging_strip import Measured, droop, measure
@@ -18,7 +21,7 @@ from withe.folding.network_training import train
 from withe.folding.noise import Noise
 from withe.folding.paper import Paper
 from withe.folding.planning import replan
-from withe.folding.plans import Plan
+from withe.folding.plans import FoldPlan
 from withe.folding.plunging import plunge
 from withe.folding.seeing import SeenEdge, find_edge, overhead_camera
 from withe.folding.sheet_network import SheetNetwork
@@ -30,12 +33,12 @@ from withe.folding.wide_sheet import WideFold, WideSheet
 __all__ = [
     "Elastica",
     "Fold",
+    "FoldPlan",
     "Jaw",
     "Measured",
     "Noise",
     "Outcome",
     "Paper",
-    "Plan",
     "SeenEdge",
     "SheetNetwork",
     "SimulatedSheet",
@@ -54,3 +57,6 @@ __all__ = [
     "run_trials",
     "train",
 ]
+
+if not TYPE_CHECKING:  # an old name stays an error to type checkers
+    __getattr__ = old_names(__name__, Plan=FoldPlan)

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from withe.common import validation
 from withe.common.keywords import keyword_hints
 from withe.folding.paper import require_length
-from withe.folding.plans import Plan
+from withe.folding.plans import FoldPlan
 from withe.folding.seeing import camera_over, find_edge
 from withe.folding.simulated_sheet import Fold, SimulatedSheet
 from withe.folding.watching import TOLERANCE, watched_parts
@@ -27,7 +27,7 @@ _NEAR = 0.01  # of where the lifted edge appears, an edge on the table cannot be
 
 @overload
 def fold(
-    plan: Plan,
+    plan: FoldPlan,
     sheet: SimulatedSheet,
     *,
     replans: int = 5,
@@ -39,7 +39,7 @@ def fold(
 
 @overload
 def fold(
-    plan: Plan,
+    plan: FoldPlan,
     sheet: WideSheet,
     *,
     replans: int = 5,
@@ -51,7 +51,7 @@ def fold(
 
 @keyword_hints
 def fold(
-    plan: Plan,
+    plan: FoldPlan,
     sheet: SimulatedSheet | WideSheet,
     *,
     replans: int = 5,
@@ -66,7 +66,7 @@ def fold(
 
     Parameters
     ----------
-    plan : Plan
+    plan : FoldPlan
         Plan to carry out.
     sheet : SimulatedSheet or WideSheet
         Sheet to fold. For a wide sheet the camera follows the middle of the far edge.
@@ -111,8 +111,8 @@ def fold(
     >>> sheet = withe.folding.SimulatedSheet(paper, seed=1, noise=withe.folding.Noise())
     >>> folded = withe.folding.fold(withe.folding.plan(paper), sheet)  # doctest: +SKIP
     """
-    if not isinstance(plan, Plan):
-        raise ValueError(f"plan must be a Plan, got {plan!r:.80}")
+    if not isinstance(plan, FoldPlan):
+        raise ValueError(f"plan must be a FoldPlan, got {plan!r:.80}")
     if not isinstance(sheet, SimulatedSheet | WideSheet):
         raise ValueError(f"sheet must be a SimulatedSheet or a WideSheet, got {sheet!r:.80}")
     require_length(sheet.paper, plan.paper)
@@ -137,7 +137,7 @@ def fold(
     return replace(folded, seen_slides=tuple(seen))
 
 
-def _slide(sheet: SimulatedSheet | WideSheet, camera: Camera, plan: Plan, pose: FloatArray) -> float:
+def _slide(sheet: SimulatedSheet | WideSheet, camera: Camera, plan: FoldPlan, pose: FloatArray) -> float:
     """Return the slide of the sheet, as a camera sees it; NaN if its far edge is hidden.
 
     The lifted edge, at a pose of the jaw, has corners like those of the far edge, and hides these in the end.

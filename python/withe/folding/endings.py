@@ -13,7 +13,7 @@ from withe.common.user_warnings import warn
 from withe.folding.jaw import Jaw
 from withe.folding.paper import Paper
 from withe.folding.planning import Grasp, Method, Source, least_friction, slow_plan
-from withe.folding.plans import Plan
+from withe.folding.plans import FoldPlan
 from withe.folding.plunging import plunge
 
 __all__ = ["plan"]
@@ -40,7 +40,7 @@ def plan(
     acceleration: float = 0.2,
     turning: float = 1.0,
     progress: bool = True,
-) -> Plan:
+) -> FoldPlan:
     """Plan how a jaw lifts one edge of a sheet and lays it down on the sheet.
 
     Parameters
@@ -67,7 +67,7 @@ def plan(
         "plunge" always ends in a `plunge`; "slow" never does. "auto" depends on the method:
 
         * method "slip" with a free moment: a plunge if some paper within the uncertainty would slide by more than 1 mm
-          (`Plan.worst_slide`) on the slow way.
+          (`FoldPlan.worst_slide`) on the slow way.
         * other methods, with `replans`: a plunge if the last part, which no camera corrects, needs more friction than
           there may be. Without `replans`: slow.
 
@@ -90,7 +90,7 @@ def plan(
 
     Returns
     -------
-    Plan
+    FoldPlan
 
     Raises
     ------
@@ -103,7 +103,7 @@ def plan(
     -----
     UserWarning
         The sheet slides on every path of method "slip"; the message names the friction that would be enough. Or
-        another paper within the uncertainty slides. Or the sheet jumps (`Plan.jumps_at`), except with "intuitive".
+        another paper within the uncertainty slides. Or the sheet jumps (`FoldPlan.jumps_at`), except with "intuitive".
 
     Examples
     --------
@@ -156,7 +156,7 @@ def plan(
     return slow
 
 
-def _slides(slow: Plan) -> str | None:
+def _slides(slow: FoldPlan) -> str | None:
     """By how much the worst paper within the uncertainty slides, where that is too much."""
     slide, paper = slow.worst_slide
     if slide <= _BEARABLE:
@@ -169,13 +169,13 @@ def _slides(slow: Plan) -> str | None:
     )
 
 
-def _jumps(slow: Plan) -> str:
+def _jumps(slow: FoldPlan) -> str:
     """That the sheet will not follow to the end, and what may."""
     free = "" if slow.grasp == "free" else ": use method='slip' with grasp='free', which also applies a moment"
     return f"the sheet jumps at {slow.jumps_at:.1f} of {slow.times[-1]:.1f} s, where its equilibrium ends{free}"
 
 
-def _unseen(slow: Plan) -> str | None:
+def _unseen(slow: FoldPlan) -> str | None:
     """What the last part asks for, of which a camera sees nothing, where that is too much."""
     lgb, (_, share) = slow.paper.gravito_bending_length, slow.uncertainty
     least = slow.paper.friction * (1.0 - share)

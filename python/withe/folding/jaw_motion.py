@@ -26,7 +26,7 @@ _JUMP = np.array([1e-3, 1e-3, 0.05])  # between motions, at most [m], [m], [rad]
 
 
 class Motion(Protocol):
-    """Poses and times of the sheet's outer edge, as a `Plan` has them."""
+    """Poses and times of the sheet's outer edge, as a `FoldPlan` has them."""
 
     @property
     def times(self) -> FloatArray:

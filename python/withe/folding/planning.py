@@ -15,7 +15,7 @@ from withe.folding.free_moment import Holding, Way
 from withe.folding.jaw import Jaw, inner_edge, outer_edge
 from withe.folding.manifold import Manifold
 from withe.folding.paper import Paper, folded_share
-from withe.folding.plans import SHORT, Plan, flat_forces
+from withe.folding.plans import SHORT, FoldPlan, flat_forces
 from withe.folding.sheets import LONGEST, SHORTEST, Elastica, at_forces, at_poses, forces_of, join, poses_of, take
 from withe.folding.timing import evenly, travel_times
 from withe.folding.widths import Width, free_width
@@ -100,7 +100,7 @@ def slow_plan(
     speed: float,
     acceleration: float,
     turning: float,
-) -> Plan:
+) -> FoldPlan:
     """Plan a fold whose edge comes down slowly; arguments and what is refused are those of `plan`."""
     if not isinstance(paper, Paper):
         raise ValueError(f"paper must be a Paper, got {paper!r}")
@@ -143,7 +143,7 @@ def slow_plan(
     return _planned(task)
 
 
-def _planned(task: _Task) -> Plan:
+def _planned(task: _Task) -> FoldPlan:
     if task.method == "intuitive":
         return _half_circle(task)
     return _free(task) if task.grasp == "free" else _over_manifold(task)
@@ -158,7 +158,7 @@ def _target(paper: Paper, target: float | str) -> float:
     return where
 
 
-def _half_circle(task: _Task) -> Plan:
+def _half_circle(task: _Task) -> FoldPlan:
     angles = np.linspace(0.0, np.pi, _POSES)
     radius = 0.5 * task.target
     outer = np.stack([radius * (1 - np.cos(angles)), radius * np.sin(angles), angles], axis=1)
@@ -167,7 +167,7 @@ def _half_circle(task: _Task) -> Plan:
     return _finished(task, outer, None)
 
 
-def _over_manifold(task: _Task) -> Plan:
+def _over_manifold(task: _Task) -> FoldPlan:
     goal = _checked_goal(_goal(task), task)
     if task.method == "slip":
         sheet = _least_sliding(task, goal, None, _POSES)
@@ -212,7 +212,7 @@ def _with_friction(task: _Task, enough: float, goal: Elastica, start: Elastica |
     return _smoothed(task, moment_free.least_ratio(task.solve, task.holding, enough, goal, start), count)
 
 
-def least_friction(present: Plan) -> float:
+def least_friction(present: FoldPlan) -> float:
     """Friction with which a plan of method "slip" to the same target has no slide."""
     if present.grasp == "free":  # which goes where least is needed, if that is not there
         return float(present.slip_ratio.max())
@@ -221,7 +221,7 @@ def least_friction(present: Plan) -> float:
     return np.inf if sheet is None or not sheet.valid.all() else float(task.holding.ratio(sheet).max())
 
 
-def replan(present: Plan, pose: npt.ArrayLike, slide: float) -> Plan:
+def replan(present: FoldPlan, pose: npt.ArrayLike, slide: float) -> FoldPlan:
     """Plan the rest of a fold anew, from where the jaw is and where the sheet has slid to.
 
     Without moment it is a search over the manifold again: by least slide if the present plan is of method "slip", or
@@ -231,7 +231,7 @@ def replan(present: Plan, pose: npt.ArrayLike, slide: float) -> Plan:
 
     Parameters
     ----------
-    present : Plan
+    present : FoldPlan
     pose : array_like of shape (7,) [m], [-]
         Of the sheet's outer edge, as those of `present`.
     slide : float [m]
@@ -239,7 +239,7 @@ def replan(present: Plan, pose: npt.ArrayLike, slide: float) -> Plan:
 
     Returns
     -------
-    Plan
+    FoldPlan
         In the same frame, from the pose on; its target and its times are those of the rest.
 
     Raises
@@ -271,7 +271,7 @@ def replan(present: Plan, pose: npt.ArrayLike, slide: float) -> Plan:
     return _finished(task, task.outer(poses_of(sheet)), sheet, offset=slide)
 
 
-def _task_of(present: Plan) -> _Task:
+def _task_of(present: FoldPlan) -> _Task:
     """What a plan was asked for, from where the sheet lies."""
     return _Task(
         paper=present.paper,
@@ -289,7 +289,7 @@ def _task_of(present: Plan) -> _Task:
     )
 
 
-def plan_above(present: Plan, height: float) -> Plan:
+def plan_above(present: FoldPlan, height: float) -> FoldPlan:
     """Plan as far as over the target, by a height [m]: what a plan was asked for, but for its last part.
 
     Where the edge would have to be pressed down, it is the last part that asks for friction.
@@ -318,7 +318,7 @@ def _anew_from(task: _Task, inner: FloatArray) -> tuple[FloatArray, FloatArray]:
     return wanted, forces_of(sheet)
 
 
-def _on_from(present: Plan, inner: FloatArray, width: Width) -> tuple[FloatArray, FloatArray]:
+def _on_from(present: FoldPlan, inner: FloatArray, width: Width) -> tuple[FloatArray, FloatArray]:
     """The same, for a jaw that takes a moment, by going over to the present plan."""
     known = present.sheet
     away = np.abs(poses_of(known) - inner).max(axis=1)
@@ -378,7 +378,7 @@ def _reachable(task: _Task) -> str:
     return f"; targets from {least:.3f} to {most:.3f} m can be reached"
 
 
-def _free(task: _Task) -> Plan:
+def _free(task: _Task) -> FoldPlan:
     """Without the table's friction where that can be, then with some, then for a sheet that is just as thought."""
     friction = task.paper.friction
     limit = friction * (1 - task.uncertainty[1])
@@ -409,7 +409,7 @@ def _free_way(task: _Task, holding: Holding, pulls: bool, most: float) -> Way | 
     return free_moment.way_to(lattice, holding, found, holding.worst_ratio(found), limit) if len(found.x) else None
 
 
-def _along(task: _Task, way: Way, holding: Holding, limit: float) -> Plan:
+def _along(task: _Task, way: Way, holding: Holding, limit: float) -> FoldPlan:
     places = free_moment.smoothed(way, holding, limit)
     sheet = at_forces(free_moment.forces_at(places))
     index = task.cut(_POSES - 1)(poses_of(sheet))
@@ -434,7 +434,7 @@ def _blocked(task: _Task) -> str:
     return f"{said} and a lifted length below {task.length:.2f} Lgb: no such pose connects with the flat sheet"
 
 
-def _finished(task: _Task, outer: FloatArray, sheet: Elastica | None, offset: float = 0.0) -> Plan:
+def _finished(task: _Task, outer: FloatArray, sheet: Elastica | None, offset: float = 0.0) -> FoldPlan:
     """Put times to outer edges (x, z [m], angle), and see to the jaw's room."""
     x, z, angle = outer.T
     back = angle > 0.5 * np.pi
@@ -442,7 +442,7 @@ def _finished(task: _Task, outer: FloatArray, sheet: Elastica | None, offset: fl
     if clearance < 0:
         side, clearance = "side", float(task.jaw.clearance(x, z, angle, "side")[back].min())
     zero = np.zeros_like(x)
-    return Plan(
+    return FoldPlan(
         paper=task.paper,
         target=task.target + offset,
         method=task.method,

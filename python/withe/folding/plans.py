@@ -22,7 +22,7 @@ from withe.folding.sheets import Elastica, at_forces, drag, forces_of, join, of_
 from withe.folding.widths import Width, free_width
 from withe.io import load_json, pose_path, save_json, save_poses
 
-__all__ = ["SHORT", "Plan", "flat_forces"]
+__all__ = ["SHORT", "FoldPlan", "flat_forces"]
 
 FloatArray = npt.NDArray[np.float64]
 SHORT = 0.5  # the same of a sheet that a plan knows: poses say little of so short a part [Lgb]
@@ -38,7 +38,7 @@ def flat_forces(width: Width) -> tuple[float, float, float]:
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
+class FoldPlan:
     """Poses of a jaw that folds a sheet, and times at which it is there.
 
     The world's origin is where the middle of the sheet's lifted edge lay in the flat sheet; x points along the sheet to
@@ -218,7 +218,7 @@ class Plan:
         sheet, slide = self._motion if paper == mine else self._moved(paper)
         return np.where(sheet.valid, slide * paper.gravito_bending_length, np.nan)
 
-    def before_plunge(self) -> Plan:
+    def before_plunge(self) -> FoldPlan:
         """The part that is led slowly: all of it where there is no plunge."""
         if self.plunges_at is None:
             return self
@@ -283,7 +283,7 @@ class Plan:
         if self.blocked is not None:
             way += ", fails within its uncertainty"
         greatest = f"slip ratio {ratio:.3f}, curvature {curvature:.0f}/m"
-        return f"Plan({way}, greatest {greatest}, fingers from the {self.side})"
+        return f"FoldPlan({way}, greatest {greatest}, fingers from the {self.side})"
 
     def plot(self, axes: Any | None = None, poses: int = 10) -> Any:
         """Draw the sheet from the side at some of the poses, as it is predicted to slide and hang there.
@@ -385,7 +385,7 @@ class Plan:
         return save_json(path, KIND, VERSION, self.to_dict())
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> Plan:
+    def load(cls, path: str | os.PathLike[str]) -> FoldPlan:
         """Read a plan that `save` wrote as JSON: the same to the last digit, for `replan`, `plot` and all the rest.
 
         Parameters
@@ -394,7 +394,7 @@ class Plan:
 
         Returns
         -------
-        Plan
+        FoldPlan
 
         Raises
         ------
@@ -406,6 +406,6 @@ class Plan:
         Examples
         --------
         >>> plan.save("fold.json")  # doctest: +SKIP
-        >>> withe.folding.Plan.load("fold.json").plot()  # doctest: +SKIP
+        >>> withe.folding.FoldPlan.load("fold.json").plot()  # doctest: +SKIP
         """
         return load_json(path, KIND, VERSION, lambda content: cls(**parts_of(content)))

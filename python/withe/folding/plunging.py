@@ -16,7 +16,7 @@ from withe.common.keywords import keyword_hints
 from withe.common.progress import progress as progress_bar
 from withe.folding.jaw_motion import Motion
 from withe.folding.planning import plan_above
-from withe.folding.plans import Plan
+from withe.folding.plans import FoldPlan
 from withe.folding.sheets import at_forces, forces_of
 from withe.folding.simulated_sheet import Held, SimulatedSheet
 from withe.folding.watching import Part, shifted, watched_parts
@@ -39,7 +39,7 @@ _COARSE = {"edges": 75, "time_step": 0.02}  # of sheets at the bounds, whose cre
 class _Tried:
     """One sheet that a paper may be: led slowly to where plunges begin, once, and from there by every one of them."""
 
-    def __init__(self, slow: Plan, sheet: SimulatedSheet, looks: int) -> None:
+    def __init__(self, slow: FoldPlan, sheet: SimulatedSheet, looks: int) -> None:
         self._sheet, self._target = sheet, slow.target
         self._held: Held | None = None
         self._from = slow.poses[-1:]
@@ -73,7 +73,7 @@ class _Tried:
 
 @keyword_hints
 def plunge(
-    plan: Plan,
+    plan: FoldPlan,
     *,
     press: float = 2e-3,
     duration: float | Sequence[float] = (0.025, 0.05),
@@ -81,7 +81,7 @@ def plunge(
     replans: int = 0,
     sheet: Mapping[str, Any] | None = None,
     progress: bool = True,
-) -> Plan:
+) -> FoldPlan:
     """End a plan quickly, and with the edge pressed onto the sheet that it comes down on.
 
     Where more friction is needed in the end than there is, the edge is drawn back or pushed on as it comes down slowly.
@@ -90,14 +90,14 @@ def plunge(
     stay. It goes down from over the target: from the least height to which the sheet is led without slide, whatever of
     the plan's `uncertainty` it is, or from where least friction is needed. The plan is made anew up to there. How much
     to the side it goes, within what time, and whether the edge ends level or as the plan has it, is tried on simulated
-    sheets without noise, those of `Plan.papers`: aimed so that the paper as it is thought to be is folded right, it is
-    the way on which the worst of them is best, by how far its crease is off and by half of how far it slides, of those
-    that fold all of them. Jaws that hold sheets at the bounds are off by 0.5 mm to either side: an edge that comes down
+    sheets without noise, those of `FoldPlan.papers`: aimed so that the paper as it is thought to be is folded right, it
+    is the way on which the worst of them is best, by how far its crease is off and by half of how far it slides, of
+    those that fold all of them. Jaws that hold sheets at the bounds are off by 0.5 mm to either side: an edge that comes down
     on the last of a sheet must not miss it.
 
     Parameters
     ----------
-    plan : Plan
+    plan : FoldPlan
     press : float [m]
     duration : float or sequence of float [s]
         Of the way down, or those that are tried. The longer it takes the farther the sheet may slide meanwhile, the
@@ -114,7 +114,7 @@ def plunge(
 
     Returns
     -------
-    Plan
+    FoldPlan
         With `plunges_at`. What is predicted of its last part is NaN. Its speed there is beyond its limits.
 
     Raises
@@ -130,8 +130,8 @@ def plunge(
     >>> slow = withe.folding.plan(paper, 0.2, method="slip", grasp="free", ending="slow")  # doctest: +SKIP
     >>> withe.folding.SimulatedSheet(paper).fold(withe.folding.plunge(slow)).error  # doctest: +SKIP
     """
-    if not isinstance(plan, Plan):
-        raise ValueError(f"plan must be a Plan, got {plan!r:.80}")
+    if not isinstance(plan, FoldPlan):
+        raise ValueError(f"plan must be a FoldPlan, got {plan!r:.80}")
     if plan.plunges_at is not None:
         raise ValueError(f"plan must end slowly, but already plunges at {plan.plunges_at:.2f} s")
     press = validation.positive(press, "press")
@@ -202,9 +202,9 @@ def _aimed(
     return aside, missed
 
 
-def _above(plan: Plan) -> Plan:
+def _above(plan: FoldPlan) -> FoldPlan:
     """The slow way to over the target."""
-    best: tuple[tuple[float, float], Plan] | None = None
+    best: tuple[tuple[float, float], FoldPlan] | None = None
     for height in _HEIGHTS:
         try:
             slow = plan_above(plan, height * plan.paper.gravito_bending_length)
@@ -220,14 +220,14 @@ def _above(plan: Plan) -> Plan:
     return best[1]
 
 
-def _down(slow: Plan, angle: float, press: float, duration: float, aside: float) -> Part:
+def _down(slow: FoldPlan, angle: float, press: float, duration: float, aside: float) -> Part:
     """From its last pose straight down to the target, `aside` further in x and `press` too low, and pressed there."""
     end = [slow.target + aside, 0.0, slow.paper.thickness - press, 0.0, np.sin(0.5 * angle), 0.0, np.cos(0.5 * angle)]
     times = slow.times[-1] + np.array([0.0, duration, duration + _HOLDING])
     return Part(times, np.vstack([slow.poses[-1], end, end]))
 
 
-def _ended(slow: Plan, way: Part, slide: float) -> Plan:
+def _ended(slow: FoldPlan, way: Part, slide: float) -> FoldPlan:
     """A plan with a way down, for a sheet that has slid so far until then."""
     added = len(way.times) - 1
     angle = 2.0 * np.arctan2(way.poses[-1, 4], way.poses[-1, 6])
@@ -243,7 +243,7 @@ def _ended(slow: Plan, way: Part, slide: float) -> Plan:
     )
 
 
-def _missed(plan: Plan, worst: float, bound: float) -> str:
+def _missed(plan: FoldPlan, worst: float, bound: float) -> str:
     lgb, friction = (100.0 * share for share in plan.uncertainty)
     sheets = f"all sheets with Lgb off by up to {lgb:g} % and friction less by up to {friction:g} %"
     how = (
@@ -254,6 +254,6 @@ def _missed(plan: Plan, worst: float, bound: float) -> str:
     return f"no plunge folds {sheets} within {1e3 * bound:g} mm: {how}; without a plunge, {_needs(plan)}"
 
 
-def _needs(plan: Plan) -> str:
+def _needs(plan: FoldPlan) -> str:
     needed = float(np.nanmax(plan.slip_ratio))
     return f"the fold would need friction {needed:.3f}, and the paper has {plan.paper.friction:g}"

@@ -254,7 +254,7 @@ class SimulatedSheet:
 
         Parameters
         ----------
-        plan : Plan
+        plan : FoldPlan
             Or anything else with `times`, `poses` and `target` like those of a plan.
         progress : bool
             Whether to show a progress bar.
@@ -287,7 +287,7 @@ class SimulatedSheet:
 
         Parameters
         ----------
-        motions : iterable of Plan
+        motions : iterable of FoldPlan
             Each is asked for when the one before has ended, so that a generator may look at the sheet in between. The
             first pose of a motion is where the one before has ended.
         target : float [m]
@@ -343,7 +343,7 @@ class SimulatedSheet:
 def require_motion(plan: FoldingMotion, paper: Paper) -> None:
     """Refuse what is no motion, and one that was planned for a longer or shorter sheet."""
     if not all(hasattr(plan, name) for name in ("times", "poses", "target")):
-        raise ValueError(f"plan must be a Plan, or have times, poses and target, got {plan!r:.80}")
+        raise ValueError(f"plan must be a FoldPlan, or have times, poses and target, got {plan!r:.80}")
     require_length(paper, getattr(plan, "paper", paper))
 
 

@@ -18,14 +18,14 @@ import numpy as np
 
 from withe.common import validation
 from withe.common.cluster import cluster_executor, require_client
-from withe.common.keywords import keyword_hints
+from withe.common.deprecation import renamed
 from withe.common.progress import progress as progress_bar
 from withe.folding.closed_loop import fold
 from withe.folding.endings import plan
 from withe.folding.hanging_strip import measure
 from withe.folding.noise import Noise
 from withe.folding.paper import Paper
-from withe.folding.plans import Plan
+from withe.folding.plans import FoldPlan
 from withe.folding.simulated_sheet import SimulatedSheet
 
 __all__ = ["Outcome", "Trial", "run_trials"]
@@ -92,7 +92,7 @@ class Outcome:
     plunges : bool
         Whether the plan ends in a plunge.
     blocked : str or None
-        Why the plan does not bear its uncertainty, as `Plan.blocked`.
+        Why the plan does not bear its uncertainty, as `FoldPlan.blocked`.
     error, length, slide : float [m]
     max_curvature : float [1/m]
         As those of `Fold`; NaN where there was no plan.
@@ -116,9 +116,9 @@ class Outcome:
     seconds: float = 0.0
 
 
-@keyword_hints
+@renamed(processes="workers")
 def run_trials(
-    trials: Sequence[Trial], *, processes: int | None = None, client: Any | None = None, progress: bool = True
+    trials: Sequence[Trial], *, workers: int | None = None, client: Any | None = None, progress: bool = True
 ) -> Iterator[Outcome]:
     """Carry out trials side by side, and hand out what came of each as it comes.
 
@@ -127,8 +127,9 @@ def run_trials(
     Parameters
     ----------
     trials : sequence of Trial
-    processes : int, optional
-        By default one a processor; 1: in this one. A script that uses more begins under ``if __name__ == "__main__":``.
+    workers : int, optional
+        Number of processes. By default one per processor; 1 runs the trials in this process. A script that uses
+        more must begin under ``if __name__ == "__main__":``.
     client : dask.distributed.Client, optional
         Of a cluster that carries them out instead, with withe installed on it.
     progress : bool
@@ -142,7 +143,7 @@ def run_trials(
     Raises
     ------
     ValueError
-        Not trials, both processes and a client, or not a client.
+        Not trials, both workers and a client, or not a client.
     ImportError
         Dask is not installed, and there is a client.
     """
@@ -150,11 +151,11 @@ def run_trials(
     for each in trials:
         if not isinstance(each, Trial):
             raise ValueError(f"trials must be Trials, got {each!r:.80}")
-    if client is not None and processes is not None:
-        raise ValueError("processes and client must not be given together")
+    if client is not None and workers is not None:
+        raise ValueError("workers and client must not be given together")
     if client is not None:
         require_client(client)
-    count = validation.integer(os.cpu_count() or 1 if processes is None else processes, "processes", 1, 10_000)
+    count = validation.integer(os.cpu_count() or 1 if workers is None else workers, "workers", 1, 10_000)
     return _run(trials, min(count, len(trials)), client, progress)
 
 
@@ -225,7 +226,7 @@ def _measured(paper: Paper, seed: int, noise: Noise, options: tuple[tuple[str, A
 
 
 @lru_cache(maxsize=4)
-def _planned(paper: Paper, target: float | str, options: tuple[tuple[str, Any], ...]) -> tuple[Plan, float]:
+def _planned(paper: Paper, target: float | str, options: tuple[tuple[str, Any], ...]) -> tuple[FoldPlan, float]:
     """A plan, and the seconds that it took: trials of one sheet, watched or not, may ask for the same."""
     began = time.thread_time()
     with warnings.catch_warnings():

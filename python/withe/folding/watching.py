@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.folding.planning import replan
-from withe.folding.plans import Plan
+from withe.folding.plans import FoldPlan
 from withe.folding.timing import travel_times
 
 __all__ = ["TOLERANCE", "Part", "shifted", "watched_parts"]
@@ -27,7 +27,7 @@ class Part:
 
 
 def watched_parts(
-    plan: Plan,
+    plan: FoldPlan,
     looks: int,
     look: Callable[[FloatArray], float],
     tolerance: float = TOLERANCE,
@@ -36,7 +36,7 @@ def watched_parts(
 
     Parameters
     ----------
-    plan : Plan
+    plan : FoldPlan
     looks : int
         At equal distances of the way; the last one before a plunge, which goes down where the sheet is then.
     look : callable
@@ -66,13 +66,13 @@ def watched_parts(
         yield Part(plunge.times, np.vstack([poses[-1:], shifted(plunge.poses[1:], farther)]))
 
 
-def _anew(present: Plan, poses: FloatArray, slide: float) -> tuple[Plan, FloatArray]:
+def _anew(present: FoldPlan, poses: FloatArray, slide: float) -> tuple[FoldPlan, FloatArray]:
     """The rest of a plan made anew, and the poses that are left: from the first one at which the sheet can be held.
 
     Where the jaw is now, a sheet that has slid may be beyond the border of the manifold without moment.
     """
 
-    def from_pose(begin: int) -> tuple[Plan, FloatArray]:
+    def from_pose(begin: int) -> tuple[FoldPlan, FloatArray]:
         rest = replan(present, poses[begin], slide)
         return rest, np.vstack([poses[: begin + 1], rest.poses[1:]])
 
@@ -92,14 +92,14 @@ def shifted(poses: FloatArray, slide: float) -> FloatArray:
     return moved
 
 
-def _plunge(plan: Plan) -> Part | None:
+def _plunge(plan: FoldPlan) -> Part | None:
     if plan.plunges_at is None:
         return None
     last = plan.times >= plan.plunges_at
     return Part(plan.times[last], plan.poses[last])
 
 
-def _timed(poses: FloatArray, plan: Plan) -> Part:
+def _timed(poses: FloatArray, plan: FoldPlan) -> Part:
     angles = np.unwrap(2.0 * np.arctan2(poses[:, 4], poses[:, 6]))
     places = np.stack([poses[:, 0], poses[:, 2], angles], axis=1)
     return Part(travel_times(places, *plan.limits), poses)

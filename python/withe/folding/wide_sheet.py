@@ -239,7 +239,7 @@ class WideSheet:
 
         Parameters
         ----------
-        plan : Plan
+        plan : FoldPlan
             Or anything else with `times`, `poses` and `target` like those of a plan.
         progress : bool
             Whether to show a progress bar.

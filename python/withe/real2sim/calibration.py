@@ -84,7 +84,7 @@ def calibrate(
     free: Sequence[Free] = ("roll", "scale", "arcs"),
     *,
     unknowns: Sequence[Any] | None = None,
-    progress: bool | Literal["always"] = True,
+    progress: bool = True,
 ) -> Calibration:
     """Calibrate the camera that saw tags of a planar robot, together with the robot's shapes.
 
@@ -113,7 +113,7 @@ def calibrate(
         * "tilt": tilt of the base
     unknowns : sequence of tuples, optional
         Unknowns of the robot, as in `fit`. By default a constant natural curvature of every rod.
-    progress : bool or "always"
+    progress : bool
         True to show a progress bar on a terminal and in a notebook.
 
     Returns

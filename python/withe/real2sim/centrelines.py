@@ -202,7 +202,7 @@ def rest_shape(
     unknown: Literal["natural_curvature", "points"] = "natural_curvature",
     ends: bool = True,
     sigma: float | None = None,
-    progress: bool | Literal["always"] = False,
+    progress: bool = False,
 ) -> Fit:
     """Fit the rest shape of a rod, without its weight, to a photograph of the sagging rod.
 
@@ -226,7 +226,7 @@ def rest_shape(
         True if the centreline goes from end to end.
     sigma : float, optional [px or m]
         Standard deviation of a coordinate of the centreline. By default estimated from the residuals.
-    progress : bool or "always"
+    progress : bool
         True to show a progress bar on a terminal and in a notebook.
 
     Returns
@@ -256,9 +256,7 @@ def rest_shape(
     return _with_misfit_named(found, target)
 
 
-def _refined(
-    simulation: Simulation, target: Centrelines, rod: Rod | str, found: Fit, progress: bool | Literal["always"]
-) -> Fit:
+def _refined(simulation: Simulation, target: Centrelines, rod: Rod | str, found: Fit, progress: bool) -> Fit:
     """The fit with as many functions as the centreline tells, from that with linear ones on."""
     voronoi = rod_part(simulation, rod).voronoi
     least = _RESOLVED * _extent(target) if target.sigma is None else target.sigma

@@ -40,7 +40,7 @@ def fit(
     conditions: Conditions | None = None,
     tolerance: float | None = None,
     max_iterations: int | None = None,
-    progress: bool | Literal["always"] = True,
+    progress: bool = True,
 ) -> Fit:
     """Fit parameters so that equilibria match targets, frame by frame.
 
@@ -83,7 +83,7 @@ def fit(
         residuals, 2.5e-3.
     max_iterations : int, optional
         Maximum number of iterations per frame. By default 50, or 1000 with "lbfgs" and "source".
-    progress : bool or "always"
+    progress : bool
         True to show a progress bar on a terminal and in a notebook.
 
     Returns

@@ -50,7 +50,7 @@ def fit_motion(
     delay: float = 0.0,
     method: Literal["gauss_newton", "lbfgs"] = "gauss_newton",
     max_iterations: int = 50,
-    progress: bool | Literal["always"] = True,
+    progress: bool = True,
 ) -> Fit:
     """Fit parameters so that a run matches targets in all frames.
 
@@ -79,7 +79,7 @@ def fit_motion(
         drawn nodes.
     max_iterations : int
         Maximum number of iterations.
-    progress : bool or "always"
+    progress : bool
         True to show a progress bar on a terminal and in a notebook.
 
     Returns

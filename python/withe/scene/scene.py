@@ -11,6 +11,7 @@ import numpy.typing as npt
 from withe.batch import Batch
 from withe.common import validation
 from withe.common.attributes import known_attributes, of_a_simulation
+from withe.common.deprecation import renamed
 from withe.common.keywords import keyword_hints
 from withe.parts.applied_loads import AppliedLoads, Bearer
 from withe.parts.directory import Directory
@@ -421,12 +422,13 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
             directory.parts.update({rod.name: rod.without_arcs() for rod in directory.all(RodPart)})
         return Simulation._build(directory, self._gravity.copy(), options)
 
-    def build_batch(self, n: int, *, workers: int | None = None, **options: Any) -> Batch:
+    @renamed(n="count")
+    def build_batch(self, count: int, *, workers: int | None = None, **options: Any) -> Batch:
         """Build a batch of equal simulations that step together, for example for reinforcement learning.
 
         Parameters
         ----------
-        n : int
+        count : int
             Number of simulations.
         workers : int, optional
             Number of threads. By default one per processor.
@@ -440,7 +442,7 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         Raises
         ------
         ValueError
-            See `build`; or n or workers below 1.
+            See `build`; or count or workers below 1.
 
         Examples
         --------
@@ -448,10 +450,10 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         >>> batch.set(arm, youngs_modulus=[0.8e6, 1.0e6, 1.2e6])
         >>> batch.step(10)
         """
-        count = validation.integer(n, "n", 1, 1_000_000)
+        number = validation.integer(count, "count", 1, 1_000_000)
         threads = None if workers is None else validation.integer(workers, "workers", 1, 4096)
         first = self.build(**options)
-        return Batch([first, *(first.copy() for _ in range(count - 1))], threads)
+        return Batch([first, *(first.copy() for _ in range(number - 1))], threads)
 
     @property
     def _bearer(self) -> Bearer:

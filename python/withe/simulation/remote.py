@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from concurrent.futures import as_completed
-from typing import Any, Literal
+from typing import Any
 
 from withe.common.cluster import cluster_executor, require_client
 from withe.common.progress import progress as progress_bar
@@ -25,7 +25,7 @@ def run_on(
     simulations: list[Simulation],
     duration: float,
     errors: str,
-    progress: bool | Literal["always"],
+    progress: bool,
     options: dict[str, Any],
 ) -> list[Record | Exception]:
     """Run each on a worker of the client, and bring back its record and its state.

@@ -31,7 +31,7 @@ def run_many(
     client: Any = None,
     errors: Literal["raise", "return"] = "raise",
     record_every: float | None = None,
-    progress: bool | Literal["always"] = True,
+    progress: bool = True,
     before_step: Callable[[Simulation], object] | None = None,
     until: Callable[[Simulation], object] | None = None,
     record: Mapping[str, Callable[[Simulation], npt.ArrayLike]] | None = None,

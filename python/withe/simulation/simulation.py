@@ -243,7 +243,7 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
         duration: float,
         record_every: float | None = None,
         *,
-        progress: bool | Literal["always"] = True,
+        progress: bool = True,
         before_step: Callable[[Simulation], object] | None = None,
         until: Callable[[Simulation], object] | None = None,
         record: Mapping[str, Callable[[Simulation], npt.ArrayLike]] | None = None,
@@ -261,7 +261,7 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
             Duration of the run.
         record_every : float [s]
             Interval of frames. By default a hundredth of the duration, rounded up to whole time steps.
-        progress : bool or "always"
+        progress : bool
             True to show a progress bar on a terminal and in a notebook.
         before_step : callable
             Controller: called with the simulation once before every time step, not before inner steps.

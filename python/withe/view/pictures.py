@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -115,7 +115,7 @@ def animate(
     color_by: ColorBy = "rod",
     camera: Pinhole | str | npt.ArrayLike | None = None,
     ground: float | None = None,
-    progress: bool | Literal["always"] = True,
+    progress: bool = True,
 ) -> Path:
     """Render the rods as tubes into a film, with planes, spheres and capsules, which move as they did.
 
@@ -131,7 +131,7 @@ def animate(
         Seconds of the simulation shown in one second of film.
     size, color_by, camera, ground
         As in `picture`; the camera stands still and has all frames in view.
-    progress : bool or "always"
+    progress : bool
         Whether to show a progress bar, as in `Simulation.run`.
 
     Returns

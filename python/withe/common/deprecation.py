@@ -1,0 +1,107 @@
+"""Old words of the public API: each works for one version and warns with `DeprecationWarning`, which names the new one.
+
+Old words are translated in this module only: `renamed` for arguments, `old_names` for classes of a module, `old_word`
+for all else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, TypeVar
+
+from withe.common.keywords import keyword_hints
+from withe.common.user_warnings import warn
+
+__all__ = ["old_names", "old_word", "renamed"]
+
+T = TypeVar("T", bound=Callable[..., Any])
+
+
+def old_word(old: str, new: str) -> None:
+    """Warn at the user's line that a word is deprecated.
+
+    Parameters
+    ----------
+    old : str
+        The deprecated word, as the user wrote it.
+    new : str
+        The word to use instead.
+
+    Warns
+    -----
+    DeprecationWarning
+        Always.
+    """
+    warn(f"{old} is deprecated and will be removed in the next version; use {new}", DeprecationWarning, cause=old)
+
+
+def renamed(**words: str) -> Callable[[T], T]:
+    """Accept old keywords of a function, and pass their values on under the new keywords.
+
+    The decorated function also has the hints of `keyword_hints`.
+
+    Parameters
+    ----------
+    **words : str
+        The new keyword of each old one.
+
+    Returns
+    -------
+    callable
+        The decorator. The decorated function raises `TypeError` if a call gives an old and its new keyword together.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> @renamed(floor="friction")
+    ... def laid(*, friction):
+    ...     return friction
+    >>> with warnings.catch_warnings():
+    ...     warnings.simplefilter("ignore", DeprecationWarning)
+    ...     laid(floor=0.4)
+    0.4
+    """
+
+    def decorate(function: T) -> T:
+        hinted = keyword_hints(function)
+
+        @wraps(function)
+        def call(*arguments: Any, **keywords: Any) -> Any:
+            for old in [word for word in words if word in keywords]:
+                new = words[old]
+                if new in keywords:
+                    raise TypeError(f"{function.__name__}() got {old}= and {new}=, which is its new name: give one")
+                old_word(f"{old}= of {function.__name__}()", f"{new}=")
+                keywords[new] = keywords.pop(old)
+            return hinted(*arguments, **keywords)
+
+        return call  # type: ignore[return-value]
+
+    return decorate
+
+
+def old_names(module: str, **classes: type) -> Callable[[str], type]:
+    """Return the ``__getattr__`` of a module some of whose classes have new names.
+
+    Parameters
+    ----------
+    module : str
+        Its full name.
+    **classes : type
+        The class that each old name stands for.
+
+    Returns
+    -------
+    callable
+        Of an old name it returns the class and warns with `DeprecationWarning`; of any other name it raises
+        `AttributeError`.
+    """
+
+    def find(name: str) -> type:
+        if name not in classes:
+            raise AttributeError(f"module {module!r} has no attribute {name!r}")
+        old_word(f"{module}.{name}", f"{module}.{classes[name].__name__}")
+        return classes[name]
+
+    return find
