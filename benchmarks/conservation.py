@@ -207,9 +207,12 @@ def driven(integrator: str, planar: bool, step: float, *, even: bool, seconds: f
     rod = scene.add_rod(start=(0, 0, 0), end=(0.3, 0, 0), nodes=12, radius=5e-3, material=material, normal=(0, 0, 1))
     wall = scene.clamp(rod.start)
     simulation = scene.build(
-        integrator=integrator, time_step=step, planar=planar, adaptive=False, step_tolerance=1e-12,
-        force_tolerance=1e-12,
-    )  # fmt: skip
+        integrator=integrator,
+        time_step=step,
+        planar=planar,
+        adaptive=False,
+        solver=withe.Solver(step_tolerance=1e-12, force_tolerance=1e-12),
+    )
     axis = np.array((0.0, 1.0, 0.0) if planar else (0.36, 0.8, 0.48))
     if even:
         angle = lambda t: 4.0 * t  # noqa: E731

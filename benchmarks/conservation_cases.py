@@ -78,7 +78,7 @@ class Case:
     def build(self, integrator: str, time_step: float, *, tight: bool = False) -> tuple[withe.Simulation, float]:
         """The scene in flight, and its mass [kg]."""
         scene = self._scene()
-        sharp = {"step_tolerance": 1e-13, "force_tolerance": 1e-13} if tight else {}
+        sharp = {"solver": withe.Solver(step_tolerance=1e-13, force_tolerance=1e-13)} if tight else {}
         simulation = scene.build(integrator=integrator, time_step=time_step, planar=self.flat, **sharp)
         r = self._random()
         positions = simulation.positions()
@@ -119,9 +119,12 @@ def spinning_rod(integrator: str, periods: float, steps: int) -> tuple[withe.Sim
     rate = 8.0
     period = 2.0 * np.pi / rate
     simulation = scene.build(
-        integrator=integrator, time_step=periods * period / steps, planar=True, adaptive=False, step_tolerance=1e-13,
-        force_tolerance=1e-13,
-    )  # fmt: skip
+        integrator=integrator,
+        time_step=periods * period / steps,
+        planar=True,
+        adaptive=False,
+        solver=withe.Solver(step_tolerance=1e-13, force_tolerance=1e-13),
+    )
     simulation.set_velocities(rod, np.cross((0.0, rate, 0.0), points) + np.array((0.02, 0.0, -0.01)))
     mass = np.zeros((13, 13))
     for edge, length in enumerate(np.linalg.norm(np.diff(points, axis=0), axis=1)):

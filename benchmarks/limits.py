@@ -18,6 +18,8 @@ from reporting import DATA, bar
 from rods_in_motion import CASES, Case, Motion, centreline, record
 from scipy.interpolate import CubicSpline
 
+import withe
+
 __all__ = ["LIMITS", "load_limits"]
 
 LIMITS = DATA / "limits.npz"
@@ -47,7 +49,15 @@ def _ours(case: Case, level: int) -> np.ndarray:
     edges, fraction = _OURS[case.name]
     step = case.time_step * fraction / 2**level
     return _even(
-        case, record(case, edges * 2**level, case.duration, frames=_FRAMES, time_step=step, step_tolerance=1e-12)
+        case,
+        record(
+            case,
+            edges * 2**level,
+            case.duration,
+            frames=_FRAMES,
+            time_step=step,
+            solver=withe.Solver(step_tolerance=1e-12),
+        ),
     )
 
 

@@ -58,7 +58,7 @@ def _converged(task: Arm, fine: int) -> Arm:
         original = withe.Scene.build
 
         def strictly(scene: withe.Scene, **options: Any) -> withe.Simulation:
-            return original(scene, **(options | {"step_tolerance": 1e-9, "force_tolerance": 1e-8}))
+            return original(scene, **(options | {"solver": withe.Solver(step_tolerance=1e-9, force_tolerance=1e-8)}))
 
         withe.Scene.build = strictly
         try:

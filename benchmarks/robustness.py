@@ -171,7 +171,7 @@ def _static(case: StressCase, verdict: Verdict) -> list[np.ndarray]:
 def _compare(case: StressCase, shapes: list[np.ndarray], verdict: Verdict) -> None:
     """Static and error-controlled results with a finer run; one that takes too long is no judge."""
     if case.method == "static":
-        finer = build(case, step_tolerance=1e-12, force_tolerance=1e-11)
+        finer = build(case, solver=withe.Solver(step_tolerance=1e-12, force_tolerance=1e-11))
     elif case.method == "error-controlled":
         finer = build(case, tolerance=1e-4 * case.length)
     else:

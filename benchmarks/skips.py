@@ -57,7 +57,7 @@ def _simulation(
         scene.add_force(arm.end, (0.0, 0.02, 0.0))
     if prepare is not None:
         prepare(scene, arm)
-    return scene.build(time_step=2e-3, step_tolerance=1e-12, **options)
+    return scene.build(time_step=2e-3, solver=withe.Solver(step_tolerance=1e-12), **options)
 
 
 def _nothing_more(scene: withe.Scene, arm: withe.Rod) -> None:
@@ -129,7 +129,7 @@ def skips(nodes: int) -> list[Skip]:
         Skip(
             "joints, loops",
             "sparse solver",
-            lambda: _simulation(nodes, solver="sparse"),
+            lambda: _simulation(nodes, solver=withe.Solver(linear_solver="sparse")),
             lambda: _simulation(nodes),
         ),
         Skip(
@@ -141,7 +141,7 @@ def skips(nodes: int) -> list[Skip]:
         Skip(
             "unsymmetric terms but with a band",
             "sparse LU",
-            lambda: _simulation(nodes, _follower, solver="sparse"),
+            lambda: _simulation(nodes, _follower, solver=withe.Solver(linear_solver="sparse")),
             lambda: _simulation(nodes, _follower),
         ),
         Skip(
@@ -159,7 +159,7 @@ def skips(nodes: int) -> list[Skip]:
         Skip(
             "contact but with a floor",
             "sparse solver",
-            lambda: _simulation(nodes, _floor, solver="sparse"),
+            lambda: _simulation(nodes, _floor, solver=withe.Solver(linear_solver="sparse")),
             lambda: _simulation(nodes, _floor),
         ),
         Skip(

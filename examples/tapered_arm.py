@@ -61,7 +61,9 @@ def hold(radii: np.ndarray, moment: float, weight: float) -> Held:
     for node in outer(nodes):
         scene.add_force(arm.node(int(node)), (0.0, 0.0, -weight / len(outer(nodes))))
     # Solved to rounding, so that differences tell of derivatives.
-    simulation = scene.build(integrator="static", planar=True, step_tolerance=1e-13, force_tolerance=1e-12)
+    simulation = scene.build(
+        integrator="static", planar=True, solver=withe.Solver(step_tolerance=1e-13, force_tolerance=1e-12)
+    )
     found = simulation.equilibrium()
     return Held(simulation.positions(), found, arm, tendon)
 

@@ -61,7 +61,7 @@ def resting() -> withe.Simulation:
     scene.add_floor(0.0)
     scene.enable_contact(stiffness=2e5, distance_tolerance=2e-3)
     # Solved to rounding, so that differences between runs tell of derivatives.
-    tolerances = {"step_tolerance": 1e-13, "force_tolerance": 1e-12}
+    tolerances = {"solver": withe.Solver(step_tolerance=1e-13, force_tolerance=1e-12)}
     simulation = scene.build(
         integrator="backward_euler", planar=True, time_step=INTERVAL / STEPS, adaptive=False, **tolerances
     )

@@ -43,6 +43,7 @@ from withe.parts.handles import (
     Tendon,
 )
 from withe.parts.materials import Circle, Material, Rectangle, Stiffness, Tube
+from withe.parts.options import Solver
 from withe.recording.record import Record
 from withe.scene.scene import Scene
 from withe.simulation.linearisation import Linearisation
@@ -88,6 +89,7 @@ __all__ = [
     "Scene",
     "Simulation",
     "Snapshot",
+    "Solver",
     "Spring",
     "SqueezedRodWarning",
     "Statistics",

@@ -5,7 +5,7 @@ import numpy as np
 import rods
 import withe
 
-TIGHT = {"step_tolerance": 1e-13, "force_tolerance": 1e-13}
+TIGHT = {"solver": withe.Solver(step_tolerance=1e-13, force_tolerance=1e-13)}
 SOFT = rods.stiffness(stretch=200.0, twist=0.7)
 
 

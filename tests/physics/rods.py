@@ -42,7 +42,10 @@ def weightless() -> withe.Scene:
 
 def sharp(scene: withe.Scene, **more: Any) -> withe.Simulation:
     """A static simulation with tolerances at rounding."""
-    options: dict[str, Any] = {"integrator": "static", "step_tolerance": 1e-12, "force_tolerance": 1e-12} | more
+    options: dict[str, Any] = {
+        "integrator": "static",
+        "solver": withe.Solver(step_tolerance=1e-12, force_tolerance=1e-12),
+    } | more
     return scene.build(**options)
 
 

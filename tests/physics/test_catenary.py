@@ -24,7 +24,7 @@ def hanging(edges, bend, weight=1.0):
         stiffness=rods.stiffness(bend=bend, stretch=1e7),
     )
     left, right = scene.pin(rope.start), scene.pin(rope.end)
-    simulation = scene.build(integrator="static", force_tolerance=1e-11)
+    simulation = scene.build(integrator="static", solver=withe.Solver(force_tolerance=1e-11))
     assert simulation.equilibrium().stable
     return simulation, rope, left, right
 

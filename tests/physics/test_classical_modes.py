@@ -161,7 +161,9 @@ def decay_rate(mode, edges, steps, viscous_time=0.0, drag=0.0):
     scene.pin(beam.end, free=(1, 0, 0))
     scene.add_drag(drag)
     step = 2.0 * np.pi / frequency / steps
-    simulation = scene.build(time_step=step, planar=True, step_tolerance=1e-13, force_tolerance=1e-12)
+    simulation = scene.build(
+        time_step=step, planar=True, solver=withe.Solver(step_tolerance=1e-13, force_tolerance=1e-12)
+    )
     shape = np.sin(mode * np.pi * np.linspace(0.0, 1.0, edges + 1))
     simulation.set_velocities(beam, np.outer(1e-5 * frequency * shape, UP))
     heights = [0.0]

@@ -6,6 +6,7 @@ import pytest
 import rods
 import snap_through
 import theory
+import withe
 from convergence import assert_order, assert_order_at_least, zero_crossing
 
 
@@ -110,7 +111,9 @@ def test_flutter_of_becks_column_grows_in_time_as_fast_as_in_theory():
         scene.clamp(column.start)
         scene.add_force(column.end, (-25.0, 0.0, 0.0), follower=True)
         step = 2.0 * np.pi / frequency / 800
-        simulation = scene.build(time_step=step, planar=True, step_tolerance=1e-13, force_tolerance=1e-12)
+        simulation = scene.build(
+            time_step=step, planar=True, solver=withe.Solver(step_tolerance=1e-13, force_tolerance=1e-12)
+        )
         simulation.equilibrium()
         push = np.zeros((edges + 1, 3))
         push[:, 2] = 1e-9 * np.linspace(0.0, 1.0, edges + 1) ** 2

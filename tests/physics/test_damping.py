@@ -25,7 +25,10 @@ def ringing(edges, steps, viscous_time, direction, integrator="implicit_midpoint
     scene.clamp(arm.start)
     step = 2.0 * np.pi / exact / steps
     simulation = scene.build(
-        integrator=integrator, time_step=step, planar=False, step_tolerance=1e-13, force_tolerance=1e-12
+        integrator=integrator,
+        time_step=step,
+        planar=False,
+        solver=withe.Solver(step_tolerance=1e-13, force_tolerance=1e-12),
     )
     velocities = np.outer(1e-4 * theory.cantilever_mode(np.linspace(0.0, 1.0, edges + 1)), direction)
     simulation.set_velocities(arm, velocities)
@@ -155,7 +158,9 @@ def test_drag_damps_every_mode_alike(mode):
     scene.add_drag(drag)
     period = 1.0 / scene.build(planar=True).linearise().frequencies(mode + 1)[mode]
     step = period / 200.0
-    simulation = scene.build(time_step=step, planar=True, step_tolerance=1e-13, force_tolerance=1e-12)
+    simulation = scene.build(
+        time_step=step, planar=True, solver=withe.Solver(step_tolerance=1e-13, force_tolerance=1e-12)
+    )
     shape = simulation.linearise().modes(mode + 1)[mode]
     simulation.set_velocities(rod, 1e-5 * shape)
     seen = []

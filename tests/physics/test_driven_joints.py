@@ -159,7 +159,7 @@ def two_soft_rods(planar, integrator, step, turn, fresh, **numbers):
     a = scene.add_rod(start=turn @ (-0.2, 0, 0.1), end=(0, 0, 0), nodes=9, **SOFT)
     b = scene.add_rod(start=(0, 0, 0), end=turn @ (0.3, 0, 0), nodes=12, **SOFT)
     joint = scene.join(a.end, b.start, "revolute", axis=turn @ (0, 1, 0), **numbers)
-    tight = {"step_tolerance": 1e-13, "force_tolerance": 1e-12}
+    tight = {"solver": withe.Solver(step_tolerance=1e-13, force_tolerance=1e-12)}
     simulation = scene.build(planar=planar, integrator=integrator, time_step=step, **tight)
     velocities = fresh.normal(size=(20, 3)) * (0.2, 0.0 if planar else 0.2, 0.2)
     simulation.set_velocities(None, velocities @ turn.T)

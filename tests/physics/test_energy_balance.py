@@ -37,8 +37,7 @@ def driven(integrator, step, what, planar=False):
         integrator=integrator,
         time_step=step,
         planar=None if planar else False,
-        step_tolerance=1e-12,
-        force_tolerance=1e-12,
+        solver=withe.Solver(step_tolerance=1e-12, force_tolerance=1e-12),
         adaptive=False,
     )
     if "wall" in what:
@@ -159,7 +158,9 @@ def soft_helix():
 def test_soft_helix_takes_long_steps_and_keeps_its_energy(step):
     """10 s from rest, where the published code gives up at 12 ms. From 35 to 60 ms a step in 900 is cut."""
     scene, _ = soft_helix()
-    simulation = scene.build(integrator="energy_momentum", time_step=step, step_tolerance=1e-12, force_tolerance=1e-12)
+    simulation = scene.build(
+        integrator="energy_momentum", time_step=step, solver=withe.Solver(step_tolerance=1e-12, force_tolerance=1e-12)
+    )
     before = simulation.energy().total
     drift = greatest = 0.0
     for _ in range(round(10.0 / step)):
@@ -328,8 +329,7 @@ def test_a_fine_mesh_closes_the_balance_as_a_coarse_one_does(seed):
         integrator="energy_momentum",
         time_step=draw.uniform(0.03, 0.3) * period,
         planar=seed % 3 == 0,
-        step_tolerance=1e-12,
-        force_tolerance=1e-12,
+        solver=withe.Solver(step_tolerance=1e-12, force_tolerance=1e-12),
     )
     first, moved, worst = balance(simulation), 0.0, 0.0
     for _ in range(6):

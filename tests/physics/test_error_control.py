@@ -49,7 +49,7 @@ def test_a_tolerance_that_the_smallest_step_misses_ends_in_an_error():
     arm = rods.straight(scene, 20)
     scene.clamp(arm.start)
     scene.add_force(arm.end, (0.0, 0.0, 1.0))
-    simulation = scene.build(time_step=0.1, tolerance=1e-6, max_halvings=2)
+    simulation = scene.build(time_step=0.1, tolerance=1e-6, solver=withe.Solver(max_halvings=2))
     with pytest.raises(withe.ConvergenceError, match="misses the tolerance"):
         simulation.step(10)
     simulation = scene.build(time_step=0.1, tolerance=1e-6)
@@ -100,13 +100,13 @@ def test_error_control_has_a_limit_of_work_and_names_remedies():
         simulation.set_natural_curvature(rod, (12.0, 0.0))
         return simulation
 
-    simulation = stiff(max_steps=2000)
+    simulation = stiff(solver=withe.Solver(max_steps=2000))
     with pytest.raises(withe.ConvergenceError, match=r"2000 inner steps .* larger tolerance, .*or a greater max_steps"):
         simulation.step()
     assert simulation.statistics.steps + simulation.statistics.rejected_steps == 2000
     assert simulation.time < 0.5  # where it can be looked at, and continued
-    simulation = stiff(max_steps=10**7)
+    simulation = stiff(solver=withe.Solver(max_steps=10**7))
     simulation.step()
     assert simulation.time == 0.5
     with pytest.raises(ValueError, match="max_steps needs a tolerance"):
-        withe.Scene().build(max_steps=10)
+        withe.Scene().build(solver=withe.Solver(max_steps=10))

@@ -262,7 +262,10 @@ def swaying(integrator, model, step, duration=0.4):
     )
     scene.clamp(arm.start)
     simulation = scene.build(
-        integrator=integrator, time_step=step, adaptive=False, step_tolerance=1e-12, force_tolerance=1e-12
+        integrator=integrator,
+        time_step=step,
+        adaptive=False,
+        solver=withe.Solver(step_tolerance=1e-12, force_tolerance=1e-12),
     )
     simulation.step(round(duration / step))
     energy = simulation.energy()

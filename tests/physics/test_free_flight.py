@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import rods
+import withe
 
 EDGES = 16
 RADIUS = 0.08
@@ -34,8 +35,7 @@ def flight(
         integrator=integrator,
         time_step=step,
         planar=None if planar else False,
-        step_tolerance=1e-13,
-        force_tolerance=1e-13,
+        solver=withe.Solver(step_tolerance=1e-13, force_tolerance=1e-13),
         adaptive=adaptive,
     )
     velocities = np.cross((0.0, spin_rate, 0.0), points) + np.array((0.1, 0.0, 0.2))

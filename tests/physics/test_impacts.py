@@ -79,7 +79,7 @@ def test_a_rod_that_drops_from_within_the_tolerance_of_contact_rises_as_high_as_
 def test_rods_that_meet_keep_their_angular_momentum_in_midpoint_steps(number: int) -> None:
     """Over the momentum that moves at the start, at the distance of the farthest node."""
     impact = draw(number)
-    simulation = impact.build("implicit_midpoint", step_tolerance=1e-13, force_tolerance=1e-13)
+    simulation = impact.build("implicit_midpoint", solver=withe.Solver(step_tolerance=1e-13, force_tolerance=1e-13))
     before = simulation.momentum().angular
     far = np.linalg.norm(simulation.positions(), axis=1).max()
     scale = 2.0 * simulation.energy().kinetic / max(impact.speed, impact.slide) * far

@@ -40,7 +40,10 @@ def robot(turn=None, shift=(0.0, 0.0, 0.0), order=(0, 1, 2), integrator="static"
     scene.pin("leg.end")
     scene.add_force("hand.end", turn @ (0.05, 0.1, -0.1))
     return scene.build(
-        integrator=integrator, time_step=2e-3, planar=False, step_tolerance=tolerance, force_tolerance=tolerance
+        integrator=integrator,
+        time_step=2e-3,
+        planar=False,
+        solver=withe.Solver(step_tolerance=tolerance, force_tolerance=tolerance),
     )
 
 
@@ -114,7 +117,7 @@ def test_micrometre_millimetre_and_metre_scenes_converge_alike(slenderness):
     shapes, iterations = [], []
     for length in SIZES:
         scene, arm = sized(length, slenderness)
-        simulation = scene.build(integrator="static", step_tolerance=1e-12, force_tolerance=1e-12)
+        simulation = scene.build(integrator="static", solver=withe.Solver(step_tolerance=1e-12, force_tolerance=1e-12))
         result = simulation.equilibrium()
         assert result.stable
         shapes.append(simulation.positions(arm) / length)
@@ -130,7 +133,9 @@ def test_micrometre_millimetre_and_metre_scenes_move_alike(integrator):
     for length in SIZES:
         scene, arm = sized(length)
         step = 0.02 * np.sqrt(length / 9.81)
-        simulation = scene.build(integrator=integrator, time_step=step, step_tolerance=1e-12, force_tolerance=1e-12)
+        simulation = scene.build(
+            integrator=integrator, time_step=step, solver=withe.Solver(step_tolerance=1e-12, force_tolerance=1e-12)
+        )
         simulation.step(20)
         shapes.append(simulation.positions(arm) / length)
         iterations.append(simulation.statistics.iterations)

@@ -141,9 +141,12 @@ def test_reactions_of_a_clamp_are_what_momenta_change_by_and_what_does_the_work(
 
     def balances(step):
         simulation = scene.build(
-            integrator=integrator, time_step=step, planar=planar, adaptive=False, step_tolerance=1e-13,
-            force_tolerance=1e-13,
-        )  # fmt: skip
+            integrator=integrator,
+            time_step=step,
+            planar=planar,
+            adaptive=False,
+            solver=withe.Solver(step_tolerance=1e-13, force_tolerance=1e-13),
+        )
         simulation.move(wall, path=pose)
         simulation.step(2)
         errors, scales = np.zeros(2), np.zeros(2)
@@ -184,7 +187,10 @@ def test_wrenches_are_means_over_all_parts_of_a_time_step(integrator, options, s
     scene = rods.weightless()
     rod = rods.straight(scene, 11, stiffness=rods.stiffness(stretch=1e3), normal=(0, 0, 1))
     simulation = scene.build(
-        integrator=integrator, time_step=0.02, step_tolerance=1e-13, force_tolerance=1e-13, **options
+        integrator=integrator,
+        time_step=0.02,
+        solver=withe.Solver(step_tolerance=1e-13, force_tolerance=1e-13),
+        **options,
     )
     hand = simulation.grasp(rod, 0.2, 0.2, stiffness=stiffness)
     turn = rods.rotation((1.0, 2.0, -1.0), 0.5) if stiffness else None  # what is turned itself has moments of 2nd order

@@ -21,7 +21,7 @@ def muscle(integrator, planar, *, held=True, mass=0.0, **build):
         scene.clamp(rod.end)
     if mass:
         scene.add_mass(rod.end, mass)
-    options = {"time_step": 5e-4, "step_tolerance": 1e-12, "force_tolerance": 1e-12} | build
+    options = {"time_step": 5e-4, "solver": withe.Solver(step_tolerance=1e-12, force_tolerance=1e-12)} | build
     return scene.build(integrator=integrator, planar=planar, **options), rod, np.array(direction)
 
 
@@ -60,7 +60,9 @@ def test_a_muscle_lifts_a_weight_by_its_strain_and_does_the_work_of_it():
     rod = rods.straight(scene, 8, (0, 0, -1.0), stiffness=rods.stiffness(stretch=EA), radius=0.02)
     scene.clamp(rod.start)
     scene.add_force(rod.end, (0, 0, -2.0))
-    simulation = scene.build(integrator="static", time_step=0.1, step_tolerance=1e-12, force_tolerance=1e-12)
+    simulation = scene.build(
+        integrator="static", time_step=0.1, solver=withe.Solver(step_tolerance=1e-12, force_tolerance=1e-12)
+    )
     simulation.equilibrium()
     before, height = simulation.energy(), simulation.positions(rod)[-1, 2]
     simulation.set_natural_stretch(rod, 0.8, over=1.0)
@@ -94,7 +96,9 @@ def test_a_step_in_which_edges_turn_far_keeps_its_energy_at_another_natural_leng
     # A rod that spins while it is 20 % longer by nature than drawn.
     scene = rods.weightless()
     rod = rods.straight(scene, 8, stiffness=rods.stiffness(stretch=1e3), radius=0.02)
-    simulation = scene.build(time_step=0.05, planar=False, step_tolerance=1e-13, force_tolerance=1e-12)
+    simulation = scene.build(
+        time_step=0.05, planar=False, solver=withe.Solver(step_tolerance=1e-13, force_tolerance=1e-12)
+    )
     simulation.set(rod, natural_stretch=1.2)
     start = np.linspace(0.0, 1.0, 9)[:, None] * np.array([1.0, 0.0, 0.0])
     simulation.set_state(rod, positions=1.2 * start, velocities=np.cross((0.0, 3.0, 0.5), start - [0.5, 0, 0]))

@@ -10,7 +10,7 @@ import rods
 import withe
 from convergence import assert_order
 
-TIGHT = {"step_tolerance": 1e-13, "force_tolerance": 1e-13}
+TIGHT = {"solver": withe.Solver(step_tolerance=1e-13, force_tolerance=1e-13)}
 
 
 def balance(simulation):

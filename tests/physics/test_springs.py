@@ -21,7 +21,11 @@ def two_masses(integrator, step, damping=0.0, speed=1e-3, stretch=1e7, **more):
     left = scene.add_rod(start=(-0.2, 0, 0), end=(-0.1, 0, 0), **parts)
     right = scene.add_rod(start=(0.2, 0, 0), end=(0.3, 0, 0), **parts)
     spring = scene.add_spring(left.end, right.start, stiffness=STIFFNESS, damping=damping)
-    options = {"planar": False, "step_tolerance": 1e-14, "force_tolerance": 1e-13, "adaptive": False} | more
+    options = {
+        "planar": False,
+        "solver": withe.Solver(step_tolerance=1e-14, force_tolerance=1e-13),
+        "adaptive": False,
+    } | more
     simulation = scene.build(integrator=integrator, time_step=step, **options)
     simulation.set_velocities(left, [(-speed, 0, 0)] * 2)
     simulation.set_velocities(right, [(speed, 0, 0)] * 2)
@@ -94,7 +98,10 @@ def tumbling(integrator, damping=0.0, step=4e-3, planar=False, turn=None, lift=F
     scene.add_spring(a.node(4), b.node(4), stiffness=20.0, damping=damping, name="lengthless", rest_length=0.0)
     options = {"planar": None if planar and not lift else False, "adaptive": False} | more
     simulation = scene.build(
-        integrator=integrator, time_step=step, step_tolerance=1e-13, force_tolerance=1e-13, **options
+        integrator=integrator,
+        time_step=step,
+        solver=withe.Solver(step_tolerance=1e-13, force_tolerance=1e-13),
+        **options,
     )
     spin = (0.0, 0.0, 3.0) if planar else (1.0, -2.0, 3.0)
     for rod, sign in ((a, 1.0), (b, -1.0)):

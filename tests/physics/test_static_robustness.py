@@ -134,7 +134,9 @@ def test_drawn_cables_that_are_pulled_over_a_rough_floor_find_equilibria_all_the
     scene.enable_contact(rods=False)
     scene.pin(cable.end, free=(0.0, 0.0, 1.0), name="hand")
     # The residuals that Newton's method leaves at 400 nodes add up.
-    simulation = scene.build(integrator="static", time_step=0.1, planar=False, step_tolerance=1e-11)
+    simulation = scene.build(
+        integrator="static", time_step=0.1, planar=False, solver=withe.Solver(step_tolerance=1e-11)
+    )
     simulation.set_natural_curvature(cable, (0.0, 0.0), over=1.0)
     way = random.normal(size=2)
     way *= random.uniform(0.005, 0.05) / np.linalg.norm(way)

@@ -48,7 +48,10 @@ def test_a_support_that_moves_books_its_work_to_the_last_digit(planar):
     )
     hand = scene.pin(bar.start)
     simulation = scene.build(
-        time_step=2e-3, integrator="energy_momentum", planar=planar, step_tolerance=1e-12, force_tolerance=1e-12
+        time_step=2e-3,
+        integrator="energy_momentum",
+        planar=planar,
+        solver=withe.Solver(step_tolerance=1e-12, force_tolerance=1e-12),
     )
     simulation.move(hand, path=lambda t: (0.1 * np.sin(9.0 * t) ** 2, 0.0, 0.05 * np.sin(7.0 * t) ** 2))
     first = simulation.energy()

@@ -274,7 +274,7 @@ def flying(planar, integrator, step, turn, fresh, **options):
         scene.add_tendon(rod, offset=(OFFSET, across), tension=TENSION),
         scene.add_tendon(guides, offset=(-OFFSET, 0.5 * across), tension=0.3 * TENSION),
     ]
-    tight = {"step_tolerance": 1e-13, "force_tolerance": 1e-12} if integrator != "verlet" else {}
+    tight = {"solver": withe.Solver(step_tolerance=1e-13, force_tolerance=1e-12)} if integrator != "verlet" else {}
     simulation = scene.build(planar=planar, integrator=integrator, time_step=step, **tight, **options)
     velocities = fresh.normal(size=(12, 3)) * (0.2, 0.0 if planar else 0.2, 0.2)
     simulation.set_velocities(None, velocities @ turn.T)
@@ -322,7 +322,7 @@ def test_momentum_is_kept_and_work_booked_where_tendons_end_at_joints(kind, plan
         scene.add_tendon(a, offset=offset, tension=0.5)
         scene.add_tendon([a.edge(-2), a.end, b.edge(0), b.edge(2), b.end], offset=offset, tension=0.4)
         scene.add_tendon([b.end, b.edge(1), b.start], offset=(0.002 * across, -OFFSET), tension=0.3)
-        tight = {"step_tolerance": 1e-13, "force_tolerance": 1e-12}
+        tight = {"solver": withe.Solver(step_tolerance=1e-13, force_tolerance=1e-12)}
         simulation = scene.build(planar=planar, integrator=integrator, time_step=3e-4, **tight)
         simulation.set_velocities(None, fresh.normal(size=simulation.positions().shape) * (0.2, 0.2 * across, 0.2))
         before, start = simulation.momentum(), simulation.energy().total

@@ -25,8 +25,7 @@ def waving(integrator, step, planar, edges=6):
         time_step=step,
         planar=None if planar else False,
         adaptive=False,
-        step_tolerance=1e-12,
-        force_tolerance=1e-12,
+        solver=withe.Solver(step_tolerance=1e-12, force_tolerance=1e-12),
     )
     velocities = np.zeros((edges + 1, 3))
     velocities[:, 2] = 0.3 * np.linspace(0.0, 1.0, edges + 1) ** 2
@@ -96,8 +95,7 @@ def driven(integrator, step, planar):
         time_step=step,
         planar=None if planar else False,
         adaptive=False,
-        step_tolerance=1e-12,
-        force_tolerance=1e-12,
+        solver=withe.Solver(step_tolerance=1e-12, force_tolerance=1e-12),
     )
     axis = (0.0, 1.0, 0.0) if planar else (0.4, 1.0, 0.2)
     simulation.move(
@@ -131,7 +129,10 @@ def test_fourth_order_steps_can_be_taken_back():
     )
     scene.clamp(arm.start)
     simulation = scene.build(
-        integrator="fourth_order", time_step=0.02, adaptive=False, step_tolerance=1e-13, force_tolerance=1e-13
+        integrator="fourth_order",
+        time_step=0.02,
+        adaptive=False,
+        solver=withe.Solver(step_tolerance=1e-13, force_tolerance=1e-13),
     )
     start = simulation.positions(arm)
     simulation.step(20)
@@ -151,7 +152,9 @@ def test_phase_error_of_fourth_order_is_that_of_five_midpoint_steps():
         arm = rods.straight(scene, 30)
         scene.clamp(arm.start)
         dt = 2.0 * np.pi / exact / steps
-        simulation = scene.build(integrator="fourth_order", time_step=dt, step_tolerance=1e-12, force_tolerance=1e-12)
+        simulation = scene.build(
+            integrator="fourth_order", time_step=dt, solver=withe.Solver(step_tolerance=1e-12, force_tolerance=1e-12)
+        )
         velocities = np.zeros((31, 3))
         velocities[:, 2] = 1e-4 * theory.cantilever_mode(np.linspace(0.0, 1.0, 31))
         simulation.set_velocities(arm, velocities)
@@ -172,7 +175,9 @@ def test_period_of_a_cantilever_is_theorys_and_the_midpoint_rule_stretches_it_at
         scene = rods.weightless()
         arm = rods.straight(scene, 50)
         scene.clamp(arm.start)
-        simulation = scene.build(time_step=2.0 * np.pi / exact / steps, step_tolerance=1e-12, force_tolerance=1e-12)
+        simulation = scene.build(
+            time_step=2.0 * np.pi / exact / steps, solver=withe.Solver(step_tolerance=1e-12, force_tolerance=1e-12)
+        )
         velocities = np.zeros((51, 3))
         velocities[:, 2] = 1e-4 * theory.cantilever_mode(np.linspace(0.0, 1.0, 51))
         simulation.set_velocities(arm, velocities)

@@ -95,7 +95,10 @@ def test_rest_and_uniform_motion_differ_by_the_motion_alone(integrator, kind):
             support = hold(scene, rod, kind, length)
             scene.add_floor(height=-radius - level)
             simulation = scene.build(
-                time_step=1e-3, integrator=integrator, planar=False, step_tolerance=1e-12, force_tolerance=1e-12
+                time_step=1e-3,
+                integrator=integrator,
+                planar=False,
+                solver=withe.Solver(step_tolerance=1e-12, force_tolerance=1e-12),
             )
             start = simulation.pose(support).position.copy()
             velocity = own + added

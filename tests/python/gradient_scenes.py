@@ -6,7 +6,7 @@ import numpy as np
 
 import withe
 
-TIGHT = {"step_tolerance": 1e-13, "force_tolerance": 1e-12}
+TIGHT = {"solver": withe.Solver(step_tolerance=1e-13, force_tolerance=1e-12)}
 NODES = 11
 
 

@@ -203,7 +203,7 @@ def build(world, data):
         "time_step": data.draw(st.sampled_from([1e-3, 1e-2, 1e-3])) * (1e-3 if integrator == "verlet" else 1.0),
         "planar": data.draw(st.sampled_from([None, None, True, False])),
         "adaptive": data.draw(st.booleans()),
-        "max_halvings": 4,
+        "solver": withe.Solver(max_halvings=4),
     }
     if data.draw(st.integers(0, 4)) == 0:
         options |= {"time_step": data.draw(positive), "tolerance": data.draw(positive)}

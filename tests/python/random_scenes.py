@@ -178,7 +178,7 @@ def draw_scene(number: int):
     }
     if integrator not in ("static", "verlet"):
         options["adaptive"] = r.random() < 0.85
-        options["max_halvings"] = r.choice([6, 2])  # or a step without solution takes long to fail
+        options["solver"] = withe.Solver(max_halvings=r.choice([6, 2]))  # or a step without solution takes long to fail
         if r.random() < 0.15:
             options["tolerance"] = r.choice([1e-3, 1e-4])
     return scene, options

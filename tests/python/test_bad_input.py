@@ -212,8 +212,11 @@ SCENES = [
     (lambda s, a, b: s.build(integrator="static", tolerance=1), "tolerance must be None with integrator='static'"),
     (lambda s, a, b: s.build(adaptive=0), "adaptive must be True or False, got 0"),
     (lambda s, a, b: s.build(planar="yes"), "planar must be True or False, got 'yes'"),
-    (lambda s, a, b: s.build(max_iterations=0), "max_iterations must lie in 1..10000, got 0"),
-    (lambda s, a, b: s.build(solver="umfpack"), "solver must be 'automatic' or 'band' or 'sparse'"),
+    (lambda s, a, b: s.build(solver=withe.Solver(max_iterations=0)), "max_iterations must lie in 1..10000, got 0"),
+    (
+        lambda s, a, b: s.build(solver=withe.Solver(linear_solver="umfpack")),
+        "linear_solver must be 'automatic' or 'band' or 'sparse'",
+    ),
     (lambda s, a, b: s.build(planar=True), "planar=True, but"),
     (lambda s, a, b: s.build(integrator="verlet", time_step=1.0), "time_step must not exceed the stable step"),
     (lambda s, a, b: withe.Scene().build(), "the scene must have at least one rod"),

@@ -164,8 +164,8 @@ def folded() -> np.ndarray:
 
 
 def test_one_that_fails_stays_where_it_was_and_holds_up_nobody():
-    batch = arms(adaptive=False, max_iterations=6)
-    singles = lone(adaptive=False, max_iterations=6)
+    batch = arms(adaptive=False, solver=withe.Solver(max_iterations=6))
+    singles = lone(adaptive=False, solver=withe.Solver(max_iterations=6))
     batch.step(3)
     before = batch.snapshot([1])
     batch.set_natural_curvature("arm", [folded()], lanes=[1])
@@ -213,7 +213,7 @@ def test_snapshots_of_which_one_does_not_fit_change_no_simulation():
 
 @pytest.mark.parametrize("way", ["snapshot", "record", "reset"])
 def test_one_that_failed_goes_on_when_it_is_restored_by_itself(way):
-    batch = arms(adaptive=False, max_iterations=6)
+    batch = arms(adaptive=False, solver=withe.Solver(max_iterations=6))
     batch.step(3)
     before, record = batch[1].snapshot(), batch[1].copy().run(duration=0.005, progress=False)
     for _ in range(2):

@@ -117,3 +117,56 @@ def test_a_type_error_within_a_renamed_function_passes_through():
 
     with pytest.raises(TypeError, match="has no len"):
         fails(new=3)
+
+
+OLD_OPTIONS = [
+    ("mixed", False),
+    ("step_tolerance", 1e-6),
+    ("force_tolerance", 1e-5),
+    ("max_iterations", 7),
+    ("max_halvings", 3),
+]
+
+
+@pytest.mark.parametrize(("word", "value"), OLD_OPTIONS)
+def test_options_of_the_solver_are_fields_of_one_value(word, value):
+    old = warned(lambda: scene_of_an_arm().build(**{word: value}), f"solver=withe.Solver({word}={value!r})")
+    new = scene_of_an_arm().build(solver=withe.Solver(**{word: value}))
+    for simulation in (old, new):
+        simulation.step(5)
+    assert np.array_equal(old.positions("arm"), new.positions("arm"))
+    assert old._session.options == new._session.options != scene_of_an_arm().build()._session.options
+
+
+def test_solver_as_a_word_is_its_linear_solver():
+    new = "solver=withe.Solver(linear_solver='sparse', max_halvings=3)"
+    old = warned(lambda: scene_of_an_arm().build(solver="sparse", max_halvings=3), new)
+    assert "sparse" in old.plan.solver
+    assert "band" in scene_of_an_arm().build(solver=withe.Solver(linear_solver="band")).plan.solver
+
+
+def test_options_of_the_solver_pass_through_batches():
+    old = warned(
+        lambda: scene_of_an_arm().build_batch(2, max_steps=10, tolerance=1e-3), "solver=withe.Solver(max_steps=10)"
+    )
+    new = scene_of_an_arm().build_batch(2, solver=withe.Solver(max_steps=10), tolerance=1e-3)
+    assert old[1]._session.options == new[1]._session.options
+
+
+def test_a_solver_beside_one_of_its_fields_is_refused():
+    with pytest.raises(
+        TypeError, match=r"build\(\) got mixed= and solver=, of which they are fields: give solver= only"
+    ):
+        scene_of_an_arm().build(mixed=False, solver=withe.Solver())
+
+
+def test_a_solver_is_a_value_that_is_checked():
+    assert withe.Solver(max_iterations=7) == withe.Solver(max_iterations=7) != withe.Solver()
+    with pytest.raises(ValueError, match=r"max_iterations must lie in 1\.\.10000, got 0"):
+        withe.Solver(max_iterations=0)
+    with pytest.raises(ValueError, match=r"solver must be a withe\.Solver, got dict"):
+        scene_of_an_arm().build(solver={})
+    with pytest.raises(TypeError, match=r"build\(\) has no keyword 'rtol'"):
+        scene_of_an_arm().build(rtol=1e-9)
+    with pytest.raises(TypeError, match=r"build\(\) has no keyword 'max_iter'; did you mean solver="):
+        scene_of_an_arm().build(max_iter=9)

@@ -165,7 +165,7 @@ def test_a_batch_drives_each_of_its_joints():
 
 @pytest.mark.parametrize("planar", [True, False])
 def test_gradients_by_what_was_set_while_a_run_went_are_those_of_differences(planar):
-    tight = {"step_tolerance": 1e-13, "force_tolerance": 1e-12}
+    tight = {"solver": withe.Solver(step_tolerance=1e-13, force_tolerance=1e-12)}
     simulation = running(planar=planar, **tight)
     start, given = simulation.snapshot(), {"rest_angle": 0.9, "moment": -4e-3}
     weight = np.random.default_rng(3).normal(size=(2, *simulation.positions().shape)) * (1, 0, 1)

@@ -252,7 +252,7 @@ class Brittle(Touch):
         rubber = withe.Material(youngs_modulus=1e6, density=1000.0, viscosity=self.viscosity)
         arm = scene.add_rod(start=(0, 0, 0), end=(0, 0, 0.3), nodes=9, radius=1e-2, material=rubber, name="arm")
         scene.clamp(arm.start)
-        return scene.build(time_step=0.02, adaptive=False, max_iterations=6)
+        return scene.build(time_step=0.02, adaptive=False, solver=withe.Solver(max_iterations=6))
 
     def act(self, robots, actions, chosen):
         zigzag = np.where(np.arange(7) % 2, 55.0, -55.0)[:, None] * np.ones(2)

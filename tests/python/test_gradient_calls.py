@@ -352,7 +352,10 @@ def test_gradient_by_a_natural_shape_that_was_on_its_way_as_the_run_began_is_by_
 
     def run(start, twice, **options):
         simulation = scene.build(
-            integrator=integrator, time_step=STEP, planar=False, step_tolerance=1e-12, force_tolerance=1e-12
+            integrator=integrator,
+            time_step=STEP,
+            planar=False,
+            solver=withe.Solver(step_tolerance=1e-12, force_tolerance=1e-12),
         )
         simulation.set(arm, **{word: start})
         getattr(simulation, f"set_{word}")(arm, goal, over=over)

@@ -5,7 +5,7 @@ import pytest
 
 import withe
 
-TIGHT = {"force_tolerance": 1e-11, "step_tolerance": 1e-11}
+TIGHT = {"solver": withe.Solver(force_tolerance=1e-11, step_tolerance=1e-11)}
 
 
 def drawn(seed, planar, joint):

@@ -438,7 +438,7 @@ def test_gradients_of_a_planar_equilibrium_know_what_leads_out_of_its_plane(word
     arm = scene.add_rod(start=(0, 0, 0), end=(0.1, 0, 0), nodes=11, section=section, normal=(0, 1, 0), material=rubber)
     wall = scene.clamp(arm.start)
     tip = scene.add_force(arm.end, (0.0, 0.0, -1e-3))
-    options = {"step_tolerance": 1e-13, "force_tolerance": 1e-13}
+    options = {"solver": withe.Solver(step_tolerance=1e-13, force_tolerance=1e-13)}
     simulation = scene.build(integrator="static", **options)
     found = simulation.equilibrium()
     whose = wall if word.startswith("reaction") else arm

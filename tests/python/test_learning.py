@@ -8,7 +8,7 @@ import pytest
 
 import withe
 
-TIGHT = {"step_tolerance": 1e-13, "force_tolerance": 1e-12}
+TIGHT = {"solver": withe.Solver(step_tolerance=1e-13, force_tolerance=1e-12)}
 NODES = 7
 
 

@@ -198,7 +198,9 @@ def test_friction_of_a_ring_is_set_while_it_runs():
     rod = scene.add_rod(start=(0, 0, 0), end=(0.4, 0, 0.1), nodes=21, radius=4e-3, material=rubber, name="rod")
     scene.grasp(rod, 0.1, slides=True)
     ring = scene.grasp(rod, 0.25, slides=True, friction=2.0, name="eye")
-    simulation = scene.build(integrator="energy_momentum", time_step=1e-3, step_tolerance=1e-13, force_tolerance=1e-13)
+    simulation = scene.build(
+        integrator="energy_momentum", time_step=1e-3, solver=withe.Solver(step_tolerance=1e-13, force_tolerance=1e-13)
+    )
 
     def balance():
         e = simulation.energy()
@@ -212,7 +214,11 @@ def test_friction_of_a_ring_is_set_while_it_runs():
         at = simulation.passage(ring).at
         copy, fresh = (
             simulation.copy(),
-            scene.build(integrator="energy_momentum", time_step=1e-3, step_tolerance=1e-13, force_tolerance=1e-13),
+            scene.build(
+                integrator="energy_momentum",
+                time_step=1e-3,
+                solver=withe.Solver(step_tolerance=1e-13, force_tolerance=1e-13),
+            ),
         )
         fresh.restore(simulation.snapshot())
         simulation.step(40)

@@ -228,15 +228,15 @@ def test_convergence_errors_pickle():
     ("build", "hint"),
     [
         (
-            {"max_iterations": 1, "max_halvings": 0},
+            {"solver": withe.Solver(max_iterations=1, max_halvings=0)},
             "Try a smaller time_step, viscosity of the material, or integrator=",
         ),
-        ({"max_iterations": 1, "adaptive": False}, "Try adaptive=True, or a smaller time_step"),
+        ({"solver": withe.Solver(max_iterations=1), "adaptive": False}, "Try adaptive=True, or a smaller time_step"),
         (
-            {"max_iterations": 1, "max_halvings": 0, "integrator": "backward_euler"},
+            {"solver": withe.Solver(max_iterations=1, max_halvings=0), "integrator": "backward_euler"},
             "Try a smaller time_step, or more max_halvings",
         ),
-        ({"tolerance": 1e-13, "max_halvings": 1}, "Try a larger tolerance, or more max_halvings"),
+        ({"tolerance": 1e-13, "solver": withe.Solver(max_halvings=1)}, "Try a larger tolerance, or more max_halvings"),
     ],
 )
 def test_a_step_that_fails_ends_with_what_to_try(build, hint):
@@ -253,7 +253,7 @@ def test_rods_of_unlike_stiffness_are_named_where_a_step_fails():
     stiff = scene.add_rod(start=(0.2, 0, 0), end=(0.3, 0, 0), nodes=6, radius=5e-3, material=steel, name="stiff")
     scene.clamp(soft.start)
     scene.join(soft.end, stiff.start)
-    simulation = scene.build(max_iterations=1, max_halvings=0)
+    simulation = scene.build(solver=withe.Solver(max_iterations=1, max_halvings=0))
     with pytest.raises(
         withe.ConvergenceError, match=r"Try more similar stiffnesses: .* rods 'soft' and 'stiff' differ by 2e\+07 times"
     ):
@@ -266,8 +266,11 @@ def test_rods_of_unlike_stiffness_are_named_where_a_step_fails():
 @pytest.mark.parametrize(
     ("build", "message"),
     [
-        ({"step_tolerance": 1.0}, "step_tolerance must not exceed the shortest edge over the longest rod, 0.1, got 1"),
-        ({"force_tolerance": 1.0}, "force_tolerance must be less than 1, got 1"),
+        (
+            {"solver": withe.Solver(step_tolerance=1.0)},
+            "step_tolerance must not exceed the shortest edge over the longest rod, 0.1, got 1",
+        ),
+        ({"solver": withe.Solver(force_tolerance=1.0)}, "force_tolerance must be less than 1, got 1"),
         ({"tolerance": 0.3}, "tolerance must not exceed the length of the longest rod, 0.2 m, got 0.3 m"),
     ],
 )

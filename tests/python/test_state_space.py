@@ -6,7 +6,7 @@ from scipy.sparse import issparse
 
 import withe
 
-TIGHT = {"step_tolerance": 1e-13, "force_tolerance": 1e-12}
+TIGHT = {"solver": withe.Solver(step_tolerance=1e-13, force_tolerance=1e-12)}
 NODES = 9
 
 

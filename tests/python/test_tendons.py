@@ -186,7 +186,9 @@ def test_records_keep_tendons_and_draw_them(tmp_path):
 @pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum", "backward_euler"])
 def test_gradients_by_tensions_that_are_set_while_it_runs(integrator):
     scene, _, tendon = arm(build=False)
-    simulation = scene.build(time_step=2e-3, integrator=integrator, step_tolerance=1e-13, force_tolerance=1e-12)
+    simulation = scene.build(
+        time_step=2e-3, integrator=integrator, solver=withe.Solver(step_tolerance=1e-13, force_tolerance=1e-12)
+    )
 
     def run(pull, **options):
         simulation.reset()

@@ -1,7 +1,7 @@
 """Old words of the public API: each works for one version and warns with `DeprecationWarning`, which names the new one.
 
-Old words are translated in this module only: `renamed` for arguments, `old_names` for classes of a module, `old_word`
-for all else.
+Old words are translated in this module only: `renamed` for arguments, `moved_into` for arguments that became fields of
+one value, `old_names` for classes of a module, `old_word` for all else.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 from withe.common.keywords import keyword_hints
 from withe.common.user_warnings import warn
 
-__all__ = ["old_names", "old_word", "renamed"]
+__all__ = ["moved_into", "old_names", "old_word", "renamed"]
 
 T = TypeVar("T", bound=Callable[..., Any])
 
@@ -74,6 +74,61 @@ def renamed(**words: str) -> Callable[[T], T]:
                     raise TypeError(f"{function.__name__}() got {old}= and {new}=, which is its new name: give one")
                 old_word(f"{old}= of {function.__name__}()", f"{new}=")
                 keywords[new] = keywords.pop(old)
+            return hinted(*arguments, **keywords)
+
+        return call  # type: ignore[return-value]
+
+    return decorate
+
+
+def moved_into(word: str, kind: type, **fields: str) -> Callable[[T], T]:
+    """Accept old keywords of a function, and pass their values on as fields of one value.
+
+    The decorated function also has the hints of `keyword_hints`.
+
+    Parameters
+    ----------
+    word : str
+        The new keyword.
+    kind : type
+        Class of its value, whose arguments are keywords.
+    **fields : str
+        The field of `kind` for each old keyword. If `word` is among the old keywords, its old values are strings.
+
+    Returns
+    -------
+    callable
+        The decorator. The decorated function raises `TypeError` if a call gives an old keyword and a value of `kind`.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> from withe import Solver
+    >>> @moved_into("solver", Solver, max_iterations="max_iterations")
+    ... def built(*, solver):
+    ...     return solver.max_iterations
+    >>> with warnings.catch_warnings():
+    ...     warnings.simplefilter("ignore", DeprecationWarning)
+    ...     built(max_iterations=7)
+    7
+    """
+
+    def decorate(function: T) -> T:
+        hinted = keyword_hints(function)
+
+        @wraps(function)
+        def call(*arguments: Any, **keywords: Any) -> Any:
+            old = [each for each in fields if each in keywords and (each != word or isinstance(keywords[each], str))]
+            if old:
+                shown = ", ".join(f"{each}=" for each in old)
+                values = {fields[each]: keywords.pop(each) for each in old}
+                if word in keywords:
+                    raise TypeError(
+                        f"{function.__name__}() got {shown} and {word}=, of which they are fields: give {word}= only"
+                    )
+                new = ", ".join(f"{name}={value!r}" for name, value in values.items())
+                old_word(f"{shown} of {function.__name__}()", f"{word}=withe.{kind.__name__}({new})")
+                keywords[word] = kind(**values)
             return hinted(*arguments, **keywords)
 
         return call  # type: ignore[return-value]

@@ -92,8 +92,8 @@ def plunge(
     to the side it goes, within what time, and whether the edge ends level or as the plan has it, is tried on simulated
     sheets without noise, those of `FoldPlan.papers`: aimed so that the paper as it is thought to be is folded right, it
     is the way on which the worst of them is best, by how far its crease is off and by half of how far it slides, of
-    those that fold all of them. Jaws that hold sheets at the bounds are off by 0.5 mm to either side: an edge that comes down
-    on the last of a sheet must not miss it.
+    those that fold all of them. Jaws that hold sheets at the bounds are off by 0.5 mm to either side: an edge that
+    comes down on the last of a sheet must not miss it.
 
     Parameters
     ----------

@@ -16,6 +16,7 @@ from withe.batch import Batch
 from withe.learning.task import IntArray, Task
 from withe.parts.kinds import ObstaclePart
 from withe.parts.materials import Material
+from withe.parts.options import Solver
 from withe.scene.scene import Scene
 from withe.simulation.simulation import Simulation
 
@@ -89,8 +90,8 @@ class Arm(Task):
             integrator="energy_momentum",
             time_step=self.time_step,
             planar=self.planar,
-            step_tolerance=1e-4,  # 0.1 mm: 1 % of what the steps' length costs, for a fifth of the work less
-            force_tolerance=1e-3,
+            # A step tolerance of 0.1 mm: 1 % of what the steps' length costs, for a fifth of the work less.
+            solver=Solver(step_tolerance=1e-4, force_tolerance=1e-3),
         )
         built._session.longest_meant = self.longest_meant
         return built

@@ -2,17 +2,79 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 from withe import _core
 from withe.common import validation
+from withe.common.keywords import keyword_hints
 
 __all__ = ["Bending", "BuildOptions", "Integrator", "Solver", "check_tolerances"]
 
 Integrator = Literal["implicit_midpoint", "backward_euler", "energy_momentum", "fourth_order", "verlet", "static"]
-Solver = Literal["automatic", "band", "sparse"]
+LinearSolver = Literal["automatic", "band", "sparse"]
 Bending = Literal["angle", "tangent"]
+
+
+@keyword_hints
+@dataclass(frozen=True, kw_only=True)
+class Solver:
+    """Options of Newton's method, of its linear equations and of the subdivision of steps.
+
+    The defaults suit almost every scene. `Scene.build` takes a `Solver` as `solver=`.
+
+    Parameters
+    ----------
+    linear_solver : {"automatic", "band", "sparse"}
+        Solver of the linear equations.
+    mixed : bool
+        True to solve for axial forces as separate unknowns in Newton's method.
+    step_tolerance : float
+        Bound on the last Newton step, relative to the length of the scene.
+    force_tolerance : float
+        Bound on the residual, relative to the forces in the scene.
+    max_iterations : int
+        Maximum number of iterations of one Newton solve.
+    max_halvings : int
+        Bound on subdivision: the smallest step is time_step / 2^max_halvings. By default 12, and 20 with a
+        tolerance. If a smaller step is needed, the run raises :class:`withe.ConvergenceError`.
+    max_steps : int
+        Maximum number of inner steps in one time step with a tolerance. By default 3e7 over the number of nodes,
+        about half a minute on one core. More raise :class:`withe.ConvergenceError`.
+
+    Raises
+    ------
+    ValueError
+        An option out of range.
+
+    Examples
+    --------
+    >>> import withe
+    >>> tight = withe.Solver(step_tolerance=1e-12, force_tolerance=1e-12)
+    >>> simulation = scene.build(solver=tight)
+    """
+
+    linear_solver: LinearSolver = "automatic"
+    mixed: bool = True
+    step_tolerance: float = 1e-9
+    force_tolerance: float = 1e-8
+    max_iterations: int = 40
+    max_halvings: int | None = None
+    max_steps: int | None = None
+
+    def __post_init__(self) -> None:
+        validation.choice(self.linear_solver, "linear_solver", get_args(LinearSolver))
+        checked: dict[str, object] = {
+            "mixed": validation.truth(self.mixed, "mixed"),
+            "max_iterations": validation.integer(self.max_iterations, "max_iterations", 1, 10_000),
+        }
+        for name in ("step_tolerance", "force_tolerance"):
+            checked[name] = validation.positive(getattr(self, name), name)
+        for name, low, high in (("max_halvings", 0, 40), ("max_steps", 1, 2**62)):
+            value = getattr(self, name)
+            checked[name] = None if value is None else validation.integer(value, name, low, high)
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
 
 
 @dataclass(frozen=True)
@@ -27,57 +89,44 @@ class BuildOptions:
     duration: float | None
     bending: Bending
     solver: Solver
-    mixed: bool
-    step_tolerance: float
-    force_tolerance: float
-    max_iterations: int
-    max_halvings: int | None
-    max_steps: int | None = None
 
     def checked(self) -> BuildOptions:
-        """The same as plain numbers, with the number of halvings that a tolerance asks for.
+        """Return the same options as plain numbers.
 
         Raises
         ------
         ValueError
             An option out of range, or tolerance with a scheme that takes none.
         """
-        words = {"integrator": Integrator, "solver": Solver, "bending": Bending}
-        for name, literal in words.items():
+        for name, literal in (("integrator", Integrator), ("bending", Bending)):
             validation.choice(getattr(self, name), name, get_args(literal))
+        if not isinstance(self.solver, Solver):
+            raise ValueError(f"solver must be a withe.Solver, got {type(self.solver).__name__}")
         checked = replace(
             self,
             time_step=validation.positive(self.time_step, "time_step"),
-            step_tolerance=validation.positive(self.step_tolerance, "step_tolerance"),
-            force_tolerance=validation.positive(self.force_tolerance, "force_tolerance"),
             tolerance=None if self.tolerance is None else validation.positive(self.tolerance, "tolerance"),
             duration=None if self.duration is None else validation.positive(self.duration, "duration"),
             adaptive=validation.truth(self.adaptive, "adaptive"),
-            mixed=validation.truth(self.mixed, "mixed"),
             planar=None if self.planar is None else validation.truth(self.planar, "planar"),
-            max_iterations=validation.integer(self.max_iterations, "max_iterations", 1, 10_000),
-            max_halvings=self._halvings(),
-            max_steps=None if self.max_steps is None else validation.integer(self.max_steps, "max_steps", 1, 2**62),
         )
         if checked.tolerance is not None and self.integrator in ("verlet", "static"):
             raise ValueError(f"tolerance must be None with integrator={self.integrator!r}")
         if checked.duration is not None and checked.tolerance is None:
-            raise ValueError("duration needs a tolerance: give tolerance= too")
-        if checked.max_steps is not None and checked.tolerance is None:
-            raise ValueError("max_steps needs a tolerance: give tolerance= too")
+            raise ValueError("duration must be given with a tolerance, and only then")
+        if self.solver.max_steps is not None and checked.tolerance is None:
+            raise ValueError("max_steps must be given with a tolerance, and only then")
         return checked
 
-    def _halvings(self) -> int:
-        if self.max_halvings is None:
-            return 12 if self.tolerance is None else 20
-        return validation.integer(self.max_halvings, "max_halvings", 0, 40)
-
     def engine(self) -> _core.Options:
-        """As the engine takes them; what bending is belongs to the description of the scene."""
+        """Return the options of the engine. The measure of bending belongs to the description of the scene."""
+        solver = self.solver
+        values = vars(self) | vars(solver) | {"solver": solver.linear_solver}
+        if solver.max_halvings is None:
+            values["max_halvings"] = 12 if self.tolerance is None else 20
         result = _core.Options()
-        for field in fields(self):
-            if field.name != "bending":
-                setattr(result, field.name, getattr(self, field.name))
+        for name in values.keys() - {"bending", "linear_solver"}:
+            setattr(result, name, values[name])
         return result
 
 
@@ -96,13 +145,13 @@ def check_tolerances(options: BuildOptions, longest: float, shortest: float) -> 
         A step_tolerance or tolerance that an edge or a rod fits into, or a force_tolerance of 1 or more.
     """
     greatest = shortest / longest
-    if options.step_tolerance > greatest:
+    if options.solver.step_tolerance > greatest:
         raise ValueError(
             f"step_tolerance must not exceed the shortest edge over the longest rod, {greatest:.3g}, "
-            f"got {options.step_tolerance:g}"
+            f"got {options.solver.step_tolerance:g}"
         )
-    if options.force_tolerance >= 1.0:
-        raise ValueError(f"force_tolerance must be less than 1, got {options.force_tolerance:g}")
+    if options.solver.force_tolerance >= 1.0:
+        raise ValueError(f"force_tolerance must be less than 1, got {options.solver.force_tolerance:g}")
     if options.tolerance is not None and options.tolerance > longest:
         raise ValueError(
             f"tolerance must not exceed the length of the longest rod, {longest:.3g} m, got {options.tolerance:g} m"

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from withe.batch import Batch
 from withe.common import validation
 from withe.common.attributes import known_attributes, of_a_simulation
-from withe.common.deprecation import renamed
+from withe.common.deprecation import moved_into, renamed
 from withe.common.keywords import keyword_hints
 from withe.parts.applied_loads import AppliedLoads, Bearer
 from withe.parts.directory import Directory
@@ -29,6 +29,8 @@ from withe.simulation.simulation import Simulation
 __all__ = ["Scene"]
 
 FloatArray = npt.NDArray[np.float64]
+_DEFAULT_SOLVER = Solver()
+_IN_SOLVER = ("mixed", "step_tolerance", "force_tolerance", "max_iterations", "max_halvings", "max_steps")
 
 
 @keyword_hints
@@ -318,6 +320,7 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
 
     # Simulations
 
+    @moved_into("solver", Solver, solver="linear_solver", **{word: word for word in _IN_SOLVER})
     def build(
         self,
         *,
@@ -328,13 +331,7 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         planar: bool | None = None,
         duration: float | None = None,
         bending: Bending = "angle",
-        solver: Solver = "automatic",
-        mixed: bool = True,
-        step_tolerance: float = 1e-9,
-        force_tolerance: float = 1e-8,
-        max_iterations: int = 40,
-        max_halvings: int | None = None,
-        max_steps: int | None = None,
+        solver: Solver = _DEFAULT_SOLVER,
     ) -> Simulation:
         """Build a simulation of the scene.
 
@@ -374,22 +371,8 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         bending : {"angle", "tangent"}
             Measure of bending strain: the angle phi between two edges, to sixth order; or 2 tan(phi / 2)
             [Bergou et al. 2008], which is too stiff on coarse meshes and does not model the arcs of edges.
-        solver : {"automatic", "band", "sparse"}
-            Solver of the linear equations.
-        mixed : bool
-            True to solve for axial forces as separate unknowns in Newton's method.
-        step_tolerance : float
-            Bound on the last Newton step, relative to the length of the scene.
-        force_tolerance : float
-            Bound on the residual, relative to the forces in the scene.
-        max_iterations : int
-            Maximum number of iterations of one Newton solve.
-        max_halvings : int
-            Bound on subdivision: the smallest step is time_step / 2^max_halvings. By default 12, and 20 with a
-            tolerance. If a smaller step is needed, the run raises :class:`withe.ConvergenceError`.
-        max_steps : int
-            Maximum number of inner steps in one time step with a tolerance. By default 3e7 over the number of nodes,
-            about half a minute on one core. More raise :class:`withe.ConvergenceError`.
+        solver : withe.Solver
+            Options of Newton's method, of its linear equations and of the subdivision of steps.
 
         Returns
         -------
@@ -410,12 +393,6 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
             duration=duration,
             bending=bending,
             solver=solver,
-            mixed=mixed,
-            step_tolerance=step_tolerance,
-            force_tolerance=force_tolerance,
-            max_iterations=max_iterations,
-            max_halvings=max_halvings,
-            max_steps=max_steps,
         ).checked()
         directory = self._directory.copy()
         if bending == "tangent":
