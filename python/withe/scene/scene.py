@@ -38,6 +38,17 @@ _IN_SOLVER = ("mixed", "step_tolerance", "force_tolerance", "max_iterations", "m
 class Scene(AppliedLoads, Loads, Contacts, Supports):
     """Describe rods, joints, supports and loads, and build simulations from the description.
 
+    Methods and properties by purpose:
+
+    * describe: `add_rod`, `join`, `add_mass`, `add_spring`, `add_tendon`, `gravity`
+    * hold: `clamp`, `pin`, `grasp`
+    * load: `add_force`, `add_moment`, `add_load`, `add_pressure`, `add_drag`, `add_fluid`, `add_custom_force`
+    * touch: `enable_contact`, `add_floor`, `add_plane`, `add_sphere`, `add_capsule`, `set_friction`,
+      `set_restitution`, `set_contact_stiffness`, `ignore_contact`, `set_contact_group`
+    * run: `build`, `build_batch`
+    * read: `rods`, and ``scene["arm"]`` for the handle of a name
+    * differentiate: see `withe.Simulation`, whose equations have derivatives
+
     Parameters
     ----------
     gravity : array_like of shape (3,) [m/s^2]

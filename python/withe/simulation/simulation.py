@@ -52,6 +52,21 @@ _MAX_STEPS = 2**31 - 1
 class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
     """Run a scene. `Scene.build` returns simulations.
 
+    Methods and properties by purpose:
+
+    * describe: `set`, `set_natural_curvature`, `set_natural_twist`, `set_natural_stretch`
+    * hold: `clamp`, `pin`, `grasp`, `release`, `move`, `hand`, `feed`
+    * load: `add_force`, `add_moment`, `add_load`, `add_pressure`, `remove`
+    * touch: `set_friction`, `set_restitution`, `set_contact_stiffness`
+    * run: `step`, `run`, `equilibrium`, `set_state`, `set_velocities`, `snapshot`, `restore`, `reset`, `copy`
+    * read the scene: `time`, `time_step`, `rods`, `get`, `energy`, `momentum`, `statistics`, `plan`, `record`
+    * read rods: `positions`, `velocities`, `directors`, `spins`, `curvatures`, `twists`, `tensions`, `link`
+    * read parts: `reaction`, `pose`, `wrench`, `deflection`, `passage`, `joint_angle`, `joint_rate`, `joint_torque`,
+      `spring_tension`, `tendon_length`, `tendon_points`, `obstacle_position`, `contacts`
+    * read pictures: `plot`, `view`, `picture`
+    * differentiate: `linearise`, `step_jacobian`, `state_difference`, `displace_state`, `check_jacobian`, and
+      `Record.gradient` for a whole run
+
     Arrays that methods return are copies. Rods, nodes, supports and loads are given by handle or by name.
 
     Examples
