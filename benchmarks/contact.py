@@ -54,7 +54,7 @@ def knot(friction: float, law: withe.parts.FrictionModel) -> withe.Simulation:
     """An overhand knot of 301 nodes whose ends are pulled apart at 2 cm/s."""
     scene = withe.Scene(gravity=(0.0, 0.0, 0.0))
     rubber = withe.Material(youngs_modulus=KNOT_MODULUS, poisson_ratio=0.5, density=KNOT_DENSITY)
-    points = withe.shapes.overhand_knot(n=1, **KNOT)
+    points = withe.knots.overhand_knot(n=1, **KNOT)
     rope = scene.add_rod(points=points, nodes=301, radius=KNOT["radius"], material=rubber, natural="straight")
     grips = [scene.clamp(end, hold="edge", spin=True) for end in (rope.start, rope.end)]
     scene.enable_contact(friction=friction, friction_model=law)
@@ -87,7 +87,7 @@ def beside_elastica(report: Report, quick: bool) -> None:
         return
     from elastica_contact import KnotRun, largest_stable_step
 
-    radius, points = KNOT["radius"], withe.shapes.overhand_knot(n=1, **KNOT)
+    radius, points = KNOT["radius"], withe.knots.overhand_knot(n=1, **KNOT)
     run = {
         "points": points,
         "radius": radius,

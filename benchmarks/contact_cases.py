@@ -169,7 +169,7 @@ def _pile(case: ContactCase, scene: withe.Scene) -> Thrown:
 
 def _knot(case: ContactCase, scene: withe.Scene) -> Thrown:
     """A loose overhand knot, its ends in grips."""
-    points = withe.shapes.overhand_knot(
+    points = withe.knots.overhand_knot(
         1 + case.number % 2, length=case.length, radius=case.radius, shortening=0.6 * case.length, nodes=case.nodes
     )
     material = withe.Material(youngs_modulus=case.youngs_modulus, poisson_ratio=0.5, density=1000.0)

@@ -65,7 +65,7 @@ def tie(n: int, nodes: int, shortening: float, friction: float, drag: float) -> 
     """A loose overhand knot, at rest, its end edges held by grips that spin; drawn at e / h, with a drag for later."""
     scene = withe.Scene(gravity=(0.0, 0.0, 0.0))
     rubber = withe.Material(youngs_modulus=MODULUS, poisson_ratio=0.5, density=1180.0)
-    points = withe.shapes.overhand_knot(n, length=LENGTH, radius=RADIUS, shortening=shortening * RADIUS, nodes=nodes)
+    points = withe.knots.overhand_knot(n, length=LENGTH, radius=RADIUS, shortening=shortening * RADIUS, nodes=nodes)
     rope = scene.add_rod(points=points, radius=RADIUS, material=rubber, natural="straight", name="rope")
     grips = [scene.clamp(node, hold="edge", spin=True) for node in (rope.start, rope.end)]
     damping = scene.add_drag(0.0)

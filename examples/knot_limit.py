@@ -44,7 +44,7 @@ def centreline(epsilon: float) -> np.ndarray:
     """A drawn knot: edges as long as the radius where strands touch, longer ones in the loop and the tails."""
     e = 2.0 * np.pi * RADIUS / epsilon**2
     length = e * (1.0 + 2.0 * TAIL)
-    line = withe.shapes.overhand_knot(length=length, radius=RADIUS, shortening=e, nodes=int(length / RADIUS))
+    line = withe.knots.overhand_knot(length=length, radius=RADIUS, shortening=e, nodes=int(length / RADIUS))
     along = np.linspace(0.0, length, len(line))
     sparse = slice(None, None, 4)
     apart = np.linalg.norm(line[sparse, None] - line[None, sparse], axis=2)

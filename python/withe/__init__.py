@@ -10,7 +10,7 @@ by rounding, so set it to "baseline" everywhere to find the same bits on unlike 
 ``print(simulation.plan)`` says which are in use.
 """
 
-from withe import deployment, folding, learning, perception, real2sim, shapes, view
+from withe import deployment, folding, knots, learning, perception, real2sim, shapes, view
 from withe._core import __version__
 from withe.batch import Batch
 from withe.errors import (
@@ -100,6 +100,7 @@ __all__ = [
     "__version__",
     "deployment",
     "folding",
+    "knots",
     "learning",
     "perception",
     "real2sim",

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import numpy.typing as npt
 
+from withe.common.deprecation import old_names
 from withe.common.keywords import keyword_hints
 from withe.common.validation import integer, non_negative, number, positive, unit_vector, vector
-from withe.knots import granny_knot, overhand_knot, reef_knot
 
-__all__ = ["arc", "circle", "granny_knot", "helix", "overhand_knot", "reef_knot"]
+__all__ = ["arc", "circle", "helix"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -114,3 +116,12 @@ def arc(
     chords = distances * np.sinc(half / np.pi)
     points: FloatArray = origin + np.outer(chords * np.cos(half), along) + np.outer(chords * np.sin(half), side)
     return points
+
+
+if not TYPE_CHECKING:  # an old name stays an error to type checkers
+    __getattr__ = old_names(
+        __name__,
+        granny_knot="withe.knots.granny_knot",
+        overhand_knot="withe.knots.overhand_knot",
+        reef_knot="withe.knots.reef_knot",
+    )

@@ -73,7 +73,7 @@ def pulled(points: FloatArray, radius: float, by: float, **contact: Any) -> with
 
 @pytest.mark.parametrize("n", [1, 2, 3, 4])
 def test_overhand_knots_are_torus_knots_and_do_not_touch_themselves(n: int) -> None:
-    points = withe.shapes.overhand_knot(n, length=1.0, radius=1.6e-3, shortening=0.6)
+    points = withe.knots.overhand_knot(n, length=1.0, radius=1.6e-3, shortening=0.6)
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
     assert lengths.sum() == pytest.approx(1.0, abs=1e-9)
     assert determinant(closed_far_away(points)) == 2 * n + 1
@@ -86,11 +86,11 @@ def test_overhand_knots_are_torus_knots_and_do_not_touch_themselves(n: int) -> N
 @pytest.mark.parametrize("tails", ["up", "sideways"])
 def test_reef_and_granny_differ_by_their_crossings(tails: Literal["up", "sideways"]) -> None:
     view = (0.02, 1.0, 0.01)
-    assert signed_crossings(withe.shapes.reef_knot(tails=tails), view) == 0
-    assert abs(signed_crossings(withe.shapes.granny_knot(tails=tails), view)) == 6
+    assert signed_crossings(withe.knots.reef_knot(tails=tails), view) == 0
+    assert abs(signed_crossings(withe.knots.granny_knot(tails=tails), view)) == 6
 
 
-@pytest.mark.parametrize("draw", [withe.shapes.reef_knot, withe.shapes.granny_knot])
+@pytest.mark.parametrize("draw", [withe.knots.reef_knot, withe.knots.granny_knot])
 def test_knots_with_tails_sideways_are_two_alike_halves_that_do_not_touch(draw: Callable[..., FloatArray]) -> None:
     points = draw(length=1.0, radius=2e-3, tails="sideways")
     assert np.linalg.norm(np.diff(points, axis=0), axis=1).sum() == pytest.approx(1.0, abs=1e-9)
@@ -104,7 +104,7 @@ def test_knots_with_tails_sideways_are_two_alike_halves_that_do_not_touch(draw: 
 
 
 def test_a_pulled_knot_stays_the_knot_that_it_is() -> None:
-    points = withe.shapes.overhand_knot(1, length=0.5, radius=1.6e-3, shortening=0.25, nodes=121)
+    points = withe.knots.overhand_knot(1, length=0.5, radius=1.6e-3, shortening=0.25, nodes=121)
     simulation = pulled(points, 1.6e-3, 0.06, friction=0.1, friction_model="lagged")
     assert determinant(closed_far_away(simulation.positions("rope"))) == 3
     contacts = simulation.contacts()
@@ -113,7 +113,7 @@ def test_a_pulled_knot_stays_the_knot_that_it_is() -> None:
 
 
 def test_writhe_of_a_polygon_is_the_mean_of_what_its_diagrams_show() -> None:
-    points = withe.shapes.overhand_knot(1, nodes=101)
+    points = withe.knots.overhand_knot(1, nodes=101)
     rng = np.random.default_rng(0)
     ends = [points[0] + 1e3 * (points[0] - points[1]), points[-1] + 1e3 * (points[-1] - points[-2])]
     carried_on = np.concatenate([ends[:1], points, ends[1:]])

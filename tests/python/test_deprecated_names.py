@@ -84,6 +84,20 @@ def test_plans_have_names_of_their_own():
         _ = withe.folding.Plans
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "names"),
+    [
+        (withe.shapes, withe.knots, ["granny_knot", "overhand_knot", "reef_knot"]),
+        (withe.real2sim, withe.perception, ["TagDetection", "detect_tags"]),
+    ],
+)
+def test_knots_and_tags_have_one_module_each(old, new, names):
+    for name in names:
+        assert warned(lambda name=name: getattr(old, name), f"{new.__name__}.{name}") is getattr(new, name)
+        assert name not in old.__all__
+        assert name in new.__all__
+
+
 def test_controller_of_a_plan_is_method():
     old = warned(lambda: plan(CABLE, LINE, controller="least_friction"), "method=")
     new = plan(CABLE, LINE, method="least_friction")

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import withe
-from withe.knots import signed_crossings
-from withe.shapes import arc, circle, helix, overhand_knot
+from withe.knots import overhand_knot, signed_crossings
+from withe.shapes import arc, circle, helix
 
 
 def test_a_helix_has_its_radius_pitch_and_length():

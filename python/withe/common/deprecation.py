@@ -1,13 +1,14 @@
 """Old words of the public API: each works for one version and warns with `DeprecationWarning`, which names the new one.
 
 Old words are translated in this module only: `renamed` for arguments, `moved_into` for arguments that became fields of
-one value, `old_names` for classes of a module, `old_word` for all else.
+one value, `old_names` for names of a module, `old_word` for all else.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import wraps
+from importlib import import_module
 from typing import Any, TypeVar
 
 from withe.common.keywords import keyword_hints
@@ -136,27 +137,28 @@ def moved_into(word: str, kind: type, **fields: str) -> Callable[[T], T]:
     return decorate
 
 
-def old_names(module: str, **classes: type) -> Callable[[str], type]:
-    """Return the ``__getattr__`` of a module some of whose classes have new names.
+def old_names(module: str, **places: str) -> Callable[[str], Any]:
+    """Return the ``__getattr__`` of a module from which names have moved.
 
     Parameters
     ----------
     module : str
-        Its full name.
-    **classes : type
-        The class that each old name stands for.
+        Full name of the module.
+    **places : str
+        The new full name of each old name, such as ``Plan="withe.folding.FoldPlan"``.
 
     Returns
     -------
     callable
-        Of an old name it returns the class and warns with `DeprecationWarning`; of any other name it raises
+        Of an old name it returns the object and warns with `DeprecationWarning`; of any other name it raises
         `AttributeError`.
     """
 
-    def find(name: str) -> type:
-        if name not in classes:
+    def find(name: str) -> Any:
+        if name not in places:
             raise AttributeError(f"module {module!r} has no attribute {name!r}")
-        old_word(f"{module}.{name}", f"{module}.{classes[name].__name__}")
-        return classes[name]
+        old_word(f"{module}.{name}", places[name])
+        home, _, new = places[name].rpartition(".")
+        return getattr(import_module(home), new)
 
     return find

@@ -59,4 +59,4 @@ __all__ = [
 ]
 
 if not TYPE_CHECKING:  # an old name stays an error to type checkers
-    __getattr__ = old_names(__name__, Plan=FoldPlan)
+    __getattr__ = old_names(__name__, Plan="withe.folding.FoldPlan")

@@ -113,9 +113,9 @@ class BuildOptions:
         if checked.tolerance is not None and self.integrator in ("verlet", "static"):
             raise ValueError(f"tolerance must be None with integrator={self.integrator!r}")
         if checked.duration is not None and checked.tolerance is None:
-            raise ValueError("duration must be given with a tolerance, and only then")
+            raise ValueError("duration needs a tolerance: give tolerance= too")
         if self.solver.max_steps is not None and checked.tolerance is None:
-            raise ValueError("max_steps must be given with a tolerance, and only then")
+            raise ValueError("max_steps needs a tolerance: give tolerance= too")
         return checked
 
     def engine(self) -> _core.Options:

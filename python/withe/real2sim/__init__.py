@@ -4,7 +4,9 @@
 >>> log = withe.real2sim.read_log("log.csv", tags=range(101, 110))  # doctest: +SKIP
 """
 
-from withe.perception.tags import TagDetection, detect_tags
+from typing import TYPE_CHECKING
+
+from withe.common.deprecation import old_names
 from withe.real2sim.calibration import Calibration, calibrate
 from withe.real2sim.centrelines import Centrelines, rest_shape
 from withe.real2sim.fitting import fit
@@ -20,13 +22,16 @@ __all__ = [
     "Fit",
     "Log",
     "Outlier",
-    "TagDetection",
     "Tags",
     "Unobservable",
     "calibrate",
-    "detect_tags",
     "fit",
     "fit_motion",
     "read_log",
     "rest_shape",
 ]
+
+if not TYPE_CHECKING:  # an old name stays an error to type checkers
+    __getattr__ = old_names(
+        __name__, TagDetection="withe.perception.TagDetection", detect_tags="withe.perception.detect_tags"
+    )
