@@ -39,52 +39,55 @@ def flat_forces(width: Width) -> tuple[float, float, float]:
 
 @dataclass(frozen=True, eq=False)
 class FoldPlan:
-    """Poses of a jaw that folds a sheet, and times at which it is there.
+    """Poses and times of a jaw that folds a sheet.
 
-    The world's origin is where the middle of the sheet's lifted edge lay in the flat sheet; x points along the sheet to
-    its far edge, z up, y across. The table and the sheet that lies on it are at z = 0. A pose is that of the sheet's
-    *outer edge*, the one that is lifted: position, and the rotation of a frame that is the world's while the sheet is
-    flat and turns about y with the edge: its x points from the outer edge into the sheet along the straight part that
-    the jaw holds, its z away from the side that lay on the table. The jaw's inner edge, where the sheet begins to hang
-    freely, is `jaw.depth` along that x.
+    The origin of the world is the middle of the lifted edge in the flat sheet. x points along the sheet to its far
+    edge, z up, and y across; table and flat sheet are at z = 0. A pose is the position and rotation of the *outer
+    edge*, which is lifted. The frame of the edge is that of the world in the flat sheet, and turns about y with the
+    edge: its x points from the outer edge into the sheet, along the straight part in the jaw. The inner edge of the
+    jaw, where the sheet begins to hang freely, is at `jaw.depth` along this x.
 
     Attributes
     ----------
     paper : Paper
+        Paper of the plan.
     target : float [m]
-        Where the outer edge comes down: x of the last pose. The crease is in the middle.
+        Target of the outer edge: x of the last pose. The crease is in the middle.
     method, grasp : str
+        Arguments of `plan`.
     jaw : Jaw
+        Jaw that holds the sheet.
     limits : tuple of float [m/s], [rad/s], [m/s^2]
-        Speed, rate of turning, acceleration.
+        Speed, rate of rotation, acceleration.
     offset : float [m]
-        How far the sheet had slid when the plan was made: 0, but where a fold was planned anew.
+        Slide of the sheet when the plan was made: 0, except after a `replan`.
     rise : float [m]
-        How high over the target the edge ends that is led slowly: 0, but where a plunge follows.
+        Height over the target at which the slow motion of the edge ends: 0, except before a plunge.
     side : str
-        From where the jaw's fingers come: "edge", from beyond the sheet's edge in line with the sheet; "side", from the
-        side of the sheet, across it, where there would be no room for them beyond the edge.
+        Direction of the jaw's fingers: "edge", from beyond the edge in line with the sheet; or "side", across the
+        sheet, if there is no room beyond the edge.
     clearance : float [m]
-        Least height of the fingers over the table while the edge looks back (angle > pi / 2), coming from `side`. At
-        the start the lower finger needs the edge to hang over that of the table, or to be bent up.
+        Least height of the fingers over the table while the edge looks back (angle > pi / 2). At the start the lower
+        finger needs the edge to overhang the table, or to be bent up.
     uncertainty : tuple of float
-        Shares by which Lgb and friction may be other than thought.
+        Relative errors of Lgb and friction.
     curvature : float [1/Lgb]
-        Bound of a free moment's curvature.
+        Bound on the curvature with a free moment.
     manifold : str
-        Where its equilibria are from: "exact" or "network".
+        Source of the equilibria: "exact" or "network".
     poses : ndarray of shape (n, 7) [m], [-]
         x, y, z and the quaternion x, y, z, w of the outer edge.
     angles : ndarray of shape (n,) [rad]
-        Of the edge, counted on beyond pi: quaternions are those of rotations by these about y.
+        Angles of the edge, which continue beyond pi. The quaternions are rotations by these angles about y.
     times : ndarray of shape (n,) [s]
+        Times of the poses.
     plunges_at : float or None [s]
-        When the jaw goes down quickly, as `plunge` found out; None where it comes down slowly.
+        Start of the plunge that `plunge` found. None without a plunge.
     plunge_slide : float [m]
-        How far a sheet that is as thought has slid by then, on which it comes down where it should.
+        Slide of the expected sheet at the start of the plunge, for which the plunge meets the target.
     blocked : str or None
-        Why it does not bear what the paper may be, with the friction that is missing; None where it does, or where
-        nobody asked (`plan` says of what it asks).
+        Reason why the plan fails within its uncertainty, with the missing friction. None if it does not fail, or if
+        this was not tested.
     """
 
     paper: Paper

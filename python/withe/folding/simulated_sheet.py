@@ -47,25 +47,25 @@ class Fold:
     Attributes
     ----------
     error : float [m]
-        Of the length from the lifted edge to the crease, which is made where the layers turn: half the signed gap
-        between that edge and the place on the sheet where it should lie; negative where the fold is too short.
+        Error of the length from the lifted edge to the crease: half the signed gap between the edge and its target on
+        the sheet. Negative if the fold is too short.
     length : float [m]
-        From the lifted edge to the crease.
+        Length from the lifted edge to the crease.
     slide : float [m]
-        How far the sheet's far edge has slid over the table, in the direction of x.
+        Slide of the sheet's far edge over the table, in the direction of x.
     max_curvature : float [1/m]
-        Greatest at any time.
+        Greatest curvature at any time.
     max_speed : float [m/s]
-        Greatest of any part of the sheet.
+        Greatest speed of any part of the sheet.
     failure : str or None
-        Why it is no fold: the sheet snapped, its equations had no solution, or motions went on for twice as long as
-        expected. The other numbers are those of that moment.
+        Reason of a failed fold: the sheet snapped, its equations had no solution, or the motion took twice as long as
+        expected. The other numbers are then those of this moment.
     record : Record
-        Of rod "sheet", from the lifted edge on, over obstacle "table".
+        Record of rod "sheet", from the lifted edge on, over obstacle "table".
     seen_slides : tuple of float [m]
-        What a camera saw of the slide on the way; NaN where it did not see the far edge.
+        Slides that a camera saw during the fold; NaN where it did not see the far edge.
     slip : float [m]
-        By how much the sheet has slipped in the jaw, beyond its force limit.
+        Slip of the sheet in the jaw, above its force limit.
     """
 
     error: float
@@ -89,24 +89,26 @@ class Held:
 
 @keyword_hints
 class SimulatedSheet:
-    """A sheet on a table, whole, and a jaw that holds one of its edges: a robot's world, in simulation.
+    """Simulate a sheet on a table, and a jaw that holds one of its edges.
 
-    The sheet is a planar rod with inertia, stretch, bending, weight and thickness; table and sheet rub on each other,
-    and so do the sheet's sides, by Coulomb's law (anchored). Nothing here knows how a plan was made.
+    The sheet is a planar rod with inertia, stretching, bending, weight and thickness, with anchored friction on the
+    table and between its own sides. The simulation takes only the motion of the jaw from a plan.
 
     Parameters
     ----------
     paper : Paper
-        As the planner knows it.
+        Paper as the planner knows it.
     seed : int
-        Of what differs from it. A sheet folds the same way whenever it is folded.
+        Seed of the noise. The same sheet always folds in the same way.
     noise : Noise, optional
-        How much differs; by default nothing does.
+        Deviations of the sheet, table and jaw. By default none.
     jaw : Jaw, optional
+        Jaw that holds the sheet.
     edges : int
-        Of the rod.
+        Number of edges of the rod.
     time_step : float [s]
-        Of backward Euler; shorter where the jaw would move by more than 2 mm in a step, and for 0.1 s after that.
+        Time step of backward Euler. It is shorter if the jaw would move by more than 2 mm in a step, and for 0.1 s
+        after that.
     own_friction : float
         Coefficient of the sheet on itself.
     record_every : float [s]

@@ -67,10 +67,9 @@ def rollout(
     ImportError
         Torch is not installed.
     ValueError
-        Values that are no tensors of float64, that `set` refuses, or by which no gradient is known; the last when the
-        gradient is asked for.
+        Values that are not float64 tensors or that `set` refuses. On backward, parameters without a gradient.
     ConvergenceError
-        A step that cannot be solved.
+        A step does not converge.
 
     Examples
     --------
@@ -101,15 +100,15 @@ def rollout(
 
 
 def equilibrium(simulation: Simulation, values: Values) -> Any:
-    """Equilibrium of a copy of a simulation with other values, as a differentiable function of them.
+    """Return the equilibrium of a simulation as a differentiable function of parameters.
 
     Parameters
     ----------
     simulation : Simulation
-        Where the search begins; stays as it is.
+        Initial state. It is not changed.
     values : mapping
-        From what `Equilibrium.gradient` takes in `wrt` (a part and a word of `set`; "gravity"; a support and
-        "position") to tensors, float64, of a shape that `set` or `move` takes; those that set others as in `rollout`.
+        Float64 tensors by parameter, as in `wrt` of `Equilibrium.gradient`: a part and a word of `set`, "gravity", or a
+        support and "position". Shapes are those of `set` or `move`. Parameters that set others act as in `rollout`.
 
     Returns
     -------

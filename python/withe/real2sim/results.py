@@ -87,35 +87,35 @@ class Fit:
     Attributes
     ----------
     names : tuple of str
-        Of the unknowns.
+        Names of the unknowns.
     values : ndarray of shape (frames, unknowns)
-        In SI units; what frames share stands in every row. NaN in frames that were skipped.
+        Values in SI units. Shared values stand in every row. NaN in skipped frames.
     residuals : ndarray of shape (frames, residuals)
-        Simulated less seen, in units of sigma, or of the target without one; NaN where nothing was seen.
+        Simulated minus observed values, in units of sigma, or of the target without sigma. NaN without observation.
     covariance : ndarray of shape (frames, unknowns, unknowns)
-        Of the values, for independent errors of the targets. Their variance is that of sigma, or what all frames
-        leave, divided by the degrees of freedom; NaN without either, infinite where the targets tell nothing. Of a
-        motion also for errors of its time step, and for what the residuals of successive frames have in common. In a
-        planar scene what lies across its plane counts for neither. A camera counts for exact: with one that `calibrate`
-        found, errors are greater, see there.
+        Covariance of the values, for independent errors of the targets. The variance of the errors is sigma^2, or the
+        mean square of the residuals per degree of freedom. NaN without either, infinite for unobservable values. For a
+        motion the covariance includes errors of the time step, and the correlation of residuals from frame to frame. In
+        a planar scene residuals across the plane do not count. The camera counts as exact; with a camera of `calibrate`
+        the true errors are greater, see there.
     solves : ndarray of int of shape (frames,)
-        Equilibria that the search took in each frame.
+        Number of equilibria for each frame.
     iterations : ndarray of int of shape (frames,)
-        Outer iterations.
+        Number of outer iterations.
     converged : ndarray of bool of shape (frames,)
-        Whether no small change of the unknowns would bring the frame nearer: also in a local minimum, and where what is
-        out of reach leaves a residual.
+        True if no small change of the unknowns reduces the residuals. This includes local minima, and targets out of
+        reach.
     reasons : dict of int to str
-        Why frames did not converge, were skipped, or leave more than sigma explains, where it is given: a sum of
-        squares above 9 sigma^2 per degree of freedom, and above what chance exceeds once in a million frames. Or which
-        motions have too coarse a mesh or too long a time step.
+        Reasons why frames did not converge, were skipped, or have residuals beyond sigma. Residuals are beyond sigma if
+        the sum of squares exceeds 9 sigma^2 per degree of freedom, and a bound that noise exceeds once in a million
+        frames. For motions also too coarse a mesh, or too long a time step.
     unobservable : tuple of Unobservable
-        Combinations of unknowns that the targets do not tell; print them.
+        Combinations of unknowns that the targets do not determine.
     outliers : tuple of Outlier
-        Tags that jump in one frame. They are looked for in fits of frames to `Tags` alone, not in motions.
+        Tags that jump in one frame. Only fits of frames to `Tags` detect outliers.
     unchecked : tuple of (int, int)
-        Frames and tags where that would go unnoticed: tags that were seen, but in fewer than four of the frames around,
-        or with hardly any other tag in the frame that tells where they should be.
+        Frames and tags in which an outlier cannot be detected: the tag was seen in fewer than four neighbouring frames,
+        or too few other tags of the frame predict its position.
     """
 
     names: tuple[str, ...]
