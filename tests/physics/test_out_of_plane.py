@@ -46,7 +46,7 @@ def test_an_equilibrium_warns_from_the_load_on_at_which_it_would_buckle_sideways
         warnings.simplefilter("error")
         assert below.equilibrium().stable
     above, rod = scene(1.005 * critical)
-    with pytest.warns(withe.OutOfPlaneWarning, match=r"build\(planar=False\) lets it"):
+    with pytest.warns(withe.OutOfPlaneWarning, match=r"Use build\(planar=False\) to allow this"):
         found = above.equilibrium()
     assert not found.stable
     assert found.stability == "diverges"

@@ -30,7 +30,7 @@ def lying(material=RUBBER, height=RADIUS, held=True, contact=None, **options):
 def test_a_held_node_that_is_moved_into_a_floor_is_an_error_that_names_both(scheme, share):
     simulation = lying(integrator=scheme, time_step=1e-3)
     simulation.move("hand", position=(0, 0, (1.0 - share) * RADIUS), over=0.02)
-    message = r"rod 'rod' is pressed .* into 'floor'.* by what does not yield"
+    message = r"rod 'rod' is pressed .* into 'floor'.*: support and obstacle are both rigid"
     with pytest.raises(withe.ConvergenceError, match=message) as error:
         simulation.step(30)
     assert (error.value.rod, error.value.node) == ("rod", 0)

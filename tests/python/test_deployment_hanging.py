@@ -84,7 +84,7 @@ def curled():
         (lambda: measure_curvature(-0.08, aside=0.1), "gravito_bending_length must be positive"),
         (lambda: measure_curvature(0.08, aside=float("nan")), "aside"),
         (lambda: measure_curvature(0.08, aside=0.0, error=-1.0), "error must not be negative"),
-        (lambda: measure_curvature(0.08, aside=-0.16), "aside must be 0.155 m at most, .* curls up"),
+        (lambda: measure_curvature(0.08, aside=-0.16), "aside must be at most 0.155 m, .* curls up"),
         (lambda: measure_curvature(0.08, aside=0.1, depth=float("inf")), "depth"),
         (lambda: measure_curvature(0.08, image=curled(), scale=5e-4), "image must show a cable whose end hangs at 70"),
         (lambda: measure_curvature(0.08, image=np.zeros((50, 50, 3), np.uint8)), "needs scale"),

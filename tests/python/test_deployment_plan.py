@@ -227,7 +227,7 @@ def test_the_command_line_warns_and_refuses_in_one_line(tmp_path, capsys):
     np.savetxt(source, 1e3 * wave(), delimiter=",")
     assert main(["deploy", str(source), *out]) == 2
     said = capsys.readouterr().err
-    assert "the pattern 517.3 m" in said
+    assert "longer than the pattern, 517.3 m" in said
     assert said.strip().endswith("is the pattern in metres?")
     assert all(line.startswith("withe: ") for line in said.splitlines())
     np.savetxt(source, wave(), delimiter=",")
@@ -288,7 +288,7 @@ def test_a_plan_that_needs_more_friction_than_there_is_says_so(controller, recwa
     plan(CABLE, pattern, controller, friction=1.01 * needed)
     assert not recwarn.list
     with pytest.warns(
-        UserWarning, match=rf"the cable slips: \d+ % .* than friction 0\.05, most {needed:.2f} at \d+ mm"
+        UserWarning, match=rf"the cable slips: \d+ % .* than friction 0\.05, up to {needed:.2f} at \d+ mm"
     ):
         plan(CABLE, pattern, controller, friction=0.05)
 

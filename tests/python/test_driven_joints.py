@@ -72,7 +72,7 @@ def test_numbers_of_a_joint_are_set_and_read():
 def test_joints_without_an_axis_have_no_angle():
     simulation = leg({"kind": "rigid"}).build()
     for read in (simulation.joint_angle, simulation.joint_rate, simulation.joint_torque):
-        with pytest.raises(ValueError, match="joint 'knee' is rigid: revolute ones have an angle"):
+        with pytest.raises(ValueError, match="joint 'knee' must be revolute to have an angle, got kind rigid"):
             read("knee")
         with pytest.raises(ValueError, match="joint must be a joint, got the rod 'shank'"):
             read("shank")

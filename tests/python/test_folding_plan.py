@@ -295,7 +295,7 @@ def test_the_command_writes_a_plan(tmp_path, capsys):
             "withe: gravito_bending_length must be at most 10 lengths, got 48 m: are all sizes in metres?",
         ),
         (["--thickness", "0.1"], "withe: thickness must be at most a tenth of the length"),
-        (["--curvature", "3"], "withe: curvature bounds sheets of grasp 'free'"),
+        (["--curvature", "3"], "withe: curvature needs grasp='free'"),
         (["--paper", "origami"], "m can be reached"),
     ],
 )

@@ -199,13 +199,13 @@ def test_what_is_no_read_out_says_so():
     found = sim.equilibrium()
     curvatures = np.zeros((NODES, 2))
     for by, message in (
-        ({"colours": {arm: curvatures}}, "derivatives by positions"),
+        ({"colours": {arm: curvatures}}, "derivatives with respect to positions"),
         ({"curvatures": curvatures}, "must be given for rods"),
         ({"curvatures": {arm: np.zeros((3, 2))}}, "shape"),
         ({"curvatures": {wall: curvatures}}, "for rods"),
         ({"reaction_forces": np.zeros(3)}, "must be given for supports"),
         ({"positions": {arm: np.ones((NODES, 3))}}, "plane"),
-        ({}, "derivatives by positions"),
+        ({}, "derivatives with respect to positions"),
     ):
         with pytest.raises(ValueError, match=message):
             found.gradient(by, ["gravity"])

@@ -118,9 +118,9 @@ def test_snapshots_copies_pickles_and_files_go_on_with_the_same_bits(stiffness, 
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ({"at": 0.5}, "must be on rod 'rod', from 0 to 0.4 m"),
-        ({"at": -0.01}, "must be on rod 'rod'"),
-        ({"at": 0.01, "length": 0.05}, "must be on rod 'rod'"),
+        ({"at": 0.5}, "must lie on rod 'rod', from 0 to 0.4 m"),
+        ({"at": -0.01}, "must lie on rod 'rod'"),
+        ({"at": 0.01, "length": 0.05}, "must lie on rod 'rod'"),
         ({"at": 0.1, "length": -0.05}, "length of 'hand 1' must not be negative"),
         ({"at": 0.1, "stiffness": (0.0, 1.0)}, "stiffness of 'hand 1' along directions must be positive"),
         ({"at": 0.1, "stiffness": (1.0, -1.0)}, "stiffness of 'hand 1' about them must be positive"),

@@ -27,7 +27,7 @@ def drawn(*, planar=False, integrator="backward_euler", viscosity=0.0, drag=None
 
 def test_without_torch_it_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "torch", None)
-    with pytest.raises(ImportError, match=r"needs torch.*\[learn\]"):
+    with pytest.raises(ImportError, match=r"needs the package torch.*\[learn\]"):
         withe.learning.equilibrium(drawn(), {"gravity": None})
 
 

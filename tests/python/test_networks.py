@@ -233,5 +233,5 @@ def test_bad_questions_are_named(network, x, message):
 
 def test_without_torch_it_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "torch", None)
-    with pytest.raises(ImportError, match=r"needs torch.*\[learn\]"):
+    with pytest.raises(ImportError, match=r"needs the package torch.*\[learn\]"):
         withe.learning.train_network(X, function(X))

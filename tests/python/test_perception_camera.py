@@ -170,5 +170,5 @@ def test_a_picture_is_one_from_above_or_from_below(matrix, up):
 
 def test_points_in_another_order_are_refused():
     pixels = np.array([(0.0, 0.0), (640.0, 0.0), (640.0, 480.0), (0.0, 480.0)])
-    with pytest.raises(ValueError, match="in their order"):
+    with pytest.raises(ValueError, match="must be in the same order"):
         Camera.from_points(pixels, 1e-3 * pixels[[0, 1, 3, 2]])

@@ -36,7 +36,7 @@ def test_curvatures_of_the_pixels_are_those_published():
         ({"tags": [1, 1]}, None, "tags must be different numbers"),
         ({"tags": [9]}, "time,tagid_x_1\n0,1\n", "must have a column 'tagid_x_9'; it has time, tagid_x_1"),
         ({"tags": [1]}, "time,tagid_x_1,tagid_y_1\n0,a,2\n", "column 'tagid_x_1' must hold numbers, got 'a' in row 0"),
-        ({"tags": [1]}, "time,tagid_x_1,tagid_y_1\n5,1,2\n5,1,2\n", "numbers that grow"),
+        ({"tags": [1]}, "time,tagid_x_1,tagid_y_1\n5,1,2\n5,1,2\n", "numbers that increase"),
         ({"tags": [1]}, "time,tagid_x_1,tagid_y_1\n5,0,0\n6,,\n", "tags must be seen in some frame"),
         ({"tags": [1], "skip": 2}, "time,tagid_x_1,tagid_y_1\n5,1,2\n", "more than skip=2 rows"),
         (

@@ -162,7 +162,7 @@ def test_a_rod_leaves_a_ring_in_the_same_step_whoever_takes_it(friction, integra
         whole.step(steps)
     with pytest.warns(withe.RingLeftWarning, match="'eye'"):
         run.run(steps * 5e-3, record_every=5e-3)
-    with pytest.warns(withe.RingLeftWarning, match="'eye' of simulation 0 .* 2 more: released"):
+    with pytest.warns(withe.RingLeftWarning, match="'eye' of simulation 0 .* 2 more: the ring was released"):
         batch.step(steps)
     with pytest.warns(withe.RingLeftWarning, match="'eye'"):
         before.step(steps - left[0])

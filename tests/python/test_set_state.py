@@ -163,7 +163,7 @@ def test_supports_are_not_moved_and_nothing_changes_where_they_would_be():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"positions": np.zeros((21, 3))}, "edge without length"),
+        ({"positions": np.zeros((21, 3))}, "edge zero length"),
         ({"positions": np.zeros((20, 3))}, "shape"),
         ({"directors": np.tile((1.0, 0, 0), (20, 1))}, "normal to their edges"),
         ({"directors": np.tile((0, 0, 1.0), (20, 1)), "twist": 0.0}, "together"),

@@ -214,7 +214,7 @@ def test_loads_put_on_while_running_are_set_kept_in_snapshots_and_undone_by_rese
     with pytest.raises(ValueError, match="not in the scene"):
         simulation.set(push, force=(0, 0, 0))
     from_file = withe.Snapshot.load(state.save(tmp_path / "state.npz"))
-    with pytest.raises(ValueError, match="function of time"):
+    with pytest.raises(ValueError, match="functions of time"):
         scene.build().restore(from_file)
     copies[2].restore(from_file)
     assert np.array_equal(copies[2].get("push", "force"), (0.001, 0, 0.02))

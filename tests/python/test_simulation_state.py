@@ -162,7 +162,7 @@ def test_a_snapshot_of_another_scene_is_refused():
         with pytest.raises(ValueError, match="another scene"):
             arm.restore(other.snapshot())
         assert arm.snapshot() == before
-    with pytest.raises(ValueError, match=r"must be a withe.Snapshot, got bytes"):
+    with pytest.raises(ValueError, match=r"must be a withe.Snapshot or a withe.Record, got bytes"):
         arm.restore(b"")
 
 

@@ -371,7 +371,7 @@ def _slips(pattern: Pattern, needed: FloatArray, friction: float) -> str:
     """Describe the share of a pattern that needs more friction, and the place that needs most."""
     share, most = 100.0 * float((needed > friction).mean()), int(needed.argmax())
     where = f"{needed[most]:.2f} at {1e3 * pattern.arc_length[most]:.0f} mm"
-    return f"the cable slips: {share:.0f} % of the pattern needs more than friction {friction:g}, at most {where}"
+    return f"the cable slips: {share:.0f} % of the pattern needs more than friction {friction:g}, up to {where}"
 
 
 def _worst_slip(found: Feasibility) -> Slip | None:
