@@ -9,9 +9,21 @@
 namespace withe {
 namespace {
 
-/// Initial guesses: the extrapolated motion; rest; rest, and continuation in friction's regularisation; a steady motion
-/// without axial forces as unknowns.
-enum class Guess : std::size_t { accelerated, rest, continuation, plain };
+/// Initial guesses of a step, in the order in which they are tried. The last two cost nothing where an earlier one
+/// leads to the solution.
+enum class Guess : std::size_t {
+  /// The extrapolated motion.
+  accelerated,
+  /// Rest: the first iteration is the linear step.
+  rest,
+  /// Rest, and continuation in friction's regularisation. A rod that hits a rough post at 42 m/s within one step needs
+  /// shorter steps without it.
+  continuation,
+  /// A steady motion, without axial forces as unknowns. A soft helix whose edges turn by a radian in a step needs
+  /// shorter
+  /// steps without it.
+  plain,
+};
 constexpr std::array kGuesses{Guess::accelerated, Guess::rest, Guess::continuation, Guess::plain};
 
 // Iterations from the extrapolated motion, which may lead nowhere.
@@ -33,8 +45,9 @@ void start_axial_force(const Equations& equations, const VectorX& q, VectorX& ou
   }
 }
 
-/// Adds to `work.move` what supports do within a part of the step. Where that is more than the edges next to them bear,
-/// the others follow as they would by the linear step.
+/// Adds the displacement of supports within a part of the step to `work.move`. Where supports move farther than the
+/// edges next to them bear, the rod follows by the linear step. A clamp that jumps by a hundred edges in one step needs
+/// that; else Newton's method fails, and the step is subdivided.
 void follow_supports(Equations& equations, const Newton& newton, const Options& options, double part,
                      const State& state, StepWorkspace& work) {
   const Assembler& assembler = equations.assembler();
@@ -108,8 +121,8 @@ class InnerSolve {
     return guess != Guess::continuation || regularised_;
   }
 
-  /// What is always tried: rest, and where friction does not let surfaces jump all but the extrapolated motion. Others
-  /// only while they help.
+  /// True if a guess is always tried: rest, and, without friction, all but the extrapolated motion. Other guesses are
+  /// tried as `GuessRecord` lets them.
   bool certain(Guess guess) const {
     if (guess == Guess::rest) return true;
     return guess != Guess::accelerated && !(frictional_ && options_.adaptive);
