@@ -105,12 +105,18 @@ def test_angular_momentum_is_kept_to_solver_tolerance_in_a_plane(integrator):
     np.testing.assert_allclose(after, before, atol=1e-10)
 
 
-@pytest.mark.parametrize("viscosity", [0.0, 0.02])
-@pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum", "fourth_order"])
+@pytest.mark.parametrize(
+    ("integrator", "viscosity"),
+    [
+        ("implicit_midpoint", 0.0),
+        ("implicit_midpoint", 0.02),
+        ("energy_momentum", 0.0),
+        ("energy_momentum", 0.02),
+        ("fourth_order", 0.0),  # viscosity does not allow its steps back in time
+    ],
+)
 def test_angular_momentum_with_twist_is_kept_to_solver_tolerance(integrator, viscosity):
     """Spin about the tangents included: rho J l omega t."""
-    if viscosity > 0.0 and integrator == "fourth_order":
-        return  # goes back in time
     for steps in (100, 400):
         simulation, rod = flight(
             integrator,
