@@ -1,14 +1,10 @@
 """Motors, springs and dampers of revolute joints as users meet them: what is refused, set, read and kept."""
 
-import copy
-import pickle
-
 import numpy as np
 import pytest
 
 import withe
 from gradient_scenes import extrapolated
-from simple_scenes import same_state
 
 RUBBER = withe.Material(youngs_modulus=1e7, density=1000.0)
 HINGE = {"axis": (0, 1, 0), "stiffness": 0.02, "rest_angle": 0.4, "damping": 1e-4, "moment": 1e-3}
@@ -96,30 +92,6 @@ def test_each_of_several_joints_has_its_own_numbers():
     simulation.equilibrium()
     angles = [simulation.joint_angle(name) for name in ("knee", "ankle", "spur")]
     np.testing.assert_allclose(angles, (0.0, 0.2, 0.0), atol=1e-6)
-
-
-def test_copies_snapshots_pickles_and_reset_carry_what_was_set(tmp_path):
-    simulation = running()
-    drawn = running()
-    simulation.step(5)
-    simulation.set("knee", stiffness=0.05, rest_angle=0.8, damping=2e-4, moment=-2e-3)
-    kept = simulation.snapshot()
-    others = [simulation.copy(), copy.deepcopy(simulation), pickle.loads(pickle.dumps(simulation))]
-    others.append(running())
-    others[-1].restore(kept)
-    others.append(running())
-    others[-1].restore(withe.Snapshot.load(kept.save(tmp_path / "kept.npz")))
-    simulation.step(10)
-    for other in others:
-        assert other.get("knee", "rest_angle") == 0.8
-        other.step(10)
-        assert same_state(other, simulation)
-        assert other.joint_angle("knee") == simulation.joint_angle("knee")
-    simulation.reset()
-    assert simulation.get("knee", "stiffness") == 0.02
-    for each in (simulation, drawn):
-        each.step(7)
-    assert same_state(simulation, drawn)
 
 
 def test_a_snapshot_of_other_joints_is_refused():

@@ -1,13 +1,9 @@
 """Springs as users meet them: what is refused, set, read, kept and drawn."""
 
-import copy
-import pickle
-
 import numpy as np
 import pytest
 
 import withe
-from simple_scenes import same_state
 
 RUBBER = withe.Material(youngs_modulus=1e6, density=1000.0)
 
@@ -114,29 +110,6 @@ def test_fourth_order_takes_no_dampers():
     with pytest.raises(ValueError, match="does not support damping of springs"):
         simulation.set("spring", damping=1.0)
     assert simulation.get("spring", "damping") == 0.0
-
-
-def test_copies_snapshots_pickles_and_reset_carry_what_was_set(tmp_path):
-    simulation = running()
-    drawn = running()
-    simulation.step(5)
-    simulation.set("far", stiffness=35.0, rest_length=0.08, damping=0.1)
-    kept = simulation.snapshot()
-    others = [simulation.copy(), copy.deepcopy(simulation), pickle.loads(pickle.dumps(simulation))]
-    others.append(running())
-    others[-1].restore(kept)
-    others.append(running())
-    others[-1].restore(withe.Snapshot.load(kept.save(tmp_path / "kept.npz")))
-    simulation.step(10)
-    for other in others:
-        assert other.get("far", "stiffness") == 35.0
-        other.step(10)
-        assert same_state(other, simulation)
-    simulation.reset()
-    assert simulation.get("far", "stiffness") == 20.0
-    for each in (simulation, drawn):
-        each.step(7)
-    assert same_state(simulation, drawn)
 
 
 def test_a_snapshot_of_other_springs_is_refused():
