@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator
+
 import numpy as np
 
 import withe
@@ -47,3 +53,33 @@ def same_state(a: withe.Simulation, b: withe.Simulation) -> bool:
         return False
     reads = [a.positions, b.positions], [a.velocities, b.velocities]
     return all(np.array_equal(x(), y()) for x, y in reads) and a.energy() == b.energy()
+
+
+def steps_elsewhere(simulation: withe.Simulation) -> bool:
+    """Whether another thread steps it: it is not to be read then."""
+    try:
+        simulation.positions()
+    except RuntimeError:
+        return True
+    return False
+
+
+@contextlib.contextmanager
+def ctrl_c_once(ready: Callable[[], bool]) -> Iterator[None]:
+    """Press Ctrl-C from another thread within the block, as soon as `ready()` is true."""
+
+    def press() -> None:
+        while not ready():
+            left.wait(1e-3)
+            if left.is_set():
+                return
+        os.kill(os.getpid(), signal.SIGINT)
+
+    left = threading.Event()
+    thread = threading.Thread(target=press)
+    thread.start()
+    try:
+        yield
+    finally:
+        left.set()
+        thread.join()

@@ -1,15 +1,14 @@
 """Small networks: what they learn, that a file keeps them, and what is refused."""
 
-import _thread
 import copy
 import pickle
 import sys
-import threading
 
 import numpy as np
 import pytest
 
 import withe
+from simple_scenes import ctrl_c_once
 from withe.learning import Alternating, Cosine, Network, train_network
 
 torch = pytest.importorskip("torch")
@@ -166,11 +165,16 @@ def test_a_limit_of_time_ends_training_after_an_epoch():
     assert (trained.training.epochs, trained.training.stopped) == (1, "time")
 
 
-def test_ctrl_c_ends_training_with_the_best_so_far():
-    timer = threading.Timer(0.7, _thread.interrupt_main)
-    timer.start()
-    trained = train_network(X, function(X), hidden=(16,), schedule=Cosine(10_000_000), progress=False)
-    timer.join()
+def test_ctrl_c_ends_training_with_the_best_so_far(monkeypatch):
+    orders, draw = [], torch.randperm  # drawn anew for every epoch
+
+    def draw_and_count(count):
+        orders.append(count)
+        return draw(count)
+
+    monkeypatch.setattr(torch, "randperm", draw_and_count)
+    with ctrl_c_once(lambda: len(orders) > 20):
+        trained = train_network(X, function(X), hidden=(16,), schedule=Cosine(10_000_000), progress=False)
     assert trained.training.stopped == "interrupted"
     assert 0 < trained.training.best <= trained.training.epochs
     assert np.isfinite(trained(X)).all()
