@@ -1,5 +1,6 @@
 """Runs: frames on their times, callbacks, progress, interruption; many simulations side by side."""
 
+import sys
 import threading
 import time
 import warnings
