@@ -8,10 +8,11 @@ import json
 import os
 import uuid
 import zipfile
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +21,9 @@ from withe.common import validation
 from withe.common.frames import Frames, edges_to_nodes, stencils_to_nodes
 
 __all__ = [
+    "PlanFile",
+    "increasing_times",
+    "listed",
     "load_arrays",
     "load_json",
     "load_poses",
@@ -27,10 +31,12 @@ __all__ = [
     "save_arrays",
     "save_json",
     "save_poses",
+    "with_gaps",
     "write_vtk",
     "written_beside",
 ]
 
+FloatArray = npt.NDArray[np.float64]
 Content = TypeVar("Content")
 
 _HEADER = "header"
@@ -216,6 +222,112 @@ def load_json(
         raise ValueError(f"{path} is a damaged {kind}: it has no {error}") from error
     except (AttributeError, TypeError, ValueError) as error:
         raise ValueError(f"{path} is a damaged {kind}: {error}") from error
+
+
+class PlanFile(ABC):
+    """A plan of poses that is saved as a table for robots, or as JSON with everything that `load` needs."""
+
+    KIND: ClassVar[str]
+    VERSION: ClassVar[int]
+    times: FloatArray
+
+    @property
+    @abstractmethod
+    def _saved_poses(self) -> FloatArray:
+        """Positions and quaternions x, y, z, w, of shape (n, 7) [m], [-]."""
+
+    @abstractmethod
+    def to_dict(self) -> dict[str, Any]:
+        """Return the plan as lists and words, for JSON. SI units; numbers that are not finite are None."""
+
+    @staticmethod
+    @abstractmethod
+    def _parts_of(content: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the arguments of the class from what `to_dict` returned."""
+
+    @property
+    def path(self) -> FloatArray:
+        """Rows t, x, y, z, qw, qx, qy, qz of shape (n, 8), for hands of a simulation, which have the scalar first.
+
+        >>> import withe
+        >>> plan = withe.folding.plan(withe.folding.Paper.a4())
+        >>> hand = scene.grasp(sheet, at=0.005, length=0.01, pose=plan.path[0, 1:])  # doctest: +SKIP
+        >>> simulation.move(hand, path=plan.path)  # doctest: +SKIP
+        """
+        return pose_path(self.times, self._saved_poses)
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the plan to a file.
+
+        Parameters
+        ----------
+        path : path-like
+            "NAME.csv": columns t, x, y, z, qx, qy, qz, qw [s], [m], [-], the fields of geometry_msgs' PoseArray and
+            trajectory_msgs' MultiDOFJointTrajectory, which `withe.io.load_poses` reads for a hand. "NAME.json": the
+            whole plan, which `load` reads.
+
+        Returns
+        -------
+        Path
+
+        Raises
+        ------
+        ValueError
+            Another ending.
+        """
+        path = Path(path)
+        if path.suffix == ".csv":
+            return save_poses(path, self.times, self._saved_poses)
+        if path.suffix != ".json":
+            raise ValueError(f"path must end in .csv or .json, got {path.name!r}")
+        return save_json(path, self.KIND, self.VERSION, self.to_dict())
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Self:
+        """Read a plan that `save` wrote as JSON, equal to the last digit.
+
+        Parameters
+        ----------
+        path : path-like
+
+        Returns
+        -------
+        FoldPlan or LayPlan
+            That of the class.
+
+        Raises
+        ------
+        ValueError
+            A file that is damaged, of something else (a table of poses has no plan), or of another version.
+        OSError
+            The file cannot be opened.
+
+        Examples
+        --------
+        >>> withe.folding.FoldPlan.load("fold.json").plot()  # doctest: +SKIP
+        >>> withe.deployment.LayPlan.load("motion.json").feasibility(0.4)  # doctest: +SKIP
+        """
+        return load_json(path, cls.KIND, cls.VERSION, lambda content: cls(**cls._parts_of(content)))
+
+
+def increasing_times(values: Any, what: str) -> FloatArray:
+    """Return the times of a plan in a file [s], two or more that increase from 0; raises ValueError for others."""
+    times = validation.number_array(values, what, ("n",))
+    if len(times) < 2 or times[0] != 0.0 or (np.diff(times) <= 0.0).any():
+        raise ValueError(f"{what} must be two or more values that increase from 0")
+    return times
+
+
+def listed(values: FloatArray) -> list[Any]:
+    """Return numbers as JSON holds them: a number that is not finite is None."""
+    return [value if np.isfinite(value) else None for value in values.tolist()]
+
+
+def with_gaps(values: Any, what: str, count: int) -> FloatArray:
+    """Return `count` numbers that `listed` made; None is NaN."""
+    known = [0.0 if value is None else value for value in values]
+    missing = [value is None for value in values]
+    return np.where(missing, np.nan, validation.number_array(known, what, (count,)))
 
 
 def save_poses(path: str | os.PathLike[str], times: npt.NDArray[np.float64], poses: npt.NDArray[np.float64]) -> Path:

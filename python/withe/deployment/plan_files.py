@@ -12,6 +12,7 @@ from withe.deployment.cable import Cable
 from withe.deployment.motion import Phase, Start
 from withe.deployment.pattern import Pattern
 from withe.deployment.posts import Post
+from withe.io import increasing_times, with_gaps
 
 __all__ = ["KIND", "VERSION", "parts_of"]
 
@@ -29,17 +30,13 @@ def parts_of(content: Mapping[str, Any]) -> dict[str, Any]:
         Something is missing, of another kind, or does not fit the rest.
     """
     motion, cable = content["motion"], dict(content["cable"])
-    times = validation.number_array(motion["t"], "t", ("n",))
+    times = increasing_times(motion["t"], "t")
     rotations = validation.number_array(motion["quaternion_xyzw"], "quaternion_xyzw", (len(times), 4))
-    if len(times) < 2 or times[0] != 0.0 or (np.diff(times) <= 0.0).any():
-        raise ValueError("t must be two or more values that increase from 0")
     if (np.abs(np.linalg.norm(rotations, axis=1) - 1.0) > _UNIT).any():
         raise ValueError("quaternion_xyzw must have length 1")
     tail = validation.non_negative(cable.pop("tail"), "tail")
     pattern = Pattern.from_dict(content["pattern"])
-    needed = content["pattern"]["needed_friction"]
-    missing = np.array([value is None for value in needed])
-    known = validation.number_array([value or 0.0 for value in needed], "needed_friction", (len(pattern.points),))
+    needed = with_gaps(content["pattern"]["needed_friction"], "needed_friction", len(pattern.points))
     return {
         "times": times,
         "positions": validation.number_array(motion["position"], "position", (len(times), 3)),
@@ -53,7 +50,7 @@ def parts_of(content: Mapping[str, Any]) -> dict[str, Any]:
         "start": validation.choice(content["start"], "start", get_args(Start)),
         "speed": validation.positive(content["speed"], "speed"),
         "fastest": validation.positive(content["fastest"], "fastest"),
-        "needed_friction": np.where(missing, np.nan, known),
+        "needed_friction": needed,
         "posts": tuple(Post(**post) for post in content["posts"]),
     }
 

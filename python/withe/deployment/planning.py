@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from pathlib import Path as FilePath
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -26,7 +24,7 @@ from withe.deployment.pattern import crossings as crossings_of
 from withe.deployment.placing import require_room
 from withe.deployment.plan_files import KIND, VERSION, parts_of
 from withe.deployment.posts import Post
-from withe.io import load_json, pose_path, save_json, save_poses
+from withe.io import PlanFile, listed
 
 __all__ = ["LayPlan", "PlanMethod", "plan"]
 
@@ -40,7 +38,7 @@ _MOST_FRICTION = 3.0  # no floor has more
 
 
 @dataclass(frozen=True, eq=False)
-class LayPlan:
+class LayPlan(PlanFile):
     """The path of a jaw that lays a cable; at its end the jaw opens. The floor is the plane z = 0.
 
     Attributes
@@ -90,10 +88,13 @@ class LayPlan:
     needed_friction: FloatArray
     posts: tuple[Post, ...] = ()
 
+    KIND = KIND
+    VERSION = VERSION
+    _parts_of = staticmethod(parts_of)
+
     @property
-    def path(self) -> FloatArray:
-        """Rows t, x, y, z, qw, qx, qy, qz of shape (n, 8), for hands of a simulation, which have the scalar first."""
-        return pose_path(self.times, np.column_stack([self.positions, self.rotations]))
+    def _saved_poses(self) -> FloatArray:
+        return np.column_stack([self.positions, self.rotations])
 
     @property
     def controller(self) -> str:
@@ -110,54 +111,6 @@ class LayPlan:
             "least_friction" if self.method in ("least_friction", "optimised") else "exact",
         )
 
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the motion to a file.
-
-        Parameters
-        ----------
-        path : str or Path
-            ``.csv``, with the header t,x,y,z,qx,qy,qz,qw [s, m], which `withe.io.load_poses` reads, or ``.json``, with
-            phases, cable and pattern beside, which `load` reads.
-
-        Raises
-        ------
-        ValueError
-            Another ending.
-        """
-        path = FilePath(path)
-        if path.suffix == ".csv":
-            save_poses(path, self.times, np.column_stack([self.positions, self.rotations]))
-        elif path.suffix == ".json":
-            save_json(path, KIND, VERSION, self.to_dict())
-        else:
-            raise ValueError(f"path must end in .csv or .json, got {path.name!r}")
-
-    @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> LayPlan:
-        """Read a plan that `save` wrote as JSON: the same to the last digit, for `deploy`, `plot` and all the rest.
-
-        Parameters
-        ----------
-        path : str or Path
-
-        Returns
-        -------
-        LayPlan
-
-        Raises
-        ------
-        ValueError
-            A file that is damaged, of something else (a table of poses has no plan), or of another version.
-        OSError
-            The file cannot be opened.
-
-        Examples
-        --------
-        >>> motion.save("motion.json")  # doctest: +SKIP
-        >>> withe.deployment.LayPlan.load("motion.json").feasibility(0.4)  # doctest: +SKIP
-        """
-        return load_json(path, KIND, VERSION, lambda content: cls(**parts_of(content)))
-
     def plot(self, friction: float) -> Any:
         """Draw the pattern coloured by the friction that it needs, the jaw's way, and each test along the cable.
 
@@ -173,7 +126,7 @@ class LayPlan:
         title = f"{self.method}, {1e3 * self.speed:.0f} mm/s"
         return draw_plan(self.pattern, self.positions, self.feasibility(friction), title)
 
-    def to_dict(self) -> dict[str, object]:
+    def to_dict(self) -> dict[str, Any]:
         """All numbers as lists, for JSON. SI units."""
         return {
             "controller": self.method,
@@ -190,7 +143,7 @@ class LayPlan:
             },
             "pattern": {
                 **self.pattern.to_dict(),
-                "needed_friction": [None if not np.isfinite(x) else x for x in self.needed_friction.tolist()],
+                "needed_friction": listed(self.needed_friction),
             },
             "posts": [asdict(post) for post in self.posts],
             "motion": {

@@ -12,8 +12,9 @@ from withe.common import validation
 from withe.folding.jaw import Jaw
 from withe.folding.paper import Paper
 from withe.folding.sheets import Elastica
+from withe.io import increasing_times, listed, with_gaps
 
-__all__ = ["KIND", "VERSION", "listed", "parts_of", "sheet_listed"]
+__all__ = ["KIND", "VERSION", "parts_of", "sheet_listed"]
 
 FloatArray = npt.NDArray[np.float64]
 KIND, VERSION = "plan of a fold", 1
@@ -21,11 +22,6 @@ _LIMITS = ("speed", "turning", "acceleration")
 _SHARES = ("gravito_bending_length", "friction")
 _FLAGS = ("valid", "stable")
 _ROUNDED = 1e-6  # of angles that quaternions tell [rad]
-
-
-def listed(values: FloatArray) -> list[Any]:
-    """Numbers as JSON takes them: what is not finite is None."""
-    return [value if np.isfinite(value) else None for value in values.tolist()]
 
 
 def sheet_listed(sheet: Elastica | None) -> dict[str, list[Any]] | None:
@@ -43,12 +39,10 @@ def parts_of(content: Mapping[str, Any]) -> dict[str, Any]:
     KeyError, TypeError, ValueError
         Something is missing, of another kind, or does not fit the rest.
     """
-    times = validation.number_array(content["times"], "times", ("n",))
+    times = increasing_times(content["times"], "times")
     count = len(times)
     poses = validation.number_array(content["poses"], "poses", (count, 7))
     angles = validation.number_array(content["angles"], "angles", (count,))
-    if count < 2 or times[0] != 0.0 or (np.diff(times) <= 0.0).any():
-        raise ValueError("times must be two or more values that increase from 0")
     turned = np.stack([np.sin(0.5 * angles), np.zeros(count), np.cos(0.5 * angles)], axis=1)
     if (np.abs(poses[:, 4:] - turned) > _ROUNDED).any() or poses[:, 3].any():
         raise ValueError("poses must be turned about y by angles")
@@ -97,7 +91,5 @@ def _sheet(columns: Mapping[str, Any] | None, count: int) -> Elastica | None:
         if name in _FLAGS:
             arrays[name] = np.array([validation.truth(value, f"{name} of sheet") for value in values])
         else:
-            known = [0.0 if value is None else value for value in values]
-            missing = [value is None for value in values]
-            arrays[name] = np.where(missing, np.nan, validation.number_array(known, f"{name} of sheet", (count,)))
+            arrays[name] = with_gaps(values, f"{name} of sheet", count)
     return Elastica(**arrays)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,10 +15,10 @@ from withe.common.extras import require
 from withe.folding.figures import draw_fold, side_view
 from withe.folding.jaw import Jaw, inner_edge
 from withe.folding.paper import Paper
-from withe.folding.plan_files import KIND, VERSION, listed, parts_of, sheet_listed
+from withe.folding.plan_files import KIND, VERSION, parts_of, sheet_listed
 from withe.folding.sheets import Elastica, at_forces, drag, forces_of, join, of_other, take
 from withe.folding.widths import Width, free_width
-from withe.io import load_json, pose_path, save_json, save_poses
+from withe.io import PlanFile, listed
 
 __all__ = ["SHORT", "FoldPlan", "flat_forces"]
 
@@ -38,7 +36,7 @@ def flat_forces(width: Width) -> tuple[float, float, float]:
 
 
 @dataclass(frozen=True, eq=False)
-class FoldPlan:
+class FoldPlan(PlanFile):
     """Poses and times of a jaw that folds a sheet.
 
     The origin of the world is the middle of the lifted edge in the flat sheet. x points along the sheet to its far
@@ -111,6 +109,14 @@ class FoldPlan:
     blocked: str | None = None
     _foreseen: Elastica | None = field(default=None, repr=False)
 
+    KIND = KIND
+    VERSION = VERSION
+    _parts_of = staticmethod(parts_of)
+
+    @property
+    def _saved_poses(self) -> FloatArray:
+        return self.poses
+
     @cached_property
     def _inner(self) -> FloatArray:
         """Poses of the jaw's inner edge in Lgb."""
@@ -151,17 +157,6 @@ class FoldPlan:
         lost[:begin] = False
         known = np.cumsum(lost) == 0
         return replace(sheet, valid=sheet.valid & known, stable=sheet.stable & known), slide
-
-    @property
-    def path(self) -> FloatArray:
-        """Rows t, x, y, z, qw, qx, qy, qz of shape (n, 8), for hands of a simulation, which have the scalar first.
-
-        >>> import withe
-        >>> plan = withe.folding.plan(withe.folding.Paper.a4())
-        >>> hand = scene.grasp(sheet, at=0.005, length=0.01, pose=plan.path[0, 1:])  # doctest: +SKIP
-        >>> simulation.move(hand, path=plan.path)  # doctest: +SKIP
-        """
-        return pose_path(self.times, self.poses)
 
     @property
     def sheet(self) -> Elastica:
@@ -360,55 +355,3 @@ class FoldPlan:
                 "max_curvature": listed(self.max_curvature),
             },
         }
-
-    def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write poses and times for a robot.
-
-        Parameters
-        ----------
-        path : path-like
-            "NAME.csv": columns t, x, y, z, qx, qy, qz, qw, the fields of geometry_msgs' PoseArray and
-            trajectory_msgs' MultiDOFJointTrajectory, which `withe.io.load_poses` reads for a hand; "NAME.json":
-            everything, which `load` reads.
-
-        Returns
-        -------
-        Path
-
-        Raises
-        ------
-        ValueError
-            Another ending.
-        """
-        path = Path(path)
-        if path.suffix == ".csv":
-            return save_poses(path, self.times, self.poses)
-        if path.suffix != ".json":
-            raise ValueError(f"path must end in .csv or .json, got {path.name!r}")
-        return save_json(path, KIND, VERSION, self.to_dict())
-
-    @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> FoldPlan:
-        """Read a plan that `save` wrote as JSON: the same to the last digit, for `replan`, `plot` and all the rest.
-
-        Parameters
-        ----------
-        path : path-like
-
-        Returns
-        -------
-        FoldPlan
-
-        Raises
-        ------
-        ValueError
-            A file that is damaged, of something else (a table of poses has no plan), or of another version.
-        OSError
-            The file cannot be opened.
-
-        Examples
-        --------
-        >>> plan.save("fold.json")  # doctest: +SKIP
-        >>> withe.folding.FoldPlan.load("fold.json").plot()  # doctest: +SKIP
-        """
-        return load_json(path, KIND, VERSION, lambda content: cls(**parts_of(content)))
