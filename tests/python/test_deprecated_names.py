@@ -18,7 +18,7 @@ QUICK = {"nodes": 25, "progress": False, "quasi_static": True}
 
 
 def warned(call, *words):
-    """What a call returns that must warn once for each old word, naming the new one, at the line of the call."""
+    """Return the result of a call that must warn once per old word, at the line of the call, and name the new word."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", DeprecationWarning)
         found = call()

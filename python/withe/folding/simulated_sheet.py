@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from copy import copy
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -15,29 +14,18 @@ from withe.common.keywords import keyword_hints
 from withe.folding.carrying import FRAMES, Watch, carried
 from withe.folding.jaw import Jaw
 from withe.folding.jaw_motion import JawMotion, Motion, lead
-from withe.folding.noise import Drawn, Noise
-from withe.folding.paper import Paper, require_length
+from withe.folding.noise import Noise
+from withe.folding.paper import Paper
 from withe.folding.paper_rods import add_paper, jaw_stiffness
-from withe.folding.views import strip_picture, table_picture
-from withe.perception.camera import Camera
+from withe.folding.table_sheet import LONGEST, TableSheet, node_places
+from withe.folding.views import strip_picture
 from withe.recording.record import Record
-from withe.scene.scene import Scene
-from withe.simulation.simulation import Simulation
 from withe.simulation.snapshots import Snapshot
 
-__all__ = ["LONGEST", "Fold", "FoldingMotion", "Held", "SimulatedSheet", "node_places", "require_motion"]
+__all__ = ["Fold", "Held", "SimulatedSheet"]
 
 FloatArray = npt.NDArray[np.float64]
 _STRIP = ((0.0, 1.0), (1.0, 1.0))
-LONGEST = 600.0  # [s] that a progress bar expects of motions that it does not know
-
-
-class FoldingMotion(Motion, Protocol):
-    """A motion that says where it brings the edge."""
-
-    @property
-    def target(self) -> float:
-        """[m]."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +76,7 @@ class Held:
 
 
 @keyword_hints
-class SimulatedSheet:
+class SimulatedSheet(TableSheet[Fold]):
     """Simulate a sheet on a table, and a jaw that holds one of its edges.
 
     The sheet is a planar rod with inertia, stretching, bending, weight and thickness, with anchored friction on the
@@ -148,25 +136,12 @@ class SimulatedSheet:
         own_friction: float = 0.3,
         record_every: float = FRAMES,
     ) -> None:
-        if not isinstance(paper, Paper):
-            raise ValueError(f"paper must be a Paper, got {paper!r}")
-        if noise is not None and not isinstance(noise, Noise):
-            raise ValueError(f"noise must be a Noise, got {noise!r}")
-        seed = validation.integer(seed, "seed", 0, 2**63 - 1)
+        super().__init__(paper, seed, noise, jaw)
         edges = validation.integer(edges, "edges", 20, 100_000)
-        self.paper, self._seed = paper, seed
-        self._grain = np.random.default_rng(seed)
-        self.jaw = Jaw() if jaw is None else jaw
         self._record_every = record_every
-        self._drawn = Drawn.of(Noise.none() if noise is None else noise, seed)
-        self.truth = replace(
-            paper,
-            gravito_bending_length=paper.gravito_bending_length * self._drawn.gravito_bending_length,
-            friction=paper.friction * self._drawn.friction,
-        )
         places = node_places(paper.length, self.jaw.depth, edges)
         self._widths = paper.width_at(places)
-        scene = Scene(gravity=9.81 * np.array([np.sin(self._drawn.tilt), 0.0, -np.cos(self._drawn.tilt)]))
+        scene = self._tilted_scene()
         self.rod = add_paper(scene, self.truth, places, self._drawn.curl)
         # Surfaces press on each other from a twentieth of the thickness on; a jaw at the sheet's height does not.
         scene.add_floor(-0.55 * paper.thickness, friction=self._friction(), restitution=0.0, name="table")
@@ -179,7 +154,7 @@ class SimulatedSheet:
             force_limit=self.jaw.force_limit,
             name="jaw",
         )
-        self.simulation: Simulation = scene.build(integrator="backward_euler", time_step=time_step, planar=True)
+        self.simulation = scene.build(integrator="backward_euler", time_step=time_step, planar=True)
         self._flat = self.simulation.hand("jaw").pose.rotation
 
     def _friction(self) -> float | Callable[[FloatArray], FloatArray]:
@@ -198,27 +173,9 @@ class SimulatedSheet:
         """Return the slide of the sheet's far edge over the table, in the direction of x [m]."""
         return float(self.positions()[-1, 0]) - self.paper.length
 
-    def picture(self, camera: Camera, size: tuple[int, int] = (640, 480)) -> npt.NDArray[np.uint8]:
-        """Take a picture of the sheet as it lies now, on a dark table.
-
-        Parameters
-        ----------
-        camera : withe.perception.Camera
-        size : (int, int) [px]
-            Width and height.
-
-        Returns
-        -------
-        ndarray of uint8, shape (height, width, 3)
-            Red, green, blue, with a sensor's noise.
-
-        Raises
-        ------
-        ImportError
-            OpenCV is not installed.
-        """
+    def _outline(self) -> list[FloatArray]:
         across = np.multiply.outer(0.5 * self._widths, [0.0, 1.0, 0.0])
-        return table_picture([self.positions() - across, self.positions() + across], camera, size, self._grain)
+        return [self.positions() - across, self.positions() + across]
 
     def strip_picture(
         self, length: float | None = None, scale: float = 4000.0, *, turned: bool = False
@@ -251,64 +208,11 @@ class SimulatedSheet:
         curl = -self._drawn.curl if turned else self._drawn.curl
         return strip_picture(strip, curl, length, scale, self._grain)
 
-    def fold(self, plan: FoldingMotion, *, progress: bool = True) -> Fold:
-        """Carry out a plan, from the flat sheet.
-
-        Parameters
-        ----------
-        plan : FoldPlan
-            Or anything else with `times`, `poses` and `target` like those of a plan.
-        progress : bool
-            Whether to show a progress bar.
-
-        Returns
-        -------
-        Fold
-
-        Raises
-        ------
-        ValueError
-            Not a plan, or one for paper of another size; poses that are not finite or do not begin at the flat sheet,
-            times that do not grow.
-
-        Examples
-        --------
-        >>> import withe
-        >>> paper = withe.folding.Paper.a4()
-        >>> folded = withe.folding.SimulatedSheet(paper).fold(withe.folding.plan(paper))  # doctest: +SKIP
-        >>> print(f"slides {1e3 * folded.slide:.1f} mm")  # doctest: +SKIP
-        slides 7.7 mm
-        """
-        require_motion(plan, self.paper)
-        return self.carry_out([plan], plan.target, duration=float(plan.times[-1] - plan.times[0]), progress=progress)
-
     def carry_out(
         self, motions: Iterable[Motion], target: float, *, duration: float = LONGEST, progress: bool = True
     ) -> Fold:
-        """Carry out motions in a row, from the flat sheet.
-
-        Parameters
-        ----------
-        motions : iterable of FoldPlan
-            Each is asked for when the one before has ended, so that a generator may look at the sheet in between. The
-            first pose of a motion is where the one before has ended.
-        target : float [m]
-            Place on the sheet where the lifted edge should lie in the end.
-        duration : float [s]
-            That a progress bar expects.
-        progress : bool
-
-        Returns
-        -------
-        Fold
-
-        Raises
-        ------
-        ValueError
-            As `fold`, or what a generator raised.
-        """
-        self.simulation.reset()
-        self._grain = np.random.default_rng(self._seed)
+        """Carry out motions in a row, from the flat sheet. See `TableSheet.carry_out`."""
+        self._begin()
         return self._carried(JawMotion(motions, self._drawn), target, duration, progress)
 
     def hold(self) -> Held:
@@ -340,20 +244,3 @@ class SimulatedSheet:
             record=self.simulation.record,
             slip=watch.slip,
         )
-
-
-def require_motion(plan: FoldingMotion, paper: Paper) -> None:
-    """Refuse what is no motion, and one that was planned for a longer or shorter sheet."""
-    if not all(hasattr(plan, name) for name in ("times", "poses", "target")):
-        raise ValueError(f"plan must be a FoldPlan, or have times, poses and target, got {plan!r:.80}")
-    require_length(paper, getattr(plan, "paper", paper))
-
-
-def node_places(length: float, depth: float, edges: int) -> FloatArray:
-    """Nodes along a sheet, so that the inner edge of the jaw is in the middle of an edge: that is how far it is held.
-
-    The direction of an edge is that of the sheet in its middle, to second order in its length.
-    """
-    held = max(0, round(edges * depth / length - 0.5))
-    last = depth * (held + 1.0) / (held + 0.5) if depth > 0.0 else length / edges
-    return np.concatenate([np.linspace(0.0, last, held + 2), np.linspace(last, length, edges - held)[1:]])

@@ -16,17 +16,14 @@ from withe.common.keywords import keyword_hints
 from withe.folding.carrying import Watch, carried
 from withe.folding.jaw import Jaw
 from withe.folding.jaw_motion import JawMotion, Motion, lead
-from withe.folding.noise import Drawn, Noise
+from withe.folding.noise import Noise
 from withe.folding.paper import Paper
 from withe.folding.paper_rods import jaw_stiffness, strip_numbers
-from withe.folding.simulated_sheet import LONGEST, FoldingMotion, node_places, require_motion
-from withe.folding.views import table_picture
+from withe.folding.table_sheet import LONGEST, TableSheet, node_places
 from withe.parts.handles import Rod
 from withe.parts.materials import Stiffness
-from withe.perception.camera import Camera
 from withe.recording.record import Record
 from withe.scene.scene import Scene
-from withe.simulation.simulation import Simulation
 
 __all__ = ["WideFold", "WideSheet"]
 
@@ -74,7 +71,7 @@ class WideFold:
 
 
 @keyword_hints
-class WideSheet:
+class WideSheet(TableSheet[WideFold]):
     """Two strips of a sheet on a table, joined at their far ends and held by one jaw: what slides unevenly turns.
 
     As `SimulatedSheet`, in space. Each strip is a rod with half of the sheet's width, at the middle of its half, and
@@ -131,35 +128,22 @@ class WideSheet:
         time_step: float = 0.01,
         own_friction: float = 0.3,
     ) -> None:
-        if not isinstance(paper, Paper):
-            raise ValueError(f"paper must be a Paper, got {paper!r}")
+        super().__init__(paper, seed, noise, jaw)
         if not paper.is_strip:
             raise ValueError("paper must have uniform width for two strips of one width, but has an outline")
-        if noise is not None and not isinstance(noise, Noise):
-            raise ValueError(f"noise must be a Noise, got {noise!r}")
-        seed = validation.integer(seed, "seed", 0, 2**63 - 1)
         edges = validation.integer(edges, "edges", 20, 100_000)
         uneven = validation.non_negative(unevenness, "unevenness")
         if uneven > 0.5:
             raise ValueError(f"unevenness must be at most 0.5, got {uneven:g}: friction would be negative")
-        self.paper, self.jaw = paper, Jaw() if jaw is None else jaw
-        self._drawn = Drawn.of(Noise.none() if noise is None else noise, seed)
-        self.truth = replace(
-            paper,
-            gravito_bending_length=paper.gravito_bending_length * self._drawn.gravito_bending_length,
-            friction=paper.friction * self._drawn.friction,
-        )
-        more = uneven * np.clip(np.random.default_rng((seed, 2)).normal(), -2.0, 2.0)
+        more = uneven * np.clip(np.random.default_rng((self._seed, 2)).normal(), -2.0, 2.0)
         self.frictions = self.truth.friction * np.array([1.0 - more, 1.0 + more])
-        self._seed, self._grain = seed, np.random.default_rng(seed)
         self._places = node_places(paper.length, self.jaw.depth, edges)
         self._sides = np.array([-0.25, 0.25]) * paper.width
         scene, self.strips = self._scene(validation.non_negative(own_friction, "own_friction"))
-        self.simulation: Simulation = scene.build(integrator="backward_euler", time_step=time_step)
+        self.simulation = scene.build(integrator="backward_euler", time_step=time_step)
 
     def _scene(self, own_friction: float) -> tuple[Scene, tuple[Rod, Rod]]:
-        tilt, paper = self._drawn.tilt, self.paper
-        scene = Scene(gravity=9.81 * np.array([np.sin(tilt), 0.0, -np.cos(tilt)]))
+        paper, scene = self.paper, self._tilted_scene()
         line_density, bend, stretch = strip_numbers(replace(self.truth, width=0.5 * paper.width))
         stiffness = Stiffness(stretch=stretch, bend=(_IN_PLANE * bend, bend), twist=_TWIST * bend)
         zero, radius = np.zeros_like(self._places), 0.5 * paper.thickness
@@ -234,35 +218,12 @@ class WideSheet:
         scene.set_contact_group(rib, "across")
         scene.ignore_contact(rib, "table")
 
-    def fold(self, plan: FoldingMotion, *, progress: bool = True) -> WideFold:
-        """Carry out a plan, from the flat sheet.
-
-        Parameters
-        ----------
-        plan : FoldPlan
-            Or anything else with `times`, `poses` and `target` like those of a plan.
-        progress : bool
-            Whether to show a progress bar.
-
-        Returns
-        -------
-        WideFold
-
-        Raises
-        ------
-        ValueError
-            As `SimulatedSheet.fold`.
-        """
-        require_motion(plan, self.paper)
-        return self.carry_out([plan], plan.target, duration=float(plan.times[-1] - plan.times[0]), progress=progress)
-
     def carry_out(
         self, motions: Iterable[Motion], target: float, *, duration: float = LONGEST, progress: bool = True
     ) -> WideFold:
-        """Carry out motions in a row, from the flat sheet, as `SimulatedSheet.carry_out`."""
+        """Carry out motions in a row, from the flat sheet. See `TableSheet.carry_out`."""
         simulation = self.simulation
-        simulation.reset()
-        self._grain = np.random.default_rng(self._seed)
+        self._begin()
         jaw = JawMotion(motions, self._drawn)
         for strip, y in zip(self.strips, self._sides, strict=True):
             hand = simulation.hand(f"jaw on {strip.name}")
@@ -270,27 +231,10 @@ class WideSheet:
         hands = [f"jaw on {strip.name}" for strip in self.strips]
         return self._result(target, carried(simulation, jaw, self.strips, hands, duration, progress))
 
-    def picture(self, camera: Camera, size: tuple[int, int] = (640, 480)) -> npt.NDArray[np.uint8]:
-        """Take a picture of the sheet as it lies now, as `SimulatedSheet.picture`; it is straight across.
-
-        Parameters
-        ----------
-        camera : withe.perception.Camera
-        size : (int, int) [px]
-            Width and height.
-
-        Returns
-        -------
-        ndarray of uint8, shape (height, width, 3)
-
-        Raises
-        ------
-        ImportError
-            OpenCV is not installed.
-        """
+    def _outline(self) -> list[FloatArray]:
         first, second = (self.simulation.positions(strip) for strip in self.strips)
         middle, across = 0.5 * (first + second), second - first  # strips are in the middles of their halves
-        return table_picture([middle - across, middle + across], camera, size, self._grain)
+        return [middle - across, middle + across]
 
     def _result(self, target: float, watch: Watch) -> WideFold:
         ends = [self.simulation.positions(strip)[[0, -1], 0] for strip in self.strips]
