@@ -157,7 +157,7 @@ def test_a_plan_is_read_back_as_it_was(options, tmp_path):
         (lambda text: text.replace('"laid"', '"lain"'), "is a damaged plan of a deployment: it has no 'laid'"),
         (lambda text: text.replace('"radius": 0.0016', '"radius": -1'), "damaged .*: radius must be positive"),
         (lambda text: text.replace('"name": "lay"', '"name": "fly"'), "damaged .*: name of a phase must be"),
-        (lambda text: text.replace('"t": [', '"t": [-1.0, '), "damaged .*: quaternion_xyzw must have shape"),
+        (lambda text: text.replace('"t": [', '"t": [-1.0, '), "damaged .*: t must be two or more values that increase"),
         (lambda text: text.replace('"arc_length": [', '"arc_length": [-1.0, '), "damaged .*: arc_length must increase"),
     ],
 )

@@ -146,7 +146,7 @@ def test_signatures_and_docstrings_stay_in_view():
 def test_words_of_other_packages_lead_to_words_that_there_are():
     owners = [
         *(withe.Scene, withe.Simulation, withe.Batch, withe.Material, withe.Stiffness),
-        *(withe.Circle, withe.Tube, withe.Rectangle),
+        *(withe.Circle, withe.Tube, withe.Rectangle, withe.Solver),
     ]
     calls = [withe.view.plot, withe.view.picture, withe.view.animate]
     calls += [each for owner in owners for _, each in inspect.getmembers(owner, inspect.isfunction)]
@@ -158,7 +158,16 @@ def test_words_of_other_packages_lead_to_words_that_there_are():
 
 def public_functions():
     """Functions and methods of the package that take keywords only, by their names."""
-    modules = [withe, withe.learning, withe.folding, withe.deployment, withe.perception, withe.real2sim, withe.shapes]
+    modules = [
+        withe,
+        withe.learning,
+        withe.folding,
+        withe.deployment,
+        withe.perception,
+        withe.real2sim,
+        withe.shapes,
+        withe.knots,
+    ]
     for module in modules:
         for name in module.__all__:
             found = getattr(module, name)

@@ -116,7 +116,7 @@ def test_an_exception_closes_the_bar(monkeypatch, without_rich):
 @pytest.mark.parametrize("enabled", ["yes", None, 2])
 def test_other_switches_are_refused(enabled):
     with (
-        pytest.raises(ValueError, match="progress must be True, False"),
+        pytest.raises(ValueError, match="progress must be True or False"),
         progress(1.0, "", enabled),
     ):
         pass
