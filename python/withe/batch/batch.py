@@ -61,7 +61,7 @@ class Batch(Setting, Reading):
     --------
     >>> import withe
     >>> batch = withe.Batch([scene.build(time_step=5e-3) for _ in range(3)], workers=2)
-    >>> batch.set_natural_curvature(arm, [(0, 2.0), (0, 4.0), (0, 6.0)], over=0.1)
+    >>> batch.set(arm, natural_curvature=[(0, 2.0), (0, 4.0), (0, 6.0)], over=0.1)
     >>> batch.step(20)
     >>> batch.positions(arm).shape
     (3, 31, 3)

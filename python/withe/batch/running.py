@@ -14,10 +14,8 @@ from withe.batch.lanes import Lanes
 from withe.batch.records import BatchRecord
 from withe.common import validation
 from withe.recording.recorder import Recorder
-from withe.simulation.obstacles import obstacle_outlines
+from withe.simulation.outlines import outlines_of
 from withe.simulation.simulation import Simulation
-from withe.simulation.springs import spring_outlines
-from withe.simulation.tendons import tendon_outlines
 
 __all__ = ["BatchRun"]
 
@@ -82,9 +80,7 @@ class BatchRun(Generic[B]):
         simulation = self._simulation(number)
         directory = simulation._session.directory
         rows = {name: self._row_of(name, number) for name in self._extras}
-        return Recorder(
-            simulation, rows, obstacle_outlines(directory), spring_outlines(directory), tendon_outlines(directory)
-        )
+        return Recorder(simulation, rows, *outlines_of(directory))
 
     def _row_of(self, name: str, number: int) -> Callable[[Simulation], npt.ArrayLike]:
         return lambda _: np.asarray(self._rows[name][number])

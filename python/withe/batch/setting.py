@@ -10,8 +10,10 @@ import numpy.typing as npt
 
 from withe.batch.lanes import IntArray, Lanes, row
 from withe.common import validation
+from withe.common.deprecation import old_word
 from withe.common.keywords import keyword_hints
 from withe.parts.handles import NodeHandle, Obstacle, Rod, Support
+from withe.parts.parameters import NATURAL_WORDS
 
 __all__ = ["Setting"]
 
@@ -33,107 +35,41 @@ class Setting:
         discrete: bool = False,
         lanes: npt.ArrayLike | None = None,
     ) -> None:
-        """Actuate a rod of every simulation by the curvature at which it is free of stress.
-
-        Parameters
-        ----------
-        rod : Rod or str
-        curvature : array_like of shape (n, 2) or (n, stencils, 2) [1/m]
-            A row for each simulation, or for each of `lanes`: see `Simulation.set_natural_curvature`.
-        over : float [s]
-            Reached after so long, evenly; at once by default.
-        discrete : bool
-            Whether the curvature is 2 tan(phi / 2) [-], phi the angle between two edges.
-        lanes : array_like of shape (n,), bool, or of numbers, optional
-            Which simulations; all by default.
-
-        Raises
-        ------
-        ValueError
-            Wrong shape, not finite, a turn of pi or more at a node (then nothing is changed), or out of the plane of a
-            simulation that was built with planar=True.
-
-        Examples
-        --------
-        >>> batch = scene.build_batch(3)
-        >>> batch.set_natural_curvature(arm, [(0, 2.0), (0, 4.0), (0, 6.0)], over=0.2)
-        """
-        part = self._lanes.rod(rod)
-        numbers, stencils = self._lanes.chosen(lanes), len(part.voronoi)
-        what = f"natural_curvature of {part.owner}"
-        values = validation.number_array(curvature, what, (len(numbers), 2), (len(numbers), stencils, 2))
-        if values.ndim == 2:
-            values = np.repeat(values[:, None], stencils, axis=1)
-        self._lanes.engine.set_natural_curvature(
-            numbers,
-            part.index,
-            values,
-            validation.non_negative(over, "over"),
-            self._lanes.voronoi(part),
-            validation.truth(discrete, "discrete"),
-            what,
-        )
+        """Deprecated: use ``set(rod, natural_curvature=..., over=...)``, or discrete_curvature."""
+        old_word("set_natural_curvature", "set(rod, natural_curvature=..., over=...)")
+        _curve(self._lanes, rod, curvature, over, lanes, discrete=validation.truth(discrete, "discrete"))
 
     def set_natural_twist(
         self, rod: Rod | str, twist: npt.ArrayLike, over: float = 0.0, *, lanes: npt.ArrayLike | None = None
     ) -> None:
-        """Actuate a rod of every simulation by the twist at which it is free of stress.
-
-        Parameters
-        ----------
-        rod : Rod or str
-        twist : array_like of shape (n,) or (n, stencils) [rad/m]
-        over : float [s]
-        lanes : array_like, optional
-            Which simulations; all by default.
-
-        Raises
-        ------
-        ValueError
-            Wrong shape, not finite, or not zero in a simulation that was built with planar=True.
-        """
-        part = self._lanes.rod(rod)
-        numbers = self._lanes.chosen(lanes)
-        values = _spread(twist, f"natural_twist of {part.owner}", len(numbers), len(part.voronoi))
-        _lead(self._lanes.engine.set_natural_twist, part.index, values, over, numbers)
+        """Deprecated: use ``set(rod, natural_twist=..., over=...)``."""
+        old_word("set_natural_twist", "set(rod, natural_twist=..., over=...)")
+        _twist(self._lanes, rod, twist, over, lanes)
 
     def set_natural_stretch(
         self, rod: Rod | str, stretch: npt.ArrayLike, over: float = 0.0, *, lanes: npt.ArrayLike | None = None
     ) -> None:
-        """Actuate a rod of every simulation by the length at which it is free of stress.
+        """Deprecated: use ``set(rod, natural_stretch=..., over=...)``."""
+        old_word("set_natural_stretch", "set(rod, natural_stretch=..., over=...)")
+        _stretch(self._lanes, rod, stretch, over, lanes)
 
-        Parameters
-        ----------
-        rod : Rod or str
-        stretch : array_like of shape (n,) or (n, edges) [-]
-            Natural over drawn length.
-        over : float [s]
-        lanes : array_like, optional
-            Which simulations; all by default.
-
-        Raises
-        ------
-        ValueError
-            Wrong shape, not finite, or not positive.
-        """
-        part = self._lanes.rod(rod)
-        numbers, what = self._lanes.chosen(lanes), f"natural_stretch of {part.owner}"
-        values = _spread(stretch, what, len(numbers), len(part.lengths))
-        if np.any(values <= 0.0):
-            raise ValueError(f"{what} must be positive, got {values.min():g}")
-        _lead(self._lanes.engine.set_natural_stretch, part.index, values, over, numbers)
-
-    def set(self, target: Any = None, /, *, lanes: npt.ArrayLike | None = None, **values: Any) -> None:
+    def set(
+        self, target: Any = None, /, *, over: float = 0.0, lanes: npt.ArrayLike | None = None, **values: Any
+    ) -> None:
         """Change parameters of every simulation, such as a modulus for each (domain randomisation).
 
         Parameters
         ----------
         target : handle or str
             As `Simulation.set` takes it.
+        over : float [s]
+            Duration over which what `Simulation.set` leads evenly goes to its value; 0: at once.
         lanes : array_like, optional
-            Which simulations; all by default.
+            Mask or numbers of the simulations; all by default.
         **values
             Words of `Simulation.set`. An array has a row for each simulation; a number, a function or None is for all.
+            Natural shapes of a rod are arrays with a row for each simulation: natural_curvature of shape (n, 2) or
+            (n, stencils, 2) [1/m], natural_twist (n,) or (n, stencils) [rad/m], natural_stretch (n,) or (n, edges) [-].
 
         Raises
         ------
@@ -145,14 +81,29 @@ class Setting:
         --------
         >>> batch = scene.build_batch(3)
         >>> batch.set(arm, youngs_modulus=[0.8e6, 1.0e6, 1.2e6])
+        >>> batch.set(arm, natural_curvature=[(0, 2.0), (0, 4.0), (0, 6.0)], over=0.2)
         """
         numbers = self._lanes.chosen(lanes)
+        natural = _natural(self._lanes, target, values)
+        if "natural_curvature" in natural and "discrete_curvature" in natural:
+            raise ValueError("natural_curvature and discrete_curvature must not be given together")
+        for word, value in natural.items():
+            del values[word]
+            given = np.full(len(numbers), value) if np.ndim(value) == 0 else value
+            if word == "natural_twist":
+                _twist(self._lanes, target, given, over, lanes)
+            elif word == "natural_stretch":
+                _stretch(self._lanes, target, given, over, lanes)
+            else:
+                _curve(self._lanes, target, given, over, lanes, discrete=word == "discrete_curvature")
+        if natural and not values:
+            return
         rows = [
             {word: row(value, place, len(numbers), word) for word, value in values.items()}
             for place in range(len(numbers))
         ]
         for place, simulation in self._lanes.each(numbers):
-            simulation.set(target, **rows[place])
+            simulation.set(target, over=over, **rows[place])
 
     def move(
         self,
@@ -207,6 +158,52 @@ class Setting:
                 roll=None if rolls is None else float(rolls[place]),
                 over=over,
             )
+
+
+def _curve(
+    owner: Lanes, rod: Rod | str, curvature: npt.ArrayLike, over: float, lanes: npt.ArrayLike | None, *, discrete: bool
+) -> None:
+    part = owner.rod(rod)
+    numbers, stencils = owner.chosen(lanes), len(part.voronoi)
+    what = f"natural_curvature of {part.owner}"
+    values = validation.number_array(curvature, what, (len(numbers), 2), (len(numbers), stencils, 2))
+    if values.ndim == 2:
+        values = np.repeat(values[:, None], stencils, axis=1)
+    owner.engine.set_natural_curvature(
+        numbers,
+        part.index,
+        values,
+        validation.non_negative(over, "over"),
+        owner.voronoi(part),
+        discrete,
+        what,
+    )
+
+
+def _twist(owner: Lanes, rod: Rod | str, twist: npt.ArrayLike, over: float, lanes: npt.ArrayLike | None) -> None:
+    part = owner.rod(rod)
+    numbers = owner.chosen(lanes)
+    values = _spread(twist, f"natural_twist of {part.owner}", len(numbers), len(part.voronoi))
+    _lead(owner.engine.set_natural_twist, part.index, values, over, numbers)
+
+
+def _stretch(owner: Lanes, rod: Rod | str, stretch: npt.ArrayLike, over: float, lanes: npt.ArrayLike | None) -> None:
+    part = owner.rod(rod)
+    numbers, what = owner.chosen(lanes), f"natural_stretch of {part.owner}"
+    values = _spread(stretch, what, len(numbers), len(part.lengths))
+    if np.any(values <= 0.0):
+        raise ValueError(f"{what} must be positive, got {values.min():g}")
+    _lead(owner.engine.set_natural_stretch, part.index, values, over, numbers)
+
+
+def _natural(owner: Lanes, target: Any, values: dict[str, Any]) -> dict[str, Any]:
+    """Values of natural shapes, which the engine sets for all simulations at once."""
+    if not isinstance(target, Rod | str) or target not in {
+        *owner.first.rods,
+        *(r.name for r in owner.first.rods),
+    }:
+        return {}
+    return {word: value for word, value in values.items() if word in (*NATURAL_WORDS, "discrete_curvature")}
 
 
 def _lead(put: Callable[..., None], rod: int, values: FloatArray, over: float, numbers: IntArray) -> None:

@@ -83,7 +83,7 @@ def lay(setup: Setup, motion: Motion, *, progress: bool) -> tuple[FloatArray, Fl
         scene.pin(cable.start, free=(0.0, 0.0, 1.0))
     simulation = scene.build(integrator=_integrator(setup), time_step=setup.time_step, planar=False)
     if any(setup.cable.natural_curvature) or setup.quasi_static:
-        simulation.set_natural_curvature(cable, setup.cable.natural_curvature)
+        simulation.set(cable, natural_curvature=setup.cable.natural_curvature)
         simulation.equilibrium()
     held = simulation.hand(jaw_part)
     held.move(path=jaw_path(setup, motion, held.pose.rotation))
@@ -107,7 +107,7 @@ def hang(setup: Setup) -> FloatArray:
     cable = _add_cable(scene, setup.cable, points, "cable")
     scene.grasp(cable, at=setup.cable.length, length=JAW, stiffness=jaw_stiffness(setup.cable), name="jaw")
     simulation = scene.build(planar=False)
-    simulation.set_natural_curvature(cable, setup.cable.natural_curvature)
+    simulation.set(cable, natural_curvature=setup.cable.natural_curvature)
     simulation.equilibrium()
     return simulation.positions(cable)
 
@@ -130,7 +130,7 @@ def place(setup: Setup, points: FloatArray, *, progress: bool) -> tuple[FloatArr
     scene, cable = _scene(setup, np.column_stack([points, np.full(len(points), setup.cable.radius)]))
     scene.ignore_contact(cable, cable)  # where a pattern touches itself, the cable lies in itself
     simulation = scene.build(integrator=_integrator(setup), time_step=setup.time_step, planar=False)
-    simulation.set_natural_curvature(cable, (0.0, 0.0), over=_STRESSED)
+    simulation.set(cable, natural_curvature=(0.0, 0.0), over=_STRESSED)
     duration = _STRESSED if setup.quasi_static else _STRESSED + _SETTLING
     record = simulation.run(duration, record_every=max(_RECORD_EVERY, setup.time_step), progress=progress)
     return simulation.positions(cable), record
@@ -154,7 +154,7 @@ def hung(
     simulation = scene.build(integrator=_integrator(setups[0]), time_step=setups[0].time_step, planar=False)
     for setup, cable in zip(setups, cables, strict=True):
         if any(setup.cable.natural_curvature):
-            simulation.set_natural_curvature(cable, setup.cable.natural_curvature)
+            simulation.set(cable, natural_curvature=setup.cable.natural_curvature)
     if any(any(setup.cable.natural_curvature) for setup in setups):
         simulation.equilibrium()
     return simulation, cables, [simulation.hand(jaw) for jaw in jaws]

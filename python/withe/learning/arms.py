@@ -128,12 +128,12 @@ class Arm(Task):
         curvature = (bends * _SHARES[:, None]).take(_SEGMENT_OF, axis=1)
         if self.components == 1:
             curvature = np.concatenate([curvature, np.zeros_like(curvature)], axis=2)
-        robots.set_natural_curvature("arm", curvature, over=self.control_step, discrete=True, lanes=chosen)
+        robots.set("arm", discrete_curvature=curvature, over=self.control_step, lanes=chosen)
         if self.twisted:
             twists = np.clip(self.twists[rows] + _TWIST_STEP * parts[..., -1], -_MOST_TWIST, _MOST_TWIST)
             self.twists[rows] = twists
             rates = (twists * _SHARES).take(_SEGMENT_OF, axis=1) * ((_NODES - 1) / _LENGTH)
-            robots.set_natural_twist("arm", rates, over=self.control_step, lanes=chosen)
+            robots.set("arm", natural_twist=rates, over=self.control_step, lanes=chosen)
 
     def observe(self, robots: Batch) -> npt.NDArray[np.float32]:
         """Positions and velocities of every second node, bends, twists, and what the task adds."""

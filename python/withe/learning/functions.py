@@ -19,9 +19,10 @@ import numpy.typing as npt
 from withe.common.extras import require
 from withe.common.keywords import keyword_hints
 from withe.parts.handles import Support
+from withe.parts.table import SCENE_WORDS
 from withe.simulation.overlaps import order_of_setting, remaining
 from withe.simulation.simulation import Simulation
-from withe.simulation.unknowns import SCENE_WORDS, Unknown
+from withe.simulation.unknowns import Unknown
 
 __all__ = ["equilibrium", "rollout"]
 
@@ -210,15 +211,17 @@ def _set(simulation: Simulation, unknown: Unknown, value: FloatArray) -> None:
         if isinstance(target, tuple):
             if word != "friction":
                 raise ValueError(f"a pair of bodies has friction only, got {word!r}")
-            simulation.set_friction(*target, float(value) if value.ndim == 0 else (float(value[0]), float(value[1])))
+            simulation.set(target, friction=float(value) if value.ndim == 0 else (float(value[0]), float(value[1])))
         elif isinstance(target, Support):
             if word != "position":
                 raise ValueError(f"{_name(unknown)} cannot be given as a tensor: a support has position")
             simulation.move(target, position=value)
         else:
-            simulation.set(target, **{word: value if value.ndim else float(value)})
-    elif unknown in SCENE_WORDS:
-        simulation.set(**{unknown: value if value.ndim else float(value)})
+            values: dict[str, Any] = {word: value if value.ndim else float(value)}
+            simulation.set(target, **values)
+    elif any(unknown == word.name for word in SCENE_WORDS):
+        values = {unknown: value if value.ndim else float(value)}
+        simulation.set(**values)
     elif unknown == "initial_velocities":
         simulation.set_velocities(None, value)
     elif unknown == "initial_positions":

@@ -34,7 +34,7 @@ class _Limbs(Task):
             curvature = np.repeat(self.drawn[None], len(chosen), axis=0)
             for number, (part, component) in enumerate(self.ways):
                 curvature[:, self.parts[part], component] += self.most * own[:, index, number, None]
-            robots.set_natural_curvature(limb, curvature, over=self.control_step, lanes=chosen)
+            robots.set(limb, natural_curvature=curvature, over=self.control_step, lanes=chosen)
         self.actions[chosen] = actions
 
     def prepare(self, robots: Batch) -> None:

@@ -6,41 +6,12 @@ from typing import Any, TypeVar
 
 from withe.common.validation import near_word
 from withe.parts.handles import EdgeHandle, Handle, Layout, NodeHandle, Rod, parse_place
-from withe.parts.kinds import (
-    ContactSettings,
-    CustomForcePart,
-    DragPart,
-    FluidPart,
-    JoinPart,
-    LoadPart,
-    MassPart,
-    ObstaclePart,
-    Part,
-    Pass,
-    RodPart,
-    SpringPart,
-    SupportPart,
-    TendonPart,
-    handle_of,
-)
+from withe.parts.kinds import ContactSettings, Part, Pass, RodPart
+from withe.parts.table import handle_of, kind_of
 
 __all__ = ["Directory"]
 
 P = TypeVar("P", bound=Part)
-
-_WORDS: dict[type[Any], str] = {
-    RodPart: "rod",
-    JoinPart: "joint",
-    SupportPart: "support",
-    LoadPart: "load",
-    MassPart: "mass",
-    SpringPart: "spring",
-    TendonPart: "tendon",
-    DragPart: "drag",
-    FluidPart: "fluid",
-    CustomForcePart: "custom force",
-    ObstaclePart: "obstacle",
-}
 
 
 class Directory:
@@ -99,7 +70,7 @@ class Directory:
         if not isinstance(name, str) or not name or not name.isprintable():
             raise ValueError(f"name of the {word} must be printable text, got {name!r:.80}")
         if name in self.parts:
-            raise ValueError(f"name of the {word} must be new: {name!r} is a {_WORDS[type(self.parts[name])]}")
+            raise ValueError(f"name of the {word} must be new: {name!r} is a {kind_of(self.parts[name]).noun}")
         if parse_place(name) is not None:
             raise ValueError(f"name of the {word} must not look like the name of a node or edge, got {name!r}")
         return name
@@ -114,7 +85,7 @@ class Directory:
         """
         part = self.find_any(handle, what)
         if not isinstance(part, kind):
-            raise ValueError(f"{what} must be a {_WORDS[kind]}, got the {_WORDS[type(part)]} {part.name!r}")
+            raise ValueError(f"{what} must be a {kind_of(kind).noun}, got the {kind_of(part).noun} {part.name!r}")
         return part
 
     def find_any(self, handle: Handle | str, what: str) -> Part:

@@ -9,15 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from withe import _core
-from withe.common import validation
 from withe.parts.handles import UnionFind
 from withe.parts.kinds import JoinPart, JointForm, Pass
-from withe.parts.plausibility import check_angle
+from withe.parts.table import kind_of
 
 __all__ = [
-    "JOINT_WORDS",
     "JointGroup",
-    "checked_number",
     "connected",
     "describe_joint",
     "gather",
@@ -26,8 +23,6 @@ __all__ = [
 ]
 
 FloatArray = npt.NDArray[np.float64]
-JOINT_WORDS = ("stiffness", "rest_angle", "damping", "moment")
-"""Parameters of revolute joints, which `Simulation.set` changes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,17 +32,6 @@ class JointGroup:
     clusters: tuple[tuple[Pass, ...], ...]
     links: tuple[tuple[int, int, JoinPart], ...]
     form: JointForm
-
-
-def checked_number(name: str, word: str, value: float) -> float:
-    """A number of a revolute joint, in its range."""
-    what = f"{word} of joint {name!r}"
-    if word in ("stiffness", "damping"):
-        return validation.non_negative(value, what)
-    number = validation.number(value, what)
-    if word == "rest_angle":
-        check_angle(number, what)
-    return number
 
 
 def connected(joins_at: Mapping[Pass, Sequence[JoinPart]], seed: Pass) -> list[JoinPart]:
@@ -132,6 +116,6 @@ def describe_joint(group: JointGroup) -> _core.JointDescription:
 def _describe_link(parent: int, child: int, join: JoinPart) -> _core.RevoluteLink:
     assert join.axis is not None
     link = _core.RevoluteLink(parent, child, join.axis)
-    for word in JOINT_WORDS:
-        setattr(link, word, getattr(join, word))
+    for word in kind_of(join).words:
+        setattr(link, word.name, getattr(join, word.name))
     return link

@@ -11,22 +11,6 @@ import numpy.typing as npt
 
 from withe.common.drawing import voronoi_lengths
 from withe.parts.friction import Coefficients
-from withe.parts.handles import (
-    CustomForce,
-    Drag,
-    Fluid,
-    Hand,
-    Handle,
-    Joint,
-    Layout,
-    Load,
-    Mass,
-    Obstacle,
-    Rod,
-    Spring,
-    Support,
-    Tendon,
-)
 from withe.parts.parameters import RodParameters
 from withe.parts.sections import SectionProperties
 
@@ -55,7 +39,6 @@ __all__ = [
     "SpringPart",
     "SupportPart",
     "TendonPart",
-    "handle_of",
 ]
 
 FloatArray = npt.NDArray[np.float64]
@@ -75,6 +58,13 @@ SUPPORT_KINDS: tuple[str, ...] = get_args(SupportKind)
 
 
 @dataclass(frozen=True, eq=False)
+class Part:
+    """A part of a scene; see `withe.parts.table` for what its kind states."""
+
+    name: str
+
+
+@dataclass(frozen=True, eq=False)
 class Drawing:
     """Drawing of a rod: its directors and natural shape from its nodes."""
 
@@ -84,10 +74,9 @@ class Drawing:
 
 
 @dataclass(frozen=True, eq=False)
-class RodPart:
+class RodPart(Part):
     """A rod as it was drawn."""
 
-    name: str
     index: int
     closed: bool
     points: FloatArray  # (nodes, 3) [m]
@@ -123,10 +112,9 @@ class RodPart:
 
 
 @dataclass(frozen=True, eq=False)
-class JoinPart:
+class JoinPart(Part):
     """Two nodes that are one."""
 
-    name: str
     nodes: tuple[Pass, Pass]
     node_names: tuple[str, str]
     kind: JoinKind
@@ -154,10 +142,9 @@ class Grasp:
 
 
 @dataclass(frozen=True, eq=False)
-class SupportPart:
+class SupportPart(Part):
     """Support of a node, or of a length of a rod by a hand."""
 
-    name: str
     kind: SupportKind
     node: Pass
     node_name: str
@@ -166,10 +153,9 @@ class SupportPart:
 
 
 @dataclass(frozen=True, eq=False)
-class LoadPart:
+class LoadPart(Part):
     """A force at a node, a moment at a node, a load along a rod, or a pressure on it."""
 
-    name: str
     kind: LoadKind
     node: Pass
     value: FloatArray  # (3,), or (edges, 3) along a rod; of one that varies that at t = 0
@@ -179,19 +165,17 @@ class LoadPart:
 
 
 @dataclass(frozen=True, eq=False)
-class MassPart:
+class MassPart(Part):
     """A mass at a node."""
 
-    name: str
     node: Pass
     mass: float
 
 
 @dataclass(frozen=True, eq=False)
-class SpringPart:
+class SpringPart(Part):
     """A spring, with a damper beside it, between two nodes."""
 
-    name: str
     nodes: tuple[Pass, Pass]
     node_names: tuple[str, str]
     stiffness: float  # [N/m]
@@ -201,29 +185,26 @@ class SpringPart:
 
 
 @dataclass(frozen=True, eq=False)
-class TendonPart:
+class TendonPart(Part):
     """A tendon through guides on edges and ends of rods."""
 
-    name: str
     guides: tuple[Guide, ...]
     offsets: FloatArray  # of each guide along d1 and d2 of its edge, (guides, 2) [m]
     tension: float  # [N]
 
 
 @dataclass(frozen=True, eq=False)
-class DragPart:
+class DragPart(Part):
     """Viscous drag along rods; None: all of them."""
 
-    name: str
     coefficient: float
     rods: tuple[int, ...] | None
 
 
 @dataclass(frozen=True, eq=False)
-class FluidPart:
+class FluidPart(Part):
     """A viscous fluid around all rods."""
 
-    name: str
     model: FluidModel
     viscosity: float  # [Pa s]
     regularization: float | None  # [m]
@@ -231,20 +212,18 @@ class FluidPart:
 
 
 @dataclass(frozen=True, eq=False)
-class CustomForcePart:
+class CustomForcePart(Part):
     """Forces that a function computes."""
 
-    name: str
     function: Callable[[float, FloatArray, FloatArray], Any]
     jacobian: Callable[[float, FloatArray, FloatArray], Any] | None = None
     moments: bool = False
 
 
 @dataclass(frozen=True, eq=False)
-class ObstaclePart:
+class ObstaclePart(Part):
     """Something solid, as it was drawn."""
 
-    name: str
     kind: Literal["plane", "capsule"]
     point: FloatArray  # on the plane; start of the axis (3,) [m]
     other: FloatArray  # normal; end of the axis (3,)
@@ -287,40 +266,3 @@ class ContactSettings:
     overlap: Overlap = "error"
     pairs: Mapping[tuple[str, str], PairSettings] = field(default_factory=dict)
     groups: Mapping[str, str] = field(default_factory=dict)  # of rods
-
-
-Part = (
-    RodPart
-    | JoinPart
-    | SupportPart
-    | LoadPart
-    | MassPart
-    | SpringPart
-    | TendonPart
-    | DragPart
-    | FluidPart
-    | CustomForcePart
-    | ObstaclePart
-)
-
-_HANDLES: dict[type[Any], type[Handle]] = {
-    JoinPart: Joint,
-    SupportPart: Support,
-    LoadPart: Load,
-    MassPart: Mass,
-    SpringPart: Spring,
-    TendonPart: Tendon,
-    DragPart: Drag,
-    FluidPart: Fluid,
-    CustomForcePart: CustomForce,
-    ObstaclePart: Obstacle,
-}
-
-
-def handle_of(part: Part, scene_id: str, layout: Layout) -> Handle:
-    """The handle of a part."""
-    if isinstance(part, RodPart):
-        return Rod(scene_id, part.name, layout, part.index)
-    if isinstance(part, SupportPart) and part.grasp is not None:
-        return Hand(scene_id, part.name)
-    return _HANDLES[type(part)](scene_id, part.name)

@@ -5,14 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from withe import _core
-from withe.common import validation
 from withe.parts.directory import Directory
 from withe.parts.handles import NodeHandle
 from withe.parts.kinds import Pass, RodPart, SpringPart
+from withe.parts.table import checked, kind_of
 
-__all__ = ["SPRING_WORDS", "checked_number", "describe_springs", "make_spring"]
-
-SPRING_WORDS = ("stiffness", "rest_length", "damping")
+__all__ = ["describe_springs", "make_spring"]
 
 
 def make_spring(
@@ -35,9 +33,9 @@ def make_spring(
         name,
         (first, second),
         (first_name, second_name),
-        checked_number(name, "stiffness", stiffness),
-        checked_number(name, "rest_length", distance if rest_length is None else rest_length),
-        checked_number(name, "damping", damping),
+        checked(SpringPart, "stiffness", stiffness, name),
+        checked(SpringPart, "rest_length", distance if rest_length is None else rest_length, name),
+        checked(SpringPart, "damping", damping, name),
         rest_length is None,
     )
     if distance == 0.0 and part.rest_length > 0.0:
@@ -46,11 +44,6 @@ def make_spring(
             f"{part.rest_length:g}: draw the nodes apart, or leave rest_length out"
         )
     return part
-
-
-def checked_number(name: str, word: str, value: float) -> float:
-    """A number of a spring, which must be finite and not negative."""
-    return validation.non_negative(value, f"{word} of spring {name!r}")
 
 
 def describe_springs(directory: Directory) -> list[_core.SpringDescription]:
@@ -68,8 +61,8 @@ def describe_springs(directory: Directory) -> list[_core.SpringDescription]:
         if first == second:
             raise ValueError(_one_node(part.name, *part.node_names))
         spring.nodes = [first, second]
-        for word in SPRING_WORDS:
-            setattr(spring, word, getattr(part, word))
+        for word in kind_of(part).words:
+            setattr(spring, word.name, getattr(part, word.name))
         springs.append(spring)
     return springs
 

@@ -9,19 +9,16 @@ import numpy.typing as npt
 
 from withe import _core
 from withe.common import validation
-from withe.common.outlines import TendonOutline
 from withe.parts.directory import Directory
 from withe.parts.handles import EdgeHandle, Handle, NodeHandle, Rod, parse_place
-from withe.parts.kinds import Guide, GuidePlace, RodPart, TendonPart
+from withe.parts.kinds import Guide, RodPart, TendonPart
 from withe.parts.plausibility import check_offset
+from withe.parts.table import checked, tendon_outline
 
-__all__ = ["Guides", "checked_tension", "describe_tendons", "make_tendon", "outline_of"]
+__all__ = ["Guides", "describe_tendons", "make_tendon"]
 
 FloatArray = npt.NDArray[np.float64]
 Guides = Rod | str | Iterable[EdgeHandle | NodeHandle | str]
-
-_SHARES: dict[GuidePlace, float] = {"start": 0.0, "middle": 0.5, "end": 1.0}
-"""Where along its edge a guide is."""
 
 
 def make_tendon(
@@ -33,7 +30,8 @@ def make_tendon(
     if len(places) < 2:
         raise ValueError(f"tendon {name!r} must have at least two guides, got {len(places)}")
     given = validation.number_array(offset, f"offset of tendon {name!r}", (2,), (len(places), 2))
-    part = TendonPart(name, places, np.array(np.broadcast_to(given, (len(places), 2))), checked_tension(name, tension))
+    tension_of = checked(TendonPart, "tension", tension, name)
+    part = TendonPart(name, places, np.array(np.broadcast_to(given, (len(places), 2))), tension_of)
     points = _drawn(directory, part)
     for index, length in enumerate(np.linalg.norm(np.diff(points, axis=0), axis=1)):
         if length <= 1e-12 * np.abs(points).max():
@@ -45,17 +43,6 @@ def make_tendon(
     along = len(places) > 2 and isinstance(guides, Rod | str) and not rods[places[0][0]].closed
     check_offset(part.offsets, radii, pulls_all_along=along and part.tension > 0.0, owner=f"tendon {name!r}")
     return part
-
-
-def checked_tension(name: str, value: float) -> float:
-    """A tension, which must be finite and not negative: a tendon pulls."""
-    return validation.non_negative(value, f"tension of tendon {name!r}")
-
-
-def outline_of(part: TendonPart) -> TendonOutline:
-    """Return the outline of a tendon for pictures and files."""
-    guides = tuple((rod, edge, _SHARES[place]) for rod, edge, place in part.guides)
-    return TendonOutline(part.name, guides, part.offsets)
 
 
 def describe_tendons(directory: Directory) -> list[_core.TendonDescription]:
@@ -102,4 +89,4 @@ def _drawn(directory: Directory, part: TendonPart) -> FloatArray:
         index: np.stack([rod.directors, np.cross(rod.tangents, rod.directors), rod.tangents], axis=1)
         for index, rod in rods.items()
     }
-    return outline_of(part).points({index: rod.points for index, rod in rods.items()}, frames)
+    return tendon_outline(part).points({index: rod.points for index, rod in rods.items()}, frames)

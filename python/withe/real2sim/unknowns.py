@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.parts.handles import Handle
-from withe.parts.parameters import ROD_WORDS
+from withe.parts.table import KINDS
 from withe.real2sim.places import rod_part, turning_axis
 from withe.simulation.overlaps import arrays_of, order_of_setting, remaining, setting_rank
 from withe.simulation.simulation import Simulation
@@ -21,14 +21,7 @@ __all__ = ["POSITIVE", "Coordinates", "Delay", "Parameter", "Tilt", "Unknown", "
 
 FloatArray = npt.NDArray[np.float64]
 
-POSITIVE = (
-    *(word for word in ROD_WORDS if word != "poisson_ratio"),
-    "mass",
-    "friction",
-    "stiffness",
-    "rest_length",
-    "damping",
-)
+POSITIVE = tuple(dict.fromkeys(word.name for kind in KINDS for word in kind.words if word.is_positive))
 
 
 class Unknown(ABC):

@@ -117,11 +117,10 @@ class Record:
         -------
         list
             Derivative of L by the initial value of each item of `wrt`, shaped like `Simulation.get`. The attribute
-            ``calls`` has the derivatives by values that were set during the run: one entry per call of `set`,
-            `set_natural_curvature`, `set_natural_twist`, `set_natural_stretch`, `set_friction` and `move`, in order.
-            An entry has ``time`` [s], ``call``, ``target``, ``over`` and ``gradients``, a dict from parameters to
-            derivatives, shaped like the value that was set. For a ramp, the value is its end; for a rotation, a
-            rotation vector; for ``discrete=True``, the smooth curvature.
+            ``calls`` has the derivatives by values that were set during the run: one entry per call of `set` and
+            `move`, in order. An entry has ``time`` [s], ``call``, ``target``, ``over`` and ``gradients``, a dict from
+            parameters to derivatives, shaped like the value that was set. For a ramp, the value is its end; for a
+            rotation, a rotation vector; a discrete_curvature is under natural_curvature, by the smooth one.
 
         Raises
         ------

@@ -11,8 +11,9 @@ import numpy.typing as npt
 from withe.common import validation
 from withe.parts.directory import Directory
 from withe.parts.handles import NodeHandle
-from withe.parts.joints import JOINT_WORDS, checked_number, connected, gather
+from withe.parts.joints import connected, gather
 from withe.parts.kinds import JoinKind, JoinPart, JointForm, Pass
+from withe.parts.table import checked, kind_of
 
 __all__ = ["JoinedNodes"]
 
@@ -86,8 +87,9 @@ class JoinedNodes:
             raise ValueError(
                 f"axis of the joint must be given for kind='revolute' and for no other kind, got kind={kind!r}"
             )
-        values = {word: checked_number(name, word, value) for word, value in zip(JOINT_WORDS, numbers, strict=True)}
-        given = next((word for word in JOINT_WORDS if values[word] != 0.0), None)
+        words = [word.name for word in kind_of(JoinPart).words]
+        values = {word: checked(JoinPart, word, value, name) for word, value in zip(words, numbers, strict=True)}
+        given = next((word for word in words if values[word] != 0.0), None)
         if given is not None and kind != "revolute":
             raise ValueError(f"{given} of joint {name!r} needs kind='revolute', got kind={kind!r}")
         if form == "pairs" and kind != "rigid":

@@ -11,41 +11,19 @@ import numpy.typing as npt
 
 from withe import _core
 from withe.parts.contacts import BodyPair
-from withe.parts.friction import by_given
-from withe.parts.joints import JOINT_WORDS
-from withe.parts.kinds import (
-    DragPart,
-    FluidPart,
-    JoinPart,
-    LoadPart,
-    MassPart,
-    ObstaclePart,
-    Part,
-    RodPart,
-    SpringPart,
-    TendonPart,
-)
+from withe.parts.kinds import DragPart, LoadPart, Part, RodPart
 from withe.parts.parameters import ACTING_WORDS, NATURAL_WORDS
-from withe.parts.springs import SPRING_WORDS
+from withe.simulation.access import reader_of, word_of
 from withe.simulation.drawn import DrawnNodes
 from withe.simulation.motion import POSE_WORDS
 from withe.simulation.moves import Way
 from withe.simulation.obstacles import find_obstacle
 from withe.simulation.overlaps import OF_DRAGS, made_by
+from withe.simulation.readers import OfRun, Reader
+from withe.simulation.rods import edges_of, rod_slopes, sum_of_slopes
 from withe.simulation.session import Session
-from withe.simulation.unknowns import (
-    SCENE_WORDS,
-    OfRun,
-    Reader,
-    Remaining,
-    dragged_rods,
-    edges_of,
-    friction_reader,
-    part_of,
-    reader_of,
-    rod_slopes,
-    sum_of_slopes,
-)
+from withe.simulation.surroundings import dragged_rods
+from withe.simulation.unknowns import Remaining, part_of
 
 __all__ = ["CallGradient", "Gradients", "Ledger", "RunJournal"]
 
@@ -60,16 +38,16 @@ class CallGradient:
     ----------
     time : float [s]
         When it was called.
-    call : {"set", "set_natural_curvature", "set_natural_twist", "set_natural_stretch", "set_friction", "move"}
+    call : {"set", "move"}
     target : str or None
         Name of the part, or of both bodies ("arm, floor"); None: the scene.
     over : float [s]
         After which the value was reached; 0: at once.
     gradients : dict
         By each word that was set, shaped like the value that it was given: dL over that value, as long as it acted. A
-        curvature given with discrete=True has that by the curvature [1/m] of every stencil; a rotation by a rotation
-        vector, (3,) [1/rad], that turns the target. Words that have no gradient (functions of time, paths, tangents and
-        rolls, a friction of 0) are left out.
+        discrete_curvature is under natural_curvature, by the curvature [1/m] of every stencil; a rotation is by a
+        rotation vector, (3,) [1/rad], that turns the target. Words that have no gradient (functions of time, paths,
+        tangents and rolls, a friction of 0) are left out.
     """
 
     time: float
@@ -85,8 +63,7 @@ class Gradients(list[Any]):
     Attributes
     ----------
     calls : list of CallGradient
-        By what calls of `set`, `set_natural_curvature`, `set_natural_twist`, `set_natural_stretch`, `set_friction` and
-        `move` gave while the run went, in their order.
+        By what calls of `set` and `move` gave while the run went, in their order.
     """
 
     def __init__(self, values: Sequence[Any], calls: list[CallGradient]) -> None:
@@ -155,6 +132,11 @@ def _ramps_on_their_way(session: Session) -> dict[_Key, _Ramp]:
     return out
 
 
+def _is_ramp(part: Part | BodyPair | None, word: str) -> bool:
+    """True of numbers that the engine leads to their values."""
+    return isinstance(part, RodPart) and word in NATURAL_WORDS
+
+
 @dataclass
 class _Epoch:
     """Which calls the numbers come from that act between two calls."""
@@ -174,7 +156,7 @@ class _Epoch:
             return out
         for word in call.values:
             key = (name, word)
-            if isinstance(call.part, RodPart) and word in NATURAL_WORDS:
+            if _is_ramp(call.part, word):
                 out.ramps[key] = _Ramp(self.weights(key, call.time), index, call.time, call.over)
                 continue
             out.live[key] = index
@@ -272,9 +254,9 @@ class Ledger:
         for key, ramp in epoch.ramps.items():
             for index, weight in ramp.at(time).items():
                 if index >= 0 and weight != 0.0:
-                    part = self._calls[index].part
-                    assert isinstance(part, RodPart)
-                    self._add(index, key[1], weight * np.asarray(getattr(found, key[1])[part.index]))
+                    call = self._calls[index]
+                    read = reader_of(call.session, call.part, key[1])
+                    self._add(index, key[1], weight * np.asarray(read(OfRun(found))))
 
     def visit_poses(self, step: int, reached: _core.Reached, found: _core.PoseAdjoint) -> None:
         """Derivatives by poses of supports and obstacles at the end of a step."""
@@ -327,7 +309,7 @@ class Ledger:
             return reader(OfRun(found))
         part, word = part_of(self._session, unknown[0]), unknown[1]
         key = (part.name, word)
-        if isinstance(part, RodPart) and word in NATURAL_WORDS:
+        if _is_ramp(part, word):
             return reader(OfRun(found)) * epoch.weights(key, time).get(_START, 0.0)
         if isinstance(part, RodPart):
             if not any(name == part.name for name, _ in epoch.made_of):
@@ -346,28 +328,16 @@ class Ledger:
     def _add_live(self, epoch: _Epoch, key: _Key, found: Any) -> None:
         index = epoch.live[key]
         call, word = self._calls[index], key[1]
+        if word not in self._by_calls[index]:
+            return
+        shape = np.shape(call.values[word])
         if isinstance(call.part, RodPart):
             arrays = epoch.arrays(call.part, word, initial=False)
-            shape = np.shape(call.values[word])
             self._add(index, word, self._by_rod(epoch, call.part, word, arrays, shape, found))
         elif isinstance(call.part, DragPart):
             self._add(index, word, _by_drag(epoch, call.part, found, initial=False))
-        elif isinstance(call.part, LoadPart) and call.part.name in epoch.session.settings.functions:
-            return
-        elif (
-            isinstance(call.part, LoadPart | MassPart | TendonPart)
-            or (isinstance(call.part, SpringPart) and word in SPRING_WORDS)
-            or (isinstance(call.part, JoinPart) and word in JOINT_WORDS)
-            or (isinstance(call.part, ObstaclePart) and word == "rolling_friction")
-        ):
-            self._add(index, word, reader_of(call.session, call.part, word)(OfRun(found)))
-        elif isinstance(call.part, ObstaclePart | BodyPair):
-            by_directions = friction_reader(call.session, call.part)(OfRun(found))
-            self._add(index, word, by_given(by_directions, np.shape(call.values[word])))
-        elif isinstance(call.part, FluidPart) and word == "viscosity":
-            self._add(index, word, found.fluid_viscosity)
-        elif call.part is None:
-            self._add(index, word, np.array(getattr(found, word)))
+        elif not (isinstance(call.part, LoadPart) and call.part.name in epoch.session.settings.functions):
+            self._add(index, word, reader_of(call.session, call.part, word, shape)(OfRun(found)))
 
     def _add(self, index: int, word: str, value: Any) -> None:
         shaped = _of_shape(value, np.shape(self._calls[index].values[word]))
@@ -391,18 +361,11 @@ def _share(session: Session, key: _Key, reached: _core.Reached) -> float:
     return float(reached.supports[index, POSE_WORDS.index(key[1])]) if len(reached.supports) else 1.0
 
 
-def _has_gradient(call: _Call, word: str) -> bool:
-    if isinstance(call.part, LoadPart):
-        return not callable(call.values[word])
-    if word in ("friction", "rolling_friction"):
-        return bool(np.max(call.values[word]) > 0.0)
-    if call.method == "move":
-        return True
-    if call.part is None:
-        return word in SCENE_WORDS
-    if isinstance(call.part, FluidPart):
-        return word == "viscosity"
-    return isinstance(call.part, RodPart | MassPart | SpringPart | TendonPart | JoinPart | DragPart)
+def _has_gradient(call: _Call, name: str) -> bool:
+    word, value = word_of(call.part, name), call.values[name]
+    if word is None or not word.has_gradient or callable(value):
+        return False
+    return not word.has_one_side or bool(np.max(value) > 0.0)
 
 
 def _by_drag(epoch: _Epoch, part: DragPart, found: Any, *, initial: bool) -> float:

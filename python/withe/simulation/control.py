@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.deprecation import old_word
 from withe.common.keywords import keyword_hints
 from withe.parts.handles import CustomForce, Load, Rod, Support
-from withe.parts.rods import curvature_array, curvature_given, stretch_array, twist_array
 from withe.simulation.functions import check_jacobian
 from withe.simulation.loads import remove_load
 from withe.simulation.parameters import Settable, get_value, set_values
@@ -30,10 +29,7 @@ class Control:
     def set_natural_curvature(
         self, rod: Rod | str, curvature: npt.ArrayLike, over: float = 0.0, *, discrete: bool = False
     ) -> None:
-        """Actuate a rod by setting its natural (stress-free) curvature.
-
-        A curvature out of the plane of a planar simulation makes the simulation three-dimensional, unless it was built
-        with planar=True.
+        """Deprecated: use ``set(rod, natural_curvature=..., over=...)``, or discrete_curvature.
 
         Parameters
         ----------
@@ -45,28 +41,12 @@ class Control:
             Duration of a linear ramp to the value. By default the change is immediate.
         discrete : bool
             True if the curvature is given as 2 tan(phi / 2) [-], with phi the angle between two edges.
-
-        Raises
-        ------
-        ValueError
-            A wrong shape, a value that is not finite, a turn of pi or more at a node, or a curvature out of the plane
-            with planar=True.
-
-        Examples
-        --------
-        >>> simulation.set_natural_curvature(arm, (0.0, 12.5), over=0.2)
         """
-        part = self._session.directory.rod(rod)
-        if validation.truth(discrete, "discrete"):
-            values = curvature_array(curvature, part.voronoi, True, part.owner)
-        else:
-            values = curvature_given(curvature, len(part.voronoi), part.owner).reshape(-1, 2)
-        self._session.world.set_natural_curvature(part.index, values, validation.non_negative(over, "over"))
-        given = values if discrete else np.asarray(curvature)
-        self._session.note("set_natural_curvature", part, {"natural_curvature": given}, float(over))
+        word = "discrete_curvature" if validation.truth(discrete, "discrete") else "natural_curvature"
+        _set_rod(self._session, "set_natural_curvature", rod, word, curvature, over)
 
     def set_natural_twist(self, rod: Rod | str, twist: npt.ArrayLike, over: float = 0.0) -> None:
-        """Actuate a rod by setting its natural (stress-free) twist.
+        """Deprecated: use ``set(rod, natural_twist=..., over=...)``.
 
         Parameters
         ----------
@@ -76,62 +56,44 @@ class Control:
             Natural twist: one value for the whole rod, or one per stencil.
         over : float [s]
             Duration of a linear ramp to the value. By default the change is immediate.
-
-        Raises
-        ------
-        ValueError
-            A wrong shape, a value that is not finite, or a twist that is not zero with planar=True.
         """
-        part = self._session.directory.rod(rod)
-        values = twist_array(twist, part.voronoi, part.owner)
-        self._session.world.set_natural_twist(part.index, values, validation.non_negative(over, "over"))
-        self._session.note("set_natural_twist", part, {"natural_twist": np.asarray(twist)}, float(over))
+        _set_rod(self._session, "set_natural_twist", rod, "natural_twist", twist, over)
 
     def set_natural_stretch(self, rod: Rod | str, stretch: npt.ArrayLike, over: float = 0.0) -> None:
-        """Actuate a rod by setting its natural (stress-free) stretch, as a muscle or a bellows does.
-
-        The tension is n = EA (l / L - s), with the natural stretch s and the drawn length L of an edge: s is the
-        reference strain of a Cosserat rod along its tangent [Antman 2005, chapter 8]. Mass, bending and twisting
-        stiffness keep the values of the drawn lengths.
+        """Deprecated: use ``set(rod, natural_stretch=..., over=...)``.
 
         Parameters
         ----------
         rod : Rod or str
             Rod to actuate.
         stretch : float or array_like of shape (edges,) [-]
-            Natural length over drawn length: 1 as drawn, 0.9 for a muscle that shortens by a tenth.
+            Natural length over drawn length.
         over : float [s]
             Duration of a linear ramp to the value. By default the change is immediate.
-
-        Raises
-        ------
-        ValueError
-            A wrong shape, or a value that is not finite or not positive.
-
-        Examples
-        --------
-        >>> simulation.set_natural_stretch(arm, 1.02, over=0.5)
         """
-        part = self._session.directory.rod(rod)
-        values = stretch_array(stretch, len(part.lengths), part.owner)
-        self._session.world.set_natural_stretch(part.index, values, validation.non_negative(over, "over"))
-        self._session.note("set_natural_stretch", part, {"natural_stretch": np.asarray(stretch)}, float(over))
+        _set_rod(self._session, "set_natural_stretch", rod, "natural_stretch", stretch, over)
 
     # Parameters
 
-    def set(self, target: Settable | str | None = None, /, **values: Any) -> None:
+    def set(self, target: Settable | str | None = None, /, *, over: float = 0.0, **values: Any) -> None:
         """Set parameters of a part or of the scene.
 
         Parameters
         ----------
         target : handle or str
             Part to change. None for the scene; a pair such as ``(arm, floor)`` for the contact of two bodies.
+        over : float [s]
+            Duration of a linear ramp to the values, of natural shapes of rods and of poses of supports. By default the
+            change is immediate.
         **values
             Parameters of the target:
 
             * rod: youngs_modulus, poisson_ratio, density, viscosity, stretch_stiffness, bend_stiffness,
-              twist_stiffness, line_density, viscous_time, drag (one number, or one per edge), natural_curvature,
-              natural_twist, natural_stretch
+              twist_stiffness, line_density, viscous_time, drag (one number, or one per edge);
+              natural_curvature towards d1 and d2, (2,) or (stencils, 2) [1/m], or discrete_curvature, the same as
+              2 tan(phi / 2) [-] with phi the angle between two edges; natural_twist, one or (stencils,) [rad/m];
+              natural_stretch s, one or (edges,) [-]: the tension is EA (l / L - s) with the drawn length L of an edge
+              [Antman 2005, chapter 8]
             * load: force, moment, load or pressure, constant or a function of time
             * mass: mass
             * spring: stiffness, rest_length, damping
@@ -140,7 +102,7 @@ class Control:
             * drag: drag
             * fluid: viscosity, and the regularization [m] of Stokeslets
             * obstacle: friction, rolling_friction, restitution; see `Scene.add_floor`
-            * pair of bodies: friction; see `Scene.set_friction`
+            * pair of bodies: friction, restitution, contact_stiffness [N/m]; see `Scene.set_friction`
             * support: position, rotation; see `move`; friction of a ring
             * scene: gravity, friction and restitution between rods, slip_tolerance, contact_stiffness [N/m] (None for a
               stiffness that follows the forces)
@@ -152,14 +114,16 @@ class Control:
         Raises
         ------
         ValueError
-            A parameter that the target does not have, or a value out of range. Then nothing is changed.
+            A parameter that the target does not have, a parameter that `over` does not ramp, or a value out of range.
+            Then nothing is changed.
 
         Examples
         --------
         >>> simulation.set(arm, youngs_modulus=2e6, natural_stretch=1.01)
         >>> simulation.set(tip_load, force=lambda t: (0, 0, -t))
+        >>> simulation.set(arm, natural_curvature=(0.0, 12.5), over=0.2)
         """
-        set_values(self._session, target, values)
+        set_values(self._session, target, values, over)
 
     def get(self, target: Settable | Support | str, word: str | None = None) -> Any:
         """Return the present value of a parameter of `set`.
@@ -229,3 +193,10 @@ class Control:
             The jacobian differs; the message names the entry with the greatest error. Or there is no jacobian.
         """
         check_jacobian(self._session, force)
+
+
+def _set_rod(session: Session, old: str, rod: Rod | str, word: str, value: npt.ArrayLike, over: float) -> None:
+    """Set a natural shape by a method that goes in the next version."""
+    name = session.directory.rod(rod).name
+    old_word(old, f"set(rod, {word}=..., over=...)")
+    set_values(session, name, {word: value}, over)

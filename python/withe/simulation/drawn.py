@@ -60,7 +60,10 @@ class Moment:
                 index: (np.array(world.support_position(index)), np.array(world.support_rotation(index)))
                 for index, _ in session.settings.supports.values()
             },
-            [world.spring(index).rest_length for index in range(len(session.directory.all(SpringPart)))],
+            [
+                float(world.parameter("spring_rest_length", i)[0, 0])
+                for i in range(len(session.directory.all(SpringPart)))
+            ],
             world.frames_as_drawn,
         )
 

@@ -12,7 +12,8 @@ import numpy.typing as npt
 from withe import _core
 from withe.common import validation
 from withe.parts.handles import NodeHandle
-from withe.parts.kinds import JoinPart, LoadPart, MassPart, RodPart, SpringPart, SupportPart, TendonPart
+from withe.parts.kinds import RodPart, SupportPart
+from withe.simulation.access import word_of
 from withe.simulation.calls import Gradients, Ledger, RunJournal
 from withe.simulation.drawn import DrawnNodes, Moment
 from withe.simulation.losses import check_in_plane, readout_adjoints, readout_shape, spoken
@@ -39,15 +40,6 @@ __all__ = [
 FloatArray = npt.NDArray[np.float64]
 
 _DRIVES = 1e-11  # share of the work over any motion, above which work over a neutral one is no rounding
-
-# Words in which the residual of statics is linear, beside loads and gravity.
-_LINEAR: dict[type[Any], tuple[str, ...]] = {
-    RodPart: ("youngs_modulus", "density"),
-    MassPart: ("mass",),
-    SpringPart: ("stiffness", "rest_length"),
-    TendonPart: ("tension",),
-    JoinPart: ("stiffness", "moment"),
-}
 
 Loss = npt.ArrayLike | Mapping[str, Any]
 """Derivatives of a scalar: by positions of every node, or by words of read-outs; see `Equilibrium.gradient`."""
@@ -198,12 +190,8 @@ def _directions(
         index = copy.settings.supports[part.name][0]
         held = np.array(copy.world.support_directions(index)).T[slice(0, 3) if word == "position" else slice(3, 6)]
         return np.zeros_like(held), held, (3,)
-    is_linear = (
-        (part is None and word == "gravity")
-        or (isinstance(part, LoadPart) and word == part.kind)
-        or any(isinstance(part, kind) and word in words for kind, words in _LINEAR.items())
-    )
-    if not is_linear:
+    known = word_of(part, word)
+    if known is None or not known.is_linear:
         return None
     value = np.array(get_value(copy, word, None) if part is None else get_value(copy, part.name, word), np.float64)
     if value.size >= most or (isinstance(part, RodPart) and value.ndim > 0):

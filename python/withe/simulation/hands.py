@@ -9,11 +9,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from withe import _core
 from withe.common import validation
 from withe.common.keywords import keyword_hints
 from withe.parts.handles import Hand, Handle
-from withe.parts.kinds import Grasp
-from withe.simulation.motion import PathLike, RotationLike
+from withe.parts.kinds import Grasp, SupportPart
+from withe.simulation.motion import POSE_WORDS, PathLike, RotationLike
+from withe.simulation.readers import OfRun, Reader, of_equilibrium
 from withe.simulation.readouts import Reaction
 from withe.simulation.session import Session
 from withe.simulation.supports import find_support, forget, move_support, release
@@ -31,7 +33,10 @@ __all__ = [
     "ring_friction",
     "ring_passage",
     "set_ring_friction",
+    "set_support",
     "support_pose",
+    "support_reader",
+    "support_value",
 ]
 
 FloatArray = npt.NDArray[np.float64]
@@ -236,3 +241,58 @@ def support_pose(session: Session, support: Handle | str) -> HeldPose:
     index, _ = find_support(session, support)
     world = session.world
     return HeldPose(np.array(world.support_position(index)), np.array(world.support_rotation(index)))
+
+
+def set_support(session: Session, part: SupportPart, values: dict[str, Any], over: float) -> None:
+    """Move a support, there after so long [s] or within the next step; change the friction of a ring."""
+    friction = None
+    if "friction" in values:
+        friction = validation.non_negative(values["friction"], f"friction of {part.name!r}")
+        find_support(session, part.name)
+    if values.keys() & set(POSE_WORDS):
+        move_support(session, part.name, values.get("position"), values.get("rotation"), None, None, over, None)
+    if friction is not None:
+        set_ring_friction(session, part.name, friction)
+
+
+def support_value(session: Session, part: SupportPart, word: str) -> Any:
+    """Return the pose of a support, or the friction of a ring."""
+    if word not in POSE_WORDS:
+        return ring_friction(session, part.name)
+    pose = support_pose(session, part.name)
+    return pose.position if word == "position" else pose.rotation
+
+
+def support_reader(session: Session, part: SupportPart, word: str) -> Reader:
+    """Return the reader of the derivative by where a support is, or by how a hand yields."""
+    if word in POSE_WORDS:
+        return _pose_reader(session, part, word)
+    return _hand_reader(session, part, word)
+
+
+def _pose_reader(session: Session, part: SupportPart, word: str) -> Reader:
+    index = session.settings.supports[part.name][0]
+
+    def read(gradient: _core.EquilibriumGradient | OfRun) -> FloatArray:
+        found = of_equilibrium(gradient, part.name)
+        return np.array(found.support_positions[index] if word == "position" else found.support_rotations[index])
+
+    return read
+
+
+def _hand_reader(session: Session, part: SupportPart, word: str) -> Reader:
+    grasp = part.grasp
+    if grasp is None or grasp.stiffness is None:
+        raise ValueError(
+            f"{part.name!r} has no {word} to differentiate by, because {part.name!r} is not a hand that yields"
+        )
+    if grasp.slides:
+        raise ValueError(
+            f"no gradient with respect to the {word} of {part.name!r} is available, because {part.name!r} is a ring"
+        )
+    index = session.settings.supports[part.name][0]
+    if word == "stiffness":
+        return lambda g: np.array(g.parameters.hand_stiffness[index])
+    if not np.isfinite(grasp.force_limit):
+        raise ValueError(f"{part.name!r} has no force_limit to differentiate by")
+    return lambda g: float(g.parameters.hand_limit[index])

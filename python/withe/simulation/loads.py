@@ -12,9 +12,19 @@ from withe.parts.description import describe_load
 from withe.parts.directory import Directory
 from withe.parts.handles import Load
 from withe.parts.kinds import LoadPart
+from withe.simulation.readers import Reader
 from withe.simulation.session import Session
 
-__all__ = ["RunningLoads", "load_index", "load_rows", "new_values", "remove_load", "set_load"]
+__all__ = [
+    "RunningLoads",
+    "load_index",
+    "load_reader",
+    "load_rows",
+    "load_value",
+    "new_values",
+    "remove_load",
+    "set_load",
+]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -82,8 +92,9 @@ def remove_load(session: Session, load: Load | str) -> None:
     session.directory.remove(part.name)
 
 
-def set_load(session: Session, part: LoadPart, value: Any) -> None:
+def set_load(session: Session, part: LoadPart, values: dict[str, Any]) -> None:
     """Change a load that acts, to a constant or a function of time."""
+    value = values[part.kind]
     what = f"{part.kind} {part.name!r}"
     function = value if callable(value) else None
     now = new_values(session, part, value(session.world.time) if callable(value) else value, what)
@@ -92,3 +103,24 @@ def set_load(session: Session, part: LoadPart, value: Any) -> None:
         session.settings.functions.pop(part.name, None)
     else:
         session.settings.functions[part.name] = function
+
+
+def load_value(session: Session, part: LoadPart, word: str) -> Any:
+    """Return the present value of a load, shaped as it was put on."""
+    value = np.array(session.world.load(load_index(session, part))).reshape(part.value.shape)
+    if part.axis is None:
+        return value
+    along = value @ part.axis
+    return along if along.ndim else float(along)
+
+
+def load_reader(session: Session, part: LoadPart, word: str) -> Reader:
+    """Return the reader of the derivative by the value of a load."""
+    rows, axis, shape = load_rows(session, part), part.axis, part.value.shape
+    if part.name in session.settings.functions:
+        raise ValueError(
+            f"no gradient with respect to {part.name!r} is available, because {part.name!r} is a function of time"
+        )
+    if axis is None:
+        return lambda g: g.parameters.loads[rows].reshape(shape)
+    return lambda g: (g.parameters.loads[rows].reshape(shape) @ axis)[()]

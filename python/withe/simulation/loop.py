@@ -13,10 +13,8 @@ from withe.common import validation
 from withe.recording.record import Record
 from withe.recording.recorder import Moving, Recorder
 from withe.simulation.gradients import RunDerivatives
-from withe.simulation.obstacles import obstacle_outlines
-from withe.simulation.springs import spring_outlines
+from withe.simulation.outlines import outlines_of
 from withe.simulation.stepping import Stepping
-from withe.simulation.tendons import tendon_outlines
 
 __all__ = ["Run"]
 
@@ -70,9 +68,7 @@ class Run(Generic[S]):
         self._recorder = Recorder(
             simulation,
             record,
-            obstacle_outlines(directory),
-            spring_outlines(directory),
-            tendon_outlines(directory),
+            *outlines_of(directory),
         )
         self._start = stepping.time
         self._ended = False

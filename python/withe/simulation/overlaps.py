@@ -9,7 +9,8 @@ from withe.parts.contacts import BodyPair
 from withe.parts.kinds import DragPart, Part, RodPart
 from withe.parts.parameters import MADE_OF, ROD_WORDS
 from withe.simulation.session import Session
-from withe.simulation.unknowns import INITIAL_WORDS, Array, Remaining, Unknown, dragged_rods, part_of
+from withe.simulation.surroundings import dragged_rods
+from withe.simulation.unknowns import INITIAL_WORDS, Array, Remaining, Unknown, part_of
 
 __all__ = ["OF_DRAGS", "arrays_of", "made_by", "order_of_setting", "remaining", "setting_rank"]
 

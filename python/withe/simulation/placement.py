@@ -6,6 +6,7 @@ from typing import Any, Literal
 
 import numpy.typing as npt
 
+from withe.common.deprecation import old_word
 from withe.common.keywords import keyword_hints
 from withe.parts.friction import Friction
 from withe.parts.handles import NodeHandle, Obstacle, Rod, Support
@@ -14,11 +15,11 @@ from withe.parts.supports import make_clamp, make_pin
 from withe.simulation.hands import RunningHand, feed_ring, find_hand
 from withe.simulation.motion import PathLike, RotationLike
 from withe.simulation.obstacles import find_obstacle, move_obstacle
+from withe.simulation.parameters import set_values
 from withe.simulation.session import Session
 from withe.simulation.states import set_state, set_velocities
 from withe.simulation.supports import hold as put_on
 from withe.simulation.supports import move_support, release
-from withe.simulation.surfaces import set_pair_friction, set_pair_restitution, set_pair_stiffness
 
 __all__ = ["Placement"]
 
@@ -217,46 +218,19 @@ class Placement:
         move_obstacle(self._session, *obstacle, position, tangent, roll, over, path)
 
     def set_friction(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, friction: Friction) -> None:
-        """Change the friction coefficient of two rods, or of a rod and an obstacle. See `Scene.set_friction`.
-
-        Raises
-        ------
-        ValueError
-            Two obstacles, negative friction, or two coefficients for two rods.
-        """
-        set_pair_friction(self._session, a, b, friction)
+        """Deprecated: use ``set((a, b), friction=...)``."""
+        old_word("set_friction", "set((a, b), friction=...)")
+        set_values(self._session, (a, b), {"friction": friction})
 
     def set_restitution(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, restitution: float) -> None:
-        """Change the coefficient of restitution of two rods, or of a rod and an obstacle.
-
-        The change acts from the next step on, also on impacts that have begun.
-
-        Raises
-        ------
-        ValueError
-            Two obstacles, or a number outside of 0 to 1.
-
-        Examples
-        --------
-        >>> simulation.set_restitution(arm, floor, 0.5)
-        """
-        set_pair_restitution(self._session, a, b, restitution)
+        """Deprecated: use ``set((a, b), restitution=...)``."""
+        old_word("set_restitution", "set((a, b), restitution=...)")
+        set_values(self._session, (a, b), {"restitution": restitution})
 
     def set_contact_stiffness(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, stiffness: float) -> None:
-        """Change the contact stiffness of two rods, or of a rod and an obstacle [N/m].
-
-        The change of contact energy is part of ``energy().work``. See `Scene.set_contact_stiffness`.
-
-        Raises
-        ------
-        ValueError
-            Two obstacles, or a stiffness that is not positive.
-
-        Examples
-        --------
-        >>> simulation.set_contact_stiffness(arm, floor, 2e3)
-        """
-        set_pair_stiffness(self._session, a, b, stiffness)
+        """Deprecated: use ``set((a, b), contact_stiffness=...)``."""
+        old_word("set_contact_stiffness", "set((a, b), contact_stiffness=...)")
+        set_values(self._session, (a, b), {"contact_stiffness": stiffness})
 
     def set_state(
         self,

@@ -121,10 +121,10 @@ class Session:
     def note(self, method: str, part: Any, values: Mapping[str, Any], over: float = 0.0) -> None:
         """Remember what a call has set, of a part, two bodies, or nothing (the scene); tell the journal, if any."""
         name = getattr(part, "name", None)
-        for key in {(method, name), *((f"set_{word}", name) for word in values)}:
-            self.settings.ramps.pop(key, None)
-        if over > 0.0:
-            self.settings.ramps[method, name] = self.world.time
+        for word in ["move"] if method == "move" else values:
+            self.settings.ramps.pop((word, name), None)
+            if over > 0.0:
+                self.settings.ramps[word, name] = self.world.time
         if self.journal is not None:
             self.journal.note(self, method, part, values, over)
 

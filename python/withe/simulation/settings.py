@@ -42,7 +42,7 @@ class Settings:
     loads : dict of str to LoadPart
         Those put on while running, in order.
     ramps : dict of (str, str or None) to float [s]
-        When what is reached after a while was last asked for: by method and part.
+        When what is reached after a while was last asked for: by word, or "move", and part.
     """
 
     rods: list[RodParameters]

@@ -26,19 +26,17 @@ from withe.simulation.linearisation import Linearisation
 from withe.simulation.loads import RunningLoads
 from withe.simulation.loop import Run
 from withe.simulation.measurements import Measurements
-from withe.simulation.obstacles import obstacle_outlines
+from withe.simulation.outlines import outlines_of
 from withe.simulation.paths import EquilibriumPath, path_options
 from withe.simulation.placement import Placement
 from withe.simulation.plausibility import check_scene
 from withe.simulation.readouts import Equilibrium
 from withe.simulation.session import Session
 from withe.simulation.snapshots import Snapshot, restore
-from withe.simulation.springs import spring_outlines
 from withe.simulation.state_space import StateSpace
 from withe.simulation.states import restore_frame
 from withe.simulation.stepping import Stepping
 from withe.simulation.surfaces import find_friction_fields
-from withe.simulation.tendons import tendon_outlines
 
 __all__ = ["Simulation"]
 
@@ -456,4 +454,4 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
 
     def _frame(self) -> Record:
         directory = self._session.directory
-        return present(self, obstacle_outlines(directory), spring_outlines(directory), tendon_outlines(directory))
+        return present(self, *outlines_of(directory))

@@ -10,9 +10,10 @@ import numpy.typing as npt
 
 from withe.common import validation
 from withe.simulation.functions import apply_functions
+from withe.simulation.readers import OfRun
 from withe.simulation.session import Session
 from withe.simulation.stepping import Stepping
-from withe.simulation.unknowns import OfRun, Unknown, check_list, unknown_reader
+from withe.simulation.unknowns import Unknown, check_list, unknown_reader
 
 __all__ = ["StateSpace"]
 

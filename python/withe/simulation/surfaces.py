@@ -9,11 +9,11 @@ import numpy.typing as npt
 
 from withe import _core
 from withe.common import validation
-from withe.parts.contacts import Body, BodyPair, body_of, pair_friction, pair_of, touching
+from withe.parts.contacts import BodyPair, body_of, pair_friction, pair_of, touching
 from withe.parts.friction import (
     Coefficients,
-    Friction,
     as_given,
+    by_given,
     check_law,
     check_rolling,
     coefficients,
@@ -25,31 +25,39 @@ from withe.parts.friction import (
     with_pair,
 )
 from withe.parts.kinds import ObstaclePart, RodPart
+from withe.simulation.readers import Reader, of_equilibrium
 from withe.simulation.session import Session
 
 __all__ = [
-    "OBSTACLE_WORDS",
-    "SCENE_WORDS",
     "find_friction_fields",
     "follow_friction_fields",
+    "obstacle_reader",
     "obstacle_value",
+    "pair_reader",
     "pair_value",
+    "scene_reader",
     "scene_value",
     "set_obstacle",
-    "set_pair_friction",
-    "set_pair_restitution",
-    "set_pair_stiffness",
+    "set_pair",
     "set_scene",
 ]
 
 FloatArray = npt.NDArray[np.float64]
+Shape = tuple[int, ...]
+Touching = RodPart | ObstaclePart
 
-SCENE_WORDS = ("friction", "slip_tolerance", "restitution", "contact_stiffness")
-OBSTACLE_WORDS = ("friction", "restitution", "rolling_friction")
+
+def set_scene(session: Session, part: None, values: dict[str, Any]) -> None:
+    """Change gravity, what all rods have with each other, and the slip tolerance and stiffness of all contact."""
+    gravity = validation.vector(values["gravity"], "gravity") if "gravity" in values else None
+    if values.keys() - {"gravity"}:
+        _set_contact(session, values)
+    if gravity is not None:
+        session.world.set_gravity(gravity)
+        session.settings.gravity = gravity
 
 
-def set_scene(session: Session, values: dict[str, Any]) -> None:
-    """Change what all rods have with each other, and the slip tolerance and stiffness of all contact."""
+def _set_contact(session: Session, values: dict[str, Any]) -> None:
     contact = session.world.contact
     for word in ("friction", "restitution"):
         if word in values:
@@ -70,8 +78,10 @@ def set_scene(session: Session, values: dict[str, Any]) -> None:
     session.world.set_contact(contact)
 
 
-def scene_value(session: Session, word: str) -> float | None:
+def scene_value(session: Session, part: None, word: str) -> Any:
     """Return the value of `set_scene`; None for a contact stiffness that is found by the rule."""
+    if word == "gravity":
+        return session.settings.gravity.copy()
     contact = session.world.contact
     if word == "contact_stiffness":
         return float(contact.stiffness) or None
@@ -118,10 +128,13 @@ def _with_obstacle_friction(
     return contact
 
 
-def obstacle_value(session: Session, part: ObstaclePart, word: str) -> Friction:
-    """Return the value of `set_obstacle`."""
-    contact = session.world.contact
+def obstacle_value(session: Session, part: ObstaclePart, word: str) -> Any:
+    """Return the value of `set_obstacle`, or the pose of an obstacle."""
+    world = session.world
+    contact = world.contact
     index = session.directory.all(ObstaclePart).index(part)
+    if word in ("position", "turn"):
+        return np.array(world.obstacle_position(index) if word == "position" else world.obstacle_turn(index))
     if word == "restitution":
         return float(contact.obstacle_restitution[index])
     if word == "rolling_friction":
@@ -132,30 +145,49 @@ def obstacle_value(session: Session, part: ObstaclePart, word: str) -> Friction:
     return as_given(obstacle_friction(contact, index))
 
 
-def set_pair_friction(session: Session, a: Body, b: Body, friction: Friction) -> None:
-    """Give two bodies another friction coefficient of their own; see `Simulation.set_friction`."""
-    first, second, contact = _pair(session, a, b, "friction")
-    given = pair_friction(session.directory, a, b, friction)
-    check_law(given.directions, contact.friction_law, f"friction of {first.name!r} and {second.name!r}")
-    rod, obstacle = (first, second) if isinstance(first, RodPart) else (second, first)
-    shares = None
-    if isinstance(rod, RodPart) and isinstance(obstacle, ObstaclePart):
-        shares = _shares_now(session, rod, obstacle, given)
-    bodies = body_of(session.directory, first), body_of(session.directory, second)
-    session.world.set_contact(with_pair(contact, bodies, given.directions, shares))
-    _note_field(session, pair_of(session.directory, a, b), given)
-    session.note("set_friction", BodyPair(first, second), {"friction": friction})
+def set_pair(session: Session, pair: BodyPair, values: dict[str, Any]) -> None:
+    """Give two bodies friction, restitution or a contact stiffness of their own, all or none."""
+    first, second = pair.first, pair.second
+    directory, contact, given = session.directory, session.world.contact, None
+    bodies = body_of(directory, first), body_of(directory, second)
+    for word in values:
+        _check_pair(first, second, contact, word.replace("_", " "))
+    if "friction" in values:
+        given = pair_friction(directory, first.name, second.name, values["friction"])
+        check_law(given.directions, contact.friction_law, f"friction of {first.name!r} and {second.name!r}")
+        rod, obstacle = (first, second) if isinstance(first, RodPart) else (second, first)
+        shares = None
+        if isinstance(rod, RodPart) and isinstance(obstacle, ObstaclePart):
+            shares = _shares_now(session, rod, obstacle, given)
+        contact = with_pair(contact, bodies, given.directions, shares)
+    for word, attribute, check in (
+        ("restitution", "restitution", validation.share),
+        ("contact_stiffness", "stiffness", validation.positive),
+    ):
+        if word in values:
+            number = check(values[word], f"{word.replace('_', ' ')} of {first.name!r} and {second.name!r}")
+            pairs = list(contact.pairs)
+            setattr(pair_in(pairs, bodies), attribute, number)
+            contact.pairs = pairs
+    session.world.set_contact(contact)
+    if given is not None:
+        _note_field(session, pair_of(directory, first.name, second.name), given)
 
 
-def pair_value(session: Session, a: Body, b: Body) -> Friction | None:
-    """Friction that two bodies have of their own, as it was given; None where they have none."""
-    names = pair_of(session.directory, a, b)
+def pair_value(session: Session, pair: BodyPair, word: str) -> Any:
+    """Return a parameter of two bodies: their own, or else that of the obstacle or the scene."""
+    names = pair_of(session.directory, pair.first.name, pair.second.name)
     parts = [touching(session.directory, name) for name in names]
     first, second = (body_of(session.directory, part) for part in parts)
     own = pair_between(session.contact.pairs, (first, second))
+    obstacle = next((part for part in parts if isinstance(part, ObstaclePart)), None)
+    if word == "contact_stiffness":
+        return own.stiffness if own is not None and own.stiffness > 0.0 else scene_value(session, None, word)
+    if word == "restitution" and own is not None and own.restitution >= 0.0:
+        return own.restitution
     directions = own_friction(own)
-    if own is None or directions is None:
-        return None
+    if word == "restitution" or own is None or directions is None:
+        return scene_value(session, None, word) if obstacle is None else obstacle_value(session, obstacle, word)
     if not len(own.shares):
         return as_given(directions)
     if names in session.settings.frictions:
@@ -164,53 +196,17 @@ def pair_value(session: Session, a: Body, b: Body) -> Friction | None:
     return np.array(own.shares)[-edges:]
 
 
-def set_pair_restitution(session: Session, a: Body, b: Body, restitution: float) -> None:
-    """Give two bodies another restitution of their own; see `Simulation.set_restitution`."""
-    first, second, contact = _pair(session, a, b, "restitution")
-    share = validation.share(restitution, f"restitution of {first.name!r} and {second.name!r}")
-    _set_pair(session, first, second, contact, restitution=share)
-
-
-def set_pair_stiffness(session: Session, a: Body, b: Body, stiffness: float) -> None:
-    """Give two bodies another contact stiffness of their own; see `Simulation.set_contact_stiffness`."""
-    first, second, contact = _pair(session, a, b, "contact stiffness")
-    given = validation.positive(stiffness, f"contact stiffness of {first.name!r} and {second.name!r}")
-    _set_pair(session, first, second, contact, stiffness=given)
-
-
-def _pair(
-    session: Session, a: Body, b: Body, word: str
-) -> tuple[RodPart | ObstaclePart, RodPart | ObstaclePart, _core.ContactDescription]:
-    """Two bodies that may touch."""
-    first, second = (touching(session.directory, body) for body in (a, b))
+def _check_pair(first: Touching, second: Touching, contact: _core.ContactDescription, word: str) -> None:
+    """Refuse two bodies that never touch."""
     if isinstance(first, ObstaclePart) and isinstance(second, ObstaclePart):
         raise ValueError(
             f"{first.name!r} and {second.name!r} are both obstacles, which never touch: name at least one rod"
         )
-    contact = session.world.contact
     if isinstance(first, RodPart) and isinstance(second, RodPart) and not contact.rods:
         raise ValueError(
             f"{word} of {first.name!r} and {second.name!r} cannot be set, because contact between rods is off: "
             "call Scene.enable_contact before build"
         )
-    return first, second, contact
-
-
-def _set_pair(
-    session: Session,
-    first: RodPart | ObstaclePart,
-    second: RodPart | ObstaclePart,
-    contact: _core.ContactDescription,
-    **numbers: float,
-) -> None:
-    """Rods are called by their index, obstacles by -1 - index."""
-    bodies = body_of(session.directory, first), body_of(session.directory, second)
-    pairs = list(contact.pairs)
-    found = pair_in(pairs, bodies)
-    for word, number in numbers.items():
-        setattr(found, word, number)
-    contact.pairs = pairs
-    session.world.set_contact(contact)
 
 
 def _note_field(session: Session, names: tuple[str, ...], given: Coefficients) -> None:
@@ -261,3 +257,51 @@ def _shares_now(session: Session, rod: RodPart, obstacle: ObstaclePart, given: C
             nodes = Rotation.from_rotvec(-turn).apply(nodes)
         nodes = nodes + obstacle.point
     return given.shares(nodes, rod.closed, f"friction of {obstacle.name!r}")
+
+
+def obstacle_reader(session: Session, part: ObstaclePart, word: str, shape: Shape | None) -> Reader:
+    """Return the reader of the derivative by a friction, or by the position, of an obstacle."""
+    index = session.directory.all(ObstaclePart).index(part)
+    if word == "friction":
+        own = obstacle_friction(session.contact, index)
+        return _by_directions(lambda g: g.parameters.obstacle_friction[index], own, shape, part.name)
+    if word == "position":
+        return lambda g: np.array(of_equilibrium(g, part.name).obstacle_positions[index])
+    check_rubs(float(session.contact.obstacle_rolling[index]), f"{part.name}, of rods that roll,")
+    return lambda g: float(g.parameters.obstacle_rolling[index])
+
+
+def pair_reader(session: Session, pair: BodyPair, word: str, shape: Shape | None) -> Reader:
+    """Return the reader of the derivative by the friction of a pair of bodies."""
+    bodies, pairs = pair.bodies(session.directory), session.contact.pairs
+    own = own_friction(pair_between(pairs, bodies))
+    if own is None:
+        raise ValueError(
+            f"{pair.name} have no friction of their own to differentiate by: call set((a, b), friction=...) first"
+        )
+    index = next(i for i, each in enumerate(pairs) if {each.first, each.second} == bodies)
+    return _by_directions(lambda g: g.parameters.pair_friction[index], own, shape, pair.name)
+
+
+def _by_directions(read: Reader, own: Any, shape: Shape | None, name: str) -> Reader:
+    """Derivatives by a friction as it was given: of that shape, or as `get` returns it."""
+    if shape is None:
+        given = as_given(own)
+        check_rubs(np.max(given), name)
+        shape = np.shape(given)
+    return lambda g: by_given(np.array(read(g)), shape)
+
+
+def scene_reader(session: Session, part: None, word: str, shape: Shape | None) -> Reader:
+    """Return the reader of the derivative by a parameter of the scene."""
+    if word == "gravity":
+        return lambda g: np.array(g.parameters.gravity)
+    if word == "friction" and shape is None:
+        check_rubs(session.contact.friction, "rods")
+    return lambda g: float(getattr(g.parameters, word))
+
+
+def check_rubs(friction: float, what: str) -> None:
+    """Refuse a friction by which there is no derivative."""
+    if not friction > 0.0:
+        raise ValueError(f"friction of {what} must be positive to differentiate by, got 0: set a small value")

@@ -1,0 +1,45 @@
+"""Numbers of parts that have one each in the engine: set, read and differentiated by the table of parts alone."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from withe.parts.joints import revolute_joints
+from withe.parts.kinds import JoinPart, Part
+from withe.parts.table import checked, kind_of
+from withe.simulation.readers import Reader
+from withe.simulation.session import Session
+
+__all__ = ["number_of", "number_reader", "number_value", "set_numbers"]
+
+
+def set_numbers(session: Session, part: Part, values: dict[str, Any]) -> None:
+    """Change numbers of a part, all or none."""
+    index, settings = number_of(session, part), {}
+    for word, value in values.items():
+        name = _parameter(part, word)
+        settings[name] = session.world.parameter(name)
+        settings[name][index] = checked(type(part), word, value, part.name)
+    session.world.set(0, settings)
+
+
+def number_value(session: Session, part: Part, word: str) -> float:
+    """Return the present value of a number."""
+    return float(session.world.parameter(_parameter(part, word))[number_of(session, part), 0])
+
+
+def number_reader(session: Session, part: Part, word: str) -> Reader:
+    """Return the reader of the derivative by a number."""
+    index, name = number_of(session, part), _parameter(part, word)
+    return lambda g: float(getattr(g.parameters, name)[index])
+
+
+def number_of(session: Session, part: Part) -> int:
+    """Place of a part among those of its kind, as the engine numbers them."""
+    if isinstance(part, JoinPart):
+        return revolute_joints(session.scene.all(JoinPart)).index(part)
+    return session.scene.all(type(part)).index(part)
+
+
+def _parameter(part: Part, word: str) -> str:
+    return f"{kind_of(part).numbers}_{word}"

@@ -1,0 +1,34 @@
+"""Outlines of the parts of a simulation, for records and pictures."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from withe.common.outlines import ObstacleOutline, SpringOutline, TendonOutline
+from withe.parts.directory import Directory
+from withe.parts.table import kind_of
+from withe.simulation.obstacles import obstacle_outlines
+
+__all__ = ["Outlines", "outlines_of"]
+
+
+class Outlines(NamedTuple):
+    """Outlines of obstacles, of springs and of what runs through guides."""
+
+    obstacles: list[ObstacleOutline]
+    springs: list[SpringOutline]
+    tendons: list[TendonOutline]
+
+
+def outlines_of(directory: Directory) -> Outlines:
+    """Outlines of all parts that have one, each sort in the order of the scene."""
+    drawn = [
+        outline(part, directory.row)
+        for part in directory.parts.values()
+        if (outline := kind_of(part).outline) is not None
+    ]
+    return Outlines(
+        obstacle_outlines(directory),
+        [each for each in drawn if isinstance(each, SpringOutline)],
+        [each for each in drawn if isinstance(each, TendonOutline)],
+    )
