@@ -43,7 +43,7 @@ def grippers(report: Report, quick: bool) -> None:
     for friction, most in ((0.0, 6.6), (0.5, 18.0)):
         simulation, limbs, curvature = gripper.build(friction, seed=1)
         for limb, own in zip(limbs, curvature, strict=True):
-            simulation.set_natural_curvature(limb, own, over=gripper.CURLING)
+            simulation.set(limb, natural_curvature=own, over=gripper.CURLING)
         seconds, contacts = _timed(simulation, steps)
         rows.append((friction, f"{seconds * steps:.2f}", contacts))
         report.goal(f"gripper, friction {friction:g} [s]", None if quick else seconds * steps, most, at_least=False)

@@ -96,7 +96,7 @@ def settled_tip(turns: np.ndarray, gravity: float) -> np.ndarray:
     """Tip of the free arm at rest, bent by these turns of its nodes, shape (2, 19) [m]."""
     arm = FreeArm().build(np.random.default_rng(0))
     arm.set(gravity=(0.0, 0.0, -gravity))
-    arm.set_natural_curvature("arm", 20.0 * turns.T)
+    arm.set("arm", natural_curvature=20.0 * turns.T)
     arm.equilibrium()
     return arm.positions("arm")[-1]
 

@@ -39,9 +39,9 @@ def _settings(simulation: withe.Simulation) -> dict[str, Callable[[int], object]
     arm = "arm"
     return {
         "youngs_modulus": lambda i: simulation.set(arm, youngs_modulus=1e6 + i % 7),
-        "natural_curvature": lambda i: simulation.set_natural_curvature(arm, curvatures[i % 7]),
+        "natural_curvature": lambda i: simulation.set(arm, natural_curvature=curvatures[i % 7]),
         "youngs_modulus, one an edge": lambda i: simulation.set(arm, youngs_modulus=moduli[i % 7]),
-        "natural_curvature, one for all": lambda i: simulation.set_natural_curvature(arm, (0.0, 1.0 + i % 7)),
+        "natural_curvature, one for all": lambda i: simulation.set(arm, natural_curvature=(0.0, 1.0 + i % 7)),
         "gravity": lambda i: simulation.set(gravity=(0.0, 0.0, -9.0 - i % 7)),
         "friction of the floor": lambda i: simulation.set("floor", friction=0.3 + 0.01 * (i % 7)),
         "youngs_modulus, as it is": lambda _: simulation.set(arm, youngs_modulus=1e6),

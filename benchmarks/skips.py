@@ -113,7 +113,7 @@ def _moving(simulation: withe.Simulation) -> withe.Simulation:
 
 
 def _actuated(simulation: withe.Simulation) -> withe.Simulation:
-    simulation.set_natural_curvature(simulation.rods[0], (0.0, 0.0), over=1e3)
+    simulation.set(simulation.rods[0], natural_curvature=(0.0, 0.0), over=1e3)
     return simulation
 
 

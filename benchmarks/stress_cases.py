@@ -230,7 +230,7 @@ def events(case: StressCase, simulation: withe.Simulation, moment: int) -> None:
         place = case.strength * case.length * case.direction * (moment == 0)
         simulation.move("wall", position=place, rotation=_jump(case, moment))
     elif case.event == "flip" and case.nodes > 2:
-        simulation.set_natural_curvature("rod", natural_curvature_of(case, moment))
+        simulation.set("rod", natural_curvature=natural_curvature_of(case, moment))
 
 
 def _rotation(vector: np.ndarray) -> np.ndarray:

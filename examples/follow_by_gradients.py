@@ -102,7 +102,7 @@ class Pursuit:
             self.bends = np.clip(wanted, -MOST_BEND, MOST_BEND)
             free.append(wanted == self.bends)
             curvature = np.repeat(self.bends / SEGMENTS[:, None], SEGMENTS, axis=0)
-            now.set_natural_curvature("arm", curvature, over=CONTROL_STEP, discrete=True)
+            now.set("arm", discrete_curvature=curvature, over=CONTROL_STEP)
             # Derivatives are by smooth curvatures k: k V = 2 arctan(kappa / 2) of each component.
             slopes.append(EDGES / (1.0 + 0.25 * (self.bends / SEGMENTS[:, None]) ** 2))
             self.lead_target()

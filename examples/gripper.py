@@ -50,7 +50,7 @@ def grip(friction: float, seed: int, duration: float, progress: bool) -> tuple[w
     """Curl the limbs up; also returns the least distance of surfaces on the way, over the radius."""
     simulation, limbs, curvature = build(friction, seed)
     for limb, own in zip(limbs, curvature, strict=True):
-        simulation.set_natural_curvature(limb, own, over=CURLING)
+        simulation.set(limb, natural_curvature=own, over=CURLING)
 
     def clearance(simulation: withe.Simulation) -> float:
         return float(simulation.contacts()["gap"].min(initial=np.inf)) / RADIUS

@@ -98,7 +98,7 @@ def wind(force: float, turns: int, edge: float) -> tuple[withe.Simulation, withe
     simulation = scene.build(integrator="backward_euler", time_step=wave_time / 40.0)
     # Drawn without twist: this one is what the moment of the theory twists it by.
     twist = expected.moment * BENDING / RADIUS / TWISTING
-    simulation.set_natural_twist(rod, -np.sign(writhe(points)) * twist)
+    simulation.set(rod, natural_twist=-np.sign(writhe(points)) * twist)
     simulation.step(1200)
     simulation.equilibrium()
     return simulation, rod

@@ -55,7 +55,7 @@ def critical_twist(nodes: int, twisting: float = TWISTING) -> float:
     simulation.pin(ring.node(nodes // 2), free=[(1.0, 0.0, 0.0), (0.0, 1.0, 0.0)])
 
     def square(twist: float) -> float:
-        simulation.set_natural_twist(ring, twist / (2.0 * np.pi * RADIUS))
+        simulation.set(ring, natural_twist=twist / (2.0 * np.pi * RADIUS))
         lowest = simulation.linearise().frequencies(1)[0]  # negative where it grows
         return float(lowest * abs(lowest))
 
@@ -77,7 +77,7 @@ def main() -> None:
         print(f"C/B = {ratio:3.1f}: critical twist {measured:6.3f} rad; Michell {expected:6.3f} rad ({share:+.3f} %)")
 
     simulation, ring = build(arguments.nodes, "backward_euler")
-    simulation.set_natural_twist(ring, 1.1 * michell(TWISTING) / (2.0 * np.pi * RADIUS), over=1.0)
+    simulation.set(ring, natural_twist=1.1 * michell(TWISTING) / (2.0 * np.pi * RADIUS), over=1.0)
     record = simulation.run(
         duration=3.0,
         record_every=0.01,

@@ -109,7 +109,7 @@ def gait(steps: int) -> list[tuple[float, int, Callable[[withe.Simulation, Leg],
     """What happens: the time, the legs (even or odd ones) and a function of the simulation and each of them."""
 
     def bend(forward: float, up: float, over: float) -> Callable[[withe.Simulation, Leg], None]:
-        return lambda simulation, leg: simulation.set_natural_curvature(leg.rod, leg.curvature(forward, up), over=over)
+        return lambda simulation, leg: simulation.set(leg.rod, natural_curvature=leg.curvature(forward, up), over=over)
 
     events = []
     for step in range(steps):
@@ -150,7 +150,7 @@ def walk(steps: int, progress: bool = True) -> withe.Record:
         for leg in legs:
             if leg.lowering and simulation.positions(leg.rod)[-1, 2] <= 0.0:
                 leg.foothold, leg.lowering = simulation.pin(leg.rod.end), False
-                simulation.set_natural_curvature(leg.rod, leg.curvature(STRIDE / 2, 0.0), over=0.1)
+                simulation.set(leg.rod, natural_curvature=leg.curvature(STRIDE / 2, 0.0), over=0.1)
 
     return simulation.run(
         duration=0.4 + steps * HALF_STEP, record_every=0.02, progress=progress, before_step=controller

@@ -53,7 +53,7 @@ def crawl(
     def bend(now: withe.Simulation) -> None:
         t = now.time + 0.5 * time_step
         wave = couple * np.sin(2.0 * np.pi * (t / PERIOD - (1.0 - s))) * min(t / PERIOD, 1.0)
-        now.set_natural_curvature(snake, np.column_stack([wave / stiffness, np.zeros_like(s)]))
+        now.set(snake, natural_curvature=np.column_stack([wave / stiffness, np.zeros_like(s)]))
 
     record = simulation.run(periods * PERIOD, record_every=PERIOD / 50, before_step=bend)
     shapes = record.positions(snake)

@@ -82,7 +82,7 @@ def throw(simulation: withe.Simulation, controls: np.ndarray, differentiable: bo
     def act(now: withe.Simulation) -> None:
         interval, step = divmod(next(steps), STEPS)
         if step == 0:
-            now.set_natural_curvature("arm", np.tensordot(controls[interval], shapes, 1))
+            now.set("arm", natural_curvature=np.tensordot(controls[interval], shapes, 1))
         else:
             touching.append(len(now.contacts()))
 

@@ -90,7 +90,7 @@ def pushed(duration: float, controlled: bool) -> Balanced:
     def steer(now: withe.Simulation) -> None:
         u = 0.0 if gain is None else -float((gain @ now.state_difference(reference))[0])
         commands.append(u)
-        now.set_natural_curvature("arm", u * shape)
+        now.set("arm", natural_curvature=u * shape)
         now.set("push", force=(PUSH if PUSHED[0] <= now.time < PUSHED[1] else 0.0, 0.0, 0.0))
 
     record = simulation.run(duration, record_every=0.02, progress=False, before_step=steer)

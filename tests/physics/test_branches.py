@@ -322,7 +322,7 @@ def test_muscles_curl_an_arm_along_its_branch(curvature):
     arm = scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=41, radius=4e-3, material=rubber, normal=(0, 1, 0))
     scene.clamp(arm.start)
     simulation = scene.build()
-    simulation.set_natural_curvature(arm, (curvature, 0.0))
+    simulation.set(arm, natural_curvature=(curvature, 0.0))
     found = simulation.equilibrium()
     assert found.stable
     assert not found.branch_changed

@@ -129,7 +129,7 @@ def test_torsional_wave_returns_after_four_lengths():
     scene.clamp(rod.start)
     period = 4.0 / np.sqrt(twist / inertia)
     simulation = scene.build(time_step=period / 800, planar=False)
-    simulation.set_natural_twist(rod, 0.1)
+    simulation.set(rod, natural_twist=0.1)
     angles = []
     for _ in range(4):
         simulation.step(200)

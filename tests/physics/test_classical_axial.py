@@ -46,7 +46,7 @@ def test_a_column_that_grows_between_walls_buckles_by_its_strain() -> None:
         scene.clamp(column.start)
         scene.clamp(column.end)
         simulation = rods.sharp(scene, planar=True)
-        simulation.set_natural_stretch(column, 1.0 + share * critical)
+        simulation.set(column, natural_stretch=1.0 + share * critical)
         assert is_stable(simulation) == (share < 1.0)
 
 

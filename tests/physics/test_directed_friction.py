@@ -134,7 +134,7 @@ def test_a_worm_that_stretches_and_shortens_crawls_by_what_friction_differs():
     for _ in range(4):
         middles.append(simulation.positions(rod)[:, 0].mean())
         for stretch in (1.0 + strain, 1.0):
-            simulation.set_natural_stretch(rod, stretch, over=0.5 * period)
+            simulation.set(rod, natural_stretch=stretch, over=0.5 * period)
             simulation.run(0.5 * period, progress=False)
     step = strain * length * (BACKWARD - FORWARD) / (BACKWARD + FORWARD)
     np.testing.assert_allclose(np.diff(middles)[1:], step, rtol=0.03)
@@ -182,7 +182,7 @@ def crawl(*friction):
     def bend(now):
         t = now.time
         kappa = -amplitude * np.sin(2 * np.pi * (waves * s + t / period)) * min(t / (0.5 * period), 1.0)
-        now.set_natural_curvature(rod, np.column_stack([kappa, 0 * kappa]))
+        now.set(rod, natural_curvature=np.column_stack([kappa, 0 * kappa]))
 
     simulation.run(2 * period, progress=False, before_step=bend)
     ways.append(simulation.positions(rod)[:, :2].mean(axis=0))

@@ -47,11 +47,11 @@ def driven(integrator, step, what, planar=False):
             path=lambda t: ((0.1 * np.sin(5.0 * t) ** 2, 0.0, 0.2 * t**2), rods.rotation(turn, 0.8 * t**2)),
         )
     if "actuation" in what:
-        simulation.set_natural_curvature(arm, (2.0, 0.0) if planar else (1.5, 1.0), over=0.3)
+        simulation.set(arm, natural_curvature=(2.0, 0.0) if planar else (1.5, 1.0), over=0.3)
         if not planar:
-            simulation.set_natural_twist(hand, 1.2, over=0.4)
+            simulation.set(hand, natural_twist=1.2, over=0.4)
     if "muscle" in what:
-        simulation.set_natural_stretch(arm, np.linspace(0.9, 1.2, 6), over=0.3)
+        simulation.set(arm, natural_stretch=np.linspace(0.9, 1.2, 6), over=0.3)
     return simulation
 
 
@@ -214,7 +214,7 @@ def loaded(points, slenderness, event, **options):
         scene.add_force(rod.end, (-event.get("pressure", 0.0), 0.0, event.get("load", 0.0)))
     simulation = scene.build(**options)
     if "curvature" in event:
-        simulation.set_natural_curvature(rod, (event["curvature"], 0.0))
+        simulation.set(rod, natural_curvature=(event["curvature"], 0.0))
     if "jump" in event:
         simulation.move(grip, position=points[-1] + event["jump"])
     return simulation

@@ -97,7 +97,7 @@ def test_error_control_has_a_limit_of_work_and_names_remedies():
         rod = rods.straight(scene, 11, stiffness=rods.stiffness(stretch=4e6), radius=1e-3)
         scene.clamp(rod.start)
         simulation = scene.build(time_step=0.5, tolerance=1e-3, duration=2.0, **options)
-        simulation.set_natural_curvature(rod, (12.0, 0.0))
+        simulation.set(rod, natural_curvature=(12.0, 0.0))
         return simulation
 
     simulation = stiff(solver=withe.Solver(max_steps=2000))

@@ -179,8 +179,8 @@ def limp_tree(seed, turn):
     scene.add_mass("arm.end", 0.01)
     simulation = scene.build(integrator="static", planar=False)
     for name in ("trunk", "leg", "arm"):
-        simulation.set_natural_curvature(name, 3.0 * draw.normal(size=2))
-        simulation.set_natural_twist(name, 3.0 * draw.normal())
+        simulation.set(name, natural_curvature=3.0 * draw.normal(size=2))
+        simulation.set(name, natural_twist=3.0 * draw.normal())
     return simulation
 
 
@@ -212,7 +212,7 @@ def hinged_chain(seed, turn):
         start, last = start + way, rod
     simulation = scene.build(integrator="static", planar=False)
     for name in ("upper", "lower", "hand"):
-        simulation.set_natural_curvature(name, 3.0 * draw.normal(size=2))
+        simulation.set(name, natural_curvature=3.0 * draw.normal(size=2))
     return simulation
 
 

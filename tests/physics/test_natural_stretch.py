@@ -65,7 +65,7 @@ def test_a_muscle_lifts_a_weight_by_its_strain_and_does_the_work_of_it():
     )
     simulation.equilibrium()
     before, height = simulation.energy(), simulation.positions(rod)[-1, 2]
-    simulation.set_natural_stretch(rod, 0.8, over=1.0)
+    simulation.set(rod, natural_stretch=0.8, over=1.0)
     simulation.step(10)
     after = simulation.energy()
     assert simulation.positions(rod)[-1, 2] - height == pytest.approx(0.2, rel=1e-10)
@@ -115,5 +115,5 @@ def test_what_is_wrong_with_a_natural_stretch_is_named():
     with pytest.raises(ValueError, match=rf"natural_stretch of rod '{name}' must have shape \(16,\), got \(15,\)"):
         simulation.set(rod, natural_stretch=np.ones(15))
     with pytest.raises(ValueError, match="over must not be negative"):
-        simulation.set_natural_stretch(rod, 1.1, over=-1.0)
+        simulation.set(rod, natural_stretch=1.1, over=-1.0)
     assert np.array_equal(simulation.get(rod, "natural_stretch"), np.ones(16))

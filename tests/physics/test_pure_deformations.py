@@ -48,7 +48,7 @@ def test_natural_curvature_closes_a_circle_to_rounding(component):
     curvature = np.zeros(2)
     curvature[component] = 2.0 * np.pi
     for share in np.linspace(0.1, 1.0, 10):
-        simulation.set_natural_curvature(rod, share * curvature)
+        simulation.set(rod, natural_curvature=share * curvature)
         assert simulation.equilibrium().stable
     positions = simulation.positions(rod)
     np.testing.assert_allclose(positions[-1], positions[0], atol=1e-9)
@@ -136,7 +136,7 @@ def bends_of_twisted_cantilever(twist):
     scene.add_force(bar.end, (0.0, 0.0, -1e-6))
     simulation = rods.sharp(scene, planar=False)
     edge = np.linalg.norm(np.diff(simulation.positions(bar)[:2], axis=0))
-    simulation.set_natural_twist(bar, twist / edge)
+    simulation.set(bar, natural_twist=twist / edge)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         simulation.equilibrium()

@@ -203,7 +203,7 @@ def test_what_turns_with_a_drum_does_not_roll_on_it(integrator: Any, planar: boo
         axis = ((0, 0, -0.1), (0, 0, 0.1))
         scene.add_capsule(*axis, drum_radius, friction=0.5, rolling_friction=rolling, restitution=0.0, name="drum")
         simulation = scene.build(integrator=integrator, time_step=2e-3, planar=planar)
-        simulation.set_natural_stretch(ring, 0.98, over=0.05)
+        simulation.set(ring, natural_stretch=0.98, over=0.05)
         simulation.run(0.2, progress=False)
         simulation.set_velocities(ring, np.cross((0, 0, rate), simulation.positions(ring)))
         simulation.move("drum", roll=0.3 * rate, over=0.3)

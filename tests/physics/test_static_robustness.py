@@ -30,7 +30,7 @@ def test_a_straight_rod_coils_into_its_natural_shape_where_no_force_is_left_to_m
     scene.clamp(arm.start)
     simulation = scene.build(integrator="static", planar=False)
     before = simulation.energy().total
-    simulation.set_natural_curvature(arm, (0.0, 2.0 * np.pi * turns_per_edge * (nodes - 1)))
+    simulation.set(arm, natural_curvature=(0.0, 2.0 * np.pi * turns_per_edge * (nodes - 1)))
     strained = simulation.energy().total
     assert simulation.equilibrium().stable
     assert simulation.energy().bend < 1e-18 * (strained - before)
@@ -137,7 +137,7 @@ def test_drawn_cables_that_are_pulled_over_a_rough_floor_find_equilibria_all_the
     simulation = scene.build(
         integrator="static", time_step=0.1, planar=False, solver=withe.Solver(step_tolerance=1e-11)
     )
-    simulation.set_natural_curvature(cable, (0.0, 0.0), over=1.0)
+    simulation.set(cable, natural_curvature=(0.0, 0.0), over=1.0)
     way = random.normal(size=2)
     way *= random.uniform(0.005, 0.05) / np.linalg.norm(way)
     simulation.move("hand", position=points[-1] + [*way, 0.0], over=1.0)

@@ -22,7 +22,7 @@ def hanging(points, planar=False, stretch=STRETCH):
     rod = scene.add_rod(points=points, stiffness=stiffness, line_density=1.0, radius=1e-3, normal=(0, 1, 0))
     held = [scene.clamp(node) for node in (rod.start, rod.end)]
     simulation = scene.build(integrator="static", planar=planar)
-    simulation.set_natural_curvature(rod, (0.0, 0.0))
+    simulation.set(rod, natural_curvature=(0.0, 0.0))
     return simulation, rod, held
 
 

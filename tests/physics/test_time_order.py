@@ -101,7 +101,7 @@ def driven(integrator, step, planar):
     simulation.move(
         arm.start, path=lambda t: ((0.1 * np.sin(5.0 * t) ** 2, 0.0, 0.2 * t**2), rods.rotation(axis, 0.8 * t**2))
     )
-    simulation.set_natural_curvature(arm, (0.0, -2.0) if planar else (1.0, -2.0), over=2.0 * DURATION)
+    simulation.set(arm, natural_curvature=(0.0, -2.0) if planar else (1.0, -2.0), over=2.0 * DURATION)
     simulation.step(round(DURATION / step))
     return simulation.positions(arm)
 

@@ -44,7 +44,7 @@ MICHELL = 2.0 * np.pi * np.sqrt(3.0) * BEND / TWIST  # total twist [rad], [Miche
 def ring_out_of_plane(nodes, twist, side):
     scene, rod = ring(nodes, side)
     simulation = rods.sharp(scene, planar=False)
-    simulation.set_natural_twist(rod, twist)
+    simulation.set(rod, natural_twist=twist)
     simulation.equilibrium()
     return simulation.positions(rod)[3 * nodes // 4, 2]
 
@@ -64,7 +64,7 @@ def test_ring_stays_flat_below_michells_twist_and_leaves_its_plane_above(sign):
     assert abs(ring_out_of_plane(60, sign * 0.97 * MICHELL, 0.0)) < 1e-9
     scene, rod = ring(60, 0.0)
     simulation = rods.sharp(scene, planar=False)
-    simulation.set_natural_twist(rod, sign * 1.03 * MICHELL)
+    simulation.set(rod, natural_twist=sign * 1.03 * MICHELL)
     assert simulation.equilibrium().stable
     assert np.ptp(simulation.positions(rod)[:, 2]) > 0.01
 

@@ -266,16 +266,17 @@ ON_SIMULATION = {
         d.draw(st.sampled_from(["floor 1", "plane 1", "sphere 1", None])),
         friction=d.draw(st.one_of(st.floats(0, 1), number, st.tuples(number, number))),
     ),
-    "friction_of_two": lambda w, d: w.simulation.set_friction(d.draw(rod), d.draw(touched), d.draw(number)),
+    "friction_of_two": lambda w, d: w.simulation.set((d.draw(rod), d.draw(touched)), friction=d.draw(number)),
     "roll": lambda w, d: w.simulation.move(
         d.draw(st.sampled_from(["floor 1", "sphere 1", "capsule 1"])), roll=d.draw(number),
         tangent=d.draw(st.one_of(st.none(), triple)), over=d.draw(st.sampled_from([0.0, 0.01])),
     ),
-    "natural_curvature": lambda w, d: w.simulation.set_natural_curvature(
-        d.draw(rod), d.draw(st.tuples(number, number)), over=d.draw(st.sampled_from([0.0, 0.01, -1, math.nan]))
+    "natural_curvature": lambda w, d: w.simulation.set(
+        d.draw(rod), natural_curvature=d.draw(st.tuples(number, number)),
+        over=d.draw(st.sampled_from([0.0, 0.01, -1, math.nan])),
     ),
-    "natural_twist": lambda w, d: w.simulation.set_natural_twist(d.draw(rod), d.draw(number)),
-    "natural_stretch": lambda w, d: w.simulation.set_natural_stretch(d.draw(rod), d.draw(number), over=0.01),
+    "natural_twist": lambda w, d: w.simulation.set(d.draw(rod), natural_twist=d.draw(number)),
+    "natural_stretch": lambda w, d: w.simulation.set(d.draw(rod), natural_stretch=d.draw(number), over=0.01),
     "velocities": lambda w, d: w.simulation.set_velocities(d.draw(rod), d.draw(triple)),
     "clamp": lambda w, d: w.simulation.clamp(d.draw(node), hold=d.draw(st.sampled_from(["frame", "edge"]))),
     "pin": lambda w, d: w.simulation.pin(d.draw(node)),

@@ -94,13 +94,13 @@ def gravity(simulation, r):
 
 def curvature(simulation, r):
     rod, out = r.choice("ab"), number(r, 5.0) if r.random() < 0.3 else 0.0
-    simulation.set_natural_curvature(
-        rod, r.choice([(number(r, 8.0), out), (out, number(r, 8.0))]), r.choice([0.0, 0.02])
+    simulation.set(
+        rod, natural_curvature=r.choice([(number(r, 8.0), out), (out, number(r, 8.0))]), over=r.choice([0.0, 0.02])
     )
 
 
 def twist(simulation, r):
-    simulation.set_natural_twist(r.choice("ab"), number(r, 8.0), over=r.choice([0.0, 0.02]))
+    simulation.set(r.choice("ab"), natural_twist=number(r, 8.0), over=r.choice([0.0, 0.02]))
 
 
 def velocities(simulation, r):
@@ -151,7 +151,7 @@ def friction(simulation, r):
     if r.random() < 0.7:
         simulation.set(r.choice(["floor", "ball"]), friction=mu)
     else:
-        simulation.set_friction("a", r.choice(["b", "floor"]), mu)
+        simulation.set(("a", r.choice(["b", "floor"])), friction=mu)
 
 
 def load(simulation, r):

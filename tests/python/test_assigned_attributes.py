@@ -46,10 +46,10 @@ def test_gravity_of_a_scene_is_assigned():
 @pytest.mark.parametrize("integrator", ["static", "implicit_midpoint"])
 def test_an_equilibrium_of_what_has_not_begun_says_so(integrator):
     simulation = arm().build(integrator=integrator)
-    simulation.set_natural_curvature("arm", (0, 3.0), over=1.0)
+    simulation.set("arm", natural_curvature=(0, 3.0), over=1.0)
     with pytest.warns(UserWarning, match="the ramp of 'arm' .over=. has not begun, and time does not advance"):
         simulation.equilibrium()
-    simulation.set_natural_curvature("arm", (0, 3.0))
+    simulation.set("arm", natural_curvature=(0, 3.0))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         simulation.equilibrium()

@@ -34,9 +34,9 @@ def test_a_batch_has_the_bits_of_single_simulations_after_many_steps(workers):
         simulation.set("arm", youngs_modulus=modulus)
     batch.set("arm", youngs_modulus=[0.7e6, 0.9e6, 1.1e6, 1.3e6])
     for step in range(100):
-        batch.set_natural_curvature("arm", bends(step), over=0.05)
+        batch.set("arm", natural_curvature=bends(step), over=0.05)
         for simulation, bend in zip(singles, bends(step), strict=True):
-            simulation.set_natural_curvature("arm", bend, over=0.05)
+            simulation.set("arm", natural_curvature=bend, over=0.05)
             simulation.step(10)
         batch.step(10)
     for simulation, other in zip(singles, batch, strict=True):
@@ -46,8 +46,8 @@ def test_a_batch_has_the_bits_of_single_simulations_after_many_steps(workers):
 
 def test_read_outs_have_one_more_axis_and_go_into_arrays_of_the_user():
     batch = arms()
-    batch.set_natural_curvature("arm", bends(0))
-    batch.set_natural_twist("arm", np.linspace(-1, 1, LANES), over=0.02)
+    batch.set("arm", natural_curvature=bends(0))
+    batch.set("arm", natural_twist=np.linspace(-1, 1, LANES), over=0.02)
     batch.step(7)
     for word in ("positions", "velocities", "directors", "curvatures", "twists", "tensions", "spins"):
         found = getattr(batch, word)("arm")
@@ -79,7 +79,7 @@ def test_some_are_stepped_set_and_reset_by_number_or_mask():
     batch.step(2, lanes=[0, -1])
     batch.step(1, lanes=[True, False, True, False])
     np.testing.assert_allclose(batch.time, [0.035, 0.02, 0.025, 0.03])
-    batch.set_natural_stretch("arm", [1.01], lanes=[2])
+    batch.set("arm", natural_stretch=[1.01], lanes=[2])
     assert batch.get("arm", "natural_stretch")[:, 0].tolist() == [1.0, 1.0, 1.01, 1.0]
     batch.reset([False, True, True, False])
     np.testing.assert_allclose(batch.time, [0.035, 0.0, 0.0, 0.03])
@@ -92,7 +92,7 @@ def test_some_are_stepped_set_and_reset_by_number_or_mask():
 
 def test_snapshots_bring_back_every_bit():
     batch = arms()
-    batch.set_natural_curvature("arm", bends(1), over=0.1)
+    batch.set("arm", natural_curvature=bends(1), over=0.1)
     batch.step(5)
     before, twin = batch.snapshot(), batch.copy()
     batch.step(5)
@@ -167,7 +167,7 @@ def test_one_that_fails_stays_where_it_was_and_holds_up_nobody():
     singles = lone(adaptive=False, solver=withe.Solver(max_iterations=6))
     batch.step(3)
     before = batch.snapshot([1])
-    batch.set_natural_curvature("arm", [folded()], lanes=[1])
+    batch.set("arm", natural_curvature=[folded()], lanes=[1])
     for _ in range(3):
         batch.step()
     assert batch.failed.tolist() == [False, True, False, False]
@@ -216,11 +216,11 @@ def test_one_that_failed_goes_on_when_it_is_restored_by_itself(way):
     batch.step(3)
     before, record = batch[1].snapshot(), batch[1].copy().run(duration=0.005, progress=False)
     for _ in range(2):
-        batch.set_natural_curvature("arm", [folded()], lanes=[1])
+        batch.set("arm", natural_curvature=[folded()], lanes=[1])
         batch.step()
         assert batch.failed.tolist() == [False, True, False, False]
         batch.step(2)
-        batch[1].set_natural_curvature("arm", (0, 0))
+        batch[1].set("arm", natural_curvature=(0, 0))
         batch.step(2)
         assert batch.failed[1]
         batch[1].reset() if way == "reset" else batch[1].restore(before if way == "snapshot" else record, frame=0)
@@ -326,15 +326,15 @@ BAD = [
     (lambda b: b.positions(out=np.empty((4, 11, 3), np.float32)), "out must be a float64 array of shape (4, 11, 3)"),
     (lambda b: b.positions(out=np.empty((3, 11, 4)).T), "out must be contiguous (order C) and writeable"),
     (lambda b: b.positions(out=[1.0]), "out must be a float64 array of shape (4, 11, 3), got list"),
-    (lambda b: b.set_natural_curvature("arm", (0, 1)), "natural_curvature of rod 'arm' must have shape (4, 2) or"),
+    (lambda b: b.set("arm", natural_curvature=(0, 1)), "natural_curvature of rod 'arm' must have shape (4, 2) or"),
     (
-        lambda b: b.set_natural_curvature("arm", np.full((4, 2), np.nan)),
+        lambda b: b.set("arm", natural_curvature=np.full((4, 2), np.nan)),
         "natural_curvature of rod 'arm' must be finite",
     ),
-    (lambda b: b.set_natural_curvature("arm", np.full((4, 2), 900.0)), "must turn the rod by less than pi at every"),
-    (lambda b: b.set_natural_curvature("arm", np.ones((4, 2)), over=-1), "over must not be negative, got -1"),
-    (lambda b: b.set_natural_twist("arm", [1, 2, 3]), "natural_twist of rod 'arm' must have shape (4,) or (4, 9)"),
-    (lambda b: b.set_natural_stretch("arm", [1, 1, 0, 1]), "natural_stretch of rod 'arm' must be positive, got 0"),
+    (lambda b: b.set("arm", natural_curvature=np.full((4, 2), 900.0)), "must turn the rod by less than pi at every"),
+    (lambda b: b.set("arm", natural_curvature=np.ones((4, 2)), over=-1), "over must not be negative, got -1"),
+    (lambda b: b.set("arm", natural_twist=[1, 2, 3]), "natural_twist of rod 'arm' must have shape (4,) or (4, 9)"),
+    (lambda b: b.set("arm", natural_stretch=[1, 1, 0, 1]), "natural_stretch of rod 'arm' must be positive, got 0"),
     (lambda b: b.set("arm", youngs_modulus=[1e6]), "youngs_modulus must have a row for each of 4 simulations, got 1"),
     (lambda b: b.move("wall", [(0, 0, 0)]), "position must have shape (4, 3), got (1, 3)"),
     (lambda b: b.move("wall", roll=[0.1, 0.2]), "roll must have shape (4,), got (2,)"),
@@ -378,12 +378,12 @@ def test_discrete_curvatures_mean_the_angles_of_each_simulations_own_nodes():
         scene.add_rod(start=(0, 0, 0), end=(length, 0, 0), nodes=11, radius=5e-3, material=rubber, name="arm")
         simulations.append(scene.build(time_step=5e-3))
     batch = withe.Batch(simulations, workers=1)
-    batch.set_natural_curvature("arm", [(0.0, 0.2), (0.0, 0.2)], discrete=True)
+    batch.set("arm", discrete_curvature=[(0.0, 0.2), (0.0, 0.2)])
     for simulation, voronoi in zip(simulations, (0.02, 0.05), strict=True):
         natural = simulation.get("arm", "natural_curvature")
         np.testing.assert_allclose(natural[:, 1] * voronoi, 2.0 * np.arctan(0.1), rtol=1e-12)
     with pytest.raises(ValueError, match="less than pi at every node"):
-        batch.set_natural_curvature("arm", [(0.0, 0.0), (0.0, 80.0)])
+        batch.set("arm", natural_curvature=[(0.0, 0.0), (0.0, 80.0)])
     assert simulations[0].get("arm", "natural_curvature")[0, 1] > 0.0
 
 

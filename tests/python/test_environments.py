@@ -256,7 +256,7 @@ class Brittle(Touch):
 
     def act(self, robots, actions, chosen):
         zigzag = np.where(np.arange(7) % 2, 55.0, -55.0)[:, None] * np.ones(2)
-        robots.set_natural_curvature("arm", (actions[:, :1] == 1.0)[..., None] * zigzag, lanes=chosen)
+        robots.set("arm", natural_curvature=(actions[:, :1] == 1.0)[..., None] * zigzag, lanes=chosen)
 
 
 def test_a_robot_whose_simulation_fails_ends_its_episode_and_no_others():
@@ -444,7 +444,7 @@ def test_steps_that_are_long_on_purpose_are_no_reason_for_a_warning_and_longer_o
         for _ in range(30):
             actions = many.action_space.sample()
             many.step(actions)
-            alone.set_natural_curvature("arm", many.robots[0].get("arm", "natural_curvature"))
+            alone.set("arm", natural_curvature=many.robots[0].get("arm", "natural_curvature"))
             alone.step()
 
     whip(getattr(withe.learning, name)())

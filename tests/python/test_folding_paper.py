@@ -43,7 +43,7 @@ def drop_of_rod(length, curl=0.0):
         )
         scene.clamp(strip.start)
         simulation = scene.build(planar=True)
-        simulation.set_natural_curvature(strip, (0.0, curl))
+        simulation.set(strip, natural_curvature=(0.0, curl))
         simulation.equilibrium()
         drops.append(-simulation.positions(strip)[-1, 2])
     return (4 * drops[1] - drops[0]) / 3

@@ -159,14 +159,14 @@ def test_gradient_by_what_was_set_while_a_run_went_is_that_of_differences(integr
 def test_gradient_by_the_ends_of_ramps_is_that_of_differences(integrator, viscosity, planar):
     random = np.random.default_rng(18)
     acts = {
-        1: [lambda s, d, g: s.set_natural_curvature(d.arm, g["first"], over=5.3e-3)],
-        3: [lambda s, d, g: s.set_natural_curvature(d.arm, g["second"], over=4.1e-3)],  # while that is on its way
+        1: [lambda s, d, g: s.set(d.arm, natural_curvature=g["first"], over=5.3e-3)],
+        3: [lambda s, d, g: s.set(d.arm, natural_curvature=g["second"], over=4.1e-3)],  # while that is on its way
         6: [lambda s, d, g: s.set(d.arm, natural_curvature=g["third"])],
-        7: [lambda s, d, g: s.set_natural_stretch(d.arm, g["stretch"], over=3e-3)],
-        8: [lambda s, d, g: s.set_natural_curvature(d.arm, g["fourth"], over=1.0)],
+        7: [lambda s, d, g: s.set(d.arm, natural_stretch=g["stretch"], over=3e-3)],
+        8: [lambda s, d, g: s.set(d.arm, natural_curvature=g["fourth"], over=1.0)],
     }
     if not planar:
-        acts[2] = [lambda s, d, g: s.set_natural_twist(d.arm, g["twist"], over=3e-3)]
+        acts[2] = [lambda s, d, g: s.set(d.arm, natural_twist=g["twist"], over=3e-3)]
     run = Run(integrator, viscosity, planar=planar, joint=False, acts=acts, given={})
     sim, arm = run.drawn.simulation, run.drawn.arm
     now = sim.get(arm, "natural_curvature")
@@ -237,7 +237,7 @@ def test_a_value_that_is_set_again_at_every_step_has_a_gradient_of_each():
         record_every=DURATION,
         progress=False,
         differentiable=True,
-        before_step=lambda s: s.set_natural_curvature(arm, curvature),
+        before_step=lambda s: s.set(arm, natural_curvature=curvature),
     )
     found = record.gradient({"positions": weight}, [(arm, "natural_curvature")])
     assert len(found.calls) == round(DURATION / STEP)
@@ -247,7 +247,7 @@ def test_a_value_that_is_set_again_at_every_step_has_a_gradient_of_each():
     for call, same in zip(found.calls, calls_alone.calls, strict=True):
         np.testing.assert_array_equal(call.gradients["natural_curvature"], same.gradients["natural_curvature"])
     sim.restore(start)
-    sim.set_natural_curvature(arm, curvature)
+    sim.set(arm, natural_curvature=curvature)
     whole = sim.run(DURATION, record_every=DURATION, progress=False, differentiable=True)
     (together,) = whole.gradient({"positions": weight}, [(arm, "natural_curvature")])
     np.testing.assert_allclose(

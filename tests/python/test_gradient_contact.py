@@ -150,7 +150,7 @@ def test_contact_that_no_gradient_goes_through_says_what_to_do():
 def test_friction_that_was_set_while_a_run_went_has_a_gradient_of_each_call(friction):
     touching = Touching("floor", friction)
     sim, arm, floor = touching.simulation, touching.arm, touching.other
-    sim.set_friction(arm, floor, 0.35)
+    sim.set((arm, floor), friction=0.35)
     start, random = sim.snapshot(), np.random.default_rng(4)
     weights = random.normal(size=(4, NODES, 3))
     given = {"own": 0.35, "tolerance": 0.08, "pair": 0.45}
@@ -158,14 +158,14 @@ def test_friction_that_was_set_while_a_run_went_has_a_gradient_of_each_call(fric
     def run(change, **options):
         values, steps = given | change, iter(range(100))
         sim.restore(start)
-        sim.set_friction(arm, floor, values["own"])
+        sim.set((arm, floor), friction=values["own"])
 
         def before_step(simulation):
             step = next(steps)
             if step == 6:
                 simulation.set(None, slip_tolerance=values["tolerance"])
             elif step == 10:
-                simulation.set_friction(floor, arm, values["pair"])
+                simulation.set((floor, arm), friction=values["pair"])
 
         return touching.run(before_step=before_step, **options)
 
@@ -173,7 +173,7 @@ def test_friction_that_was_set_while_a_run_went_has_a_gradient_of_each_call(fric
     wrt = [((arm, floor), "friction"), (floor, "friction"), "slip_tolerance"]
     found = record.gradient({"positions": weights}, wrt)
     assert found[1] == 0.0  # what the pair has of its own acts in its place
-    assert [(call.call, call.target) for call in found.calls] == [("set", None), ("set_friction", f"arm, {floor.name}")]
+    assert [(call.call, call.target) for call in found.calls] == [("set", None), ("set", f"arm, {floor.name}")]
     gradients = {
         "own": found[0],
         "tolerance": found.calls[0].gradients["slip_tolerance"],
@@ -196,7 +196,7 @@ def test_friction_without_a_gradient_says_what_to_do():
     for unknown, message in (
         ((floor, "rotation"), "no gradient with respect to 'rotation'"),
         ("friction", "set a small value"),
-        (((arm, floor), "friction"), "call set_friction first"),
+        (((arm, floor), "friction"), "have no friction of their own"),
         (((arm, floor, arm), "friction"), "wrt must name two bodies by a pair"),
         (((arm, "nobody"), "friction"), "nobody"),
     ):
@@ -215,7 +215,7 @@ def test_runs_in_which_friction_comes_or_goes_say_so(pair):
         if next(steps) != 8:
             return
         if pair:
-            simulation.set_friction(touching.arm, touching.other, 0.2)
+            simulation.set((touching.arm, touching.other), friction=0.2)
         else:
             simulation.set(touching.other, friction=0.0)
 
@@ -276,7 +276,7 @@ def test_runs_of_integrators_without_a_gradient_say_so(integrator):
     ("change", "message"),
     [
         (lambda s, arm, floor: s.set(contact_stiffness=3e5), "the contact stiffness was set"),
-        (lambda s, arm, floor: s.set_contact_stiffness(arm, floor, 3e5), "the contact stiffness was set"),
+        (lambda s, arm, floor: s.set((arm, floor), contact_stiffness=3e5), "the contact stiffness was set"),
         (lambda s, arm, floor: s.set(floor, restitution=0.5), "use restitution=1"),
     ],
 )

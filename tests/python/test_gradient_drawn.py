@@ -97,7 +97,7 @@ def test_a_shape_that_is_set_later_does_not_follow_drawn_nodes():
 
     def arm(h):
         made = Arm(points + h * way, planar=False, support="frame")
-        made.simulation.set_natural_curvature(made.arm, (3.0, -2.0))
+        made.simulation.set(made.arm, natural_curvature=(3.0, -2.0))
         return made, made.simulation.equilibrium()
 
     first, found = arm(0.0)
@@ -138,7 +138,7 @@ def test_gradient_of_a_run_by_drawn_nodes_is_that_of_scenes_built_anew(integrato
 
         def before_step(simulation):
             if next(steps) == 3:
-                simulation.set_natural_curvature(made.arm, (bent, 3.0), over=6e-3)
+                simulation.set(made.arm, natural_curvature=(bent, 3.0), over=6e-3)
 
         return made, made.simulation.run(20e-3, record_every=4e-3, progress=False, before_step=before_step, **options)
 

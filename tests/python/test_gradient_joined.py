@@ -161,7 +161,7 @@ def test_gradient_of_a_run_by_drawn_nodes_of_joined_rods_is_that_of_scenes_built
         def before_step(simulation):
             step = next(steps)
             if step == 3:
-                simulation.set_natural_curvature(made.arm, (0.0 if planar else 2.0, 3.0), over=6e-3)
+                simulation.set(made.arm, natural_curvature=(0.0 if planar else 2.0, 3.0), over=6e-3)
             if step == 5:
                 simulation.set(made.stay, rest_length=0.15)
 

@@ -230,7 +230,7 @@ def test_gradient_of_tensions_goes_by_the_natural_stretch_that_a_ramp_has_come_t
     def run(h=0.0, **options):
         sim.restore(start)
         sim.set(arm, youngs_modulus=1e6 + h)
-        sim.set_natural_stretch(arm, 1.02, over=20e-3)
+        sim.set(arm, natural_stretch=1.02, over=20e-3)
         return sim.run(12e-3, record_every=4e-3, progress=False, **options)
 
     (found,) = run(differentiable=True).gradient({"tensions": {arm: weights}}, [(arm, "youngs_modulus")])

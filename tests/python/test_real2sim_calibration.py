@@ -60,10 +60,10 @@ def test_sigmas_of_a_fit_take_the_camera_for_exact_as_their_documentation_says()
     still = scene.build(integrator="static", planar=True)
     places, curvatures, seen = [arm.node(i) for i in range(0, 21, 4)], np.linspace(-6.0, 9.0, 6), []
     for curvature in curvatures:
-        still.set_natural_curvature(arm, (0.0, curvature))
+        still.set(arm, natural_curvature=(0.0, curvature))
         still.equilibrium()
         seen.append(np.array([300.0, 200.0]) + 1500.0 * still.positions(arm)[::4, [0, 2]] * (1.0, -1.0))
-    still.set_natural_curvature(arm, (0.0, 0.0))
+    still.set(arm, natural_curvature=(0.0, 0.0))
     exact = calibrate(still, Tags(seen, places), progress=False)
     errors = {"exact": [], "calibrated": []}
     for seed in range(8):

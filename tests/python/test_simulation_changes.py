@@ -124,7 +124,7 @@ def test_friction_that_was_changed_acts_as_if_it_had_been_drawn(drawn, changed):
 def test_friction_of_a_pair_and_of_rods_is_set_while_running():
     block, floor, scene = sliding(0.0)
     simulation = scene.build(time_step=1e-3)
-    simulation.set_friction(block, floor, (0.6, 0.1))
+    simulation.set((block, floor), friction=(0.6, 0.1))
     other, ground, drawn = sliding(0.0)
     drawn.set_friction(other, ground, (0.6, 0.1))
     assert way(simulation, block) == pytest.approx(way(drawn.build(time_step=1e-3), other), rel=1e-6)
@@ -132,7 +132,7 @@ def test_friction_of_a_pair_and_of_rods_is_set_while_running():
     assert simulation.get("friction") == 0.3
     kept = pickle.loads(pickle.dumps(simulation))
     assert kept.get("friction") == 0.3
-    simulation.set_friction("block", "block", 0.2)
+    simulation.set(("block", "block"), friction=0.2)
 
 
 @pytest.mark.parametrize("friction", [0.1, (0.3, 0.1), (0.1, 0.3, 0.2), np.linspace(0.1, 0.3, 5)])
@@ -163,7 +163,7 @@ def test_three_coefficients_of_a_rod_of_three_edges_are_directions_as_a_tuple_an
     floor = scene.add_floor()
     simulation = scene.build()
     for friction in ((0.1, 0.2, 0.3), np.array((0.1, 0.2, 0.3))):
-        simulation.set_friction(block, floor, friction)
+        simulation.set((block, floor), friction=friction)
         assert type(simulation.get((block, floor), "friction")) is type(friction)
 
 
@@ -204,9 +204,9 @@ def test_a_file_of_a_field_of_friction_needs_the_field(tmp_path):
         (lambda s: s.set("floor", friction=(0.1, -2, 0.1)), "friction of 'floor' towards its start must"),
         (lambda s: s.set("floor", friction=(0.1, -2)), "friction of 'floor' across must"),
         (lambda s: s.set("floor", radius=1), "obstacle 'floor' has no 'radius' to set; it has friction"),
-        (lambda s: s.set_friction("floor", "floor", 0.1), "both obstacles"),
+        (lambda s: s.set(("floor", "floor"), friction=0.1), "both obstacles"),
         (
-            lambda s: s.set_friction("block", "block", (0.1, 0.2)),
+            lambda s: s.set(("block", "block"), friction=(0.1, 0.2)),
             "must be one number, got .*: friction along and across",
         ),
         (lambda s: s.set(friction="much"), "friction must be"),

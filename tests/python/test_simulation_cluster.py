@@ -23,7 +23,7 @@ def test_a_cluster_gives_the_records_and_states_of_single_runs(client):
     singles = [simulation.copy() for simulation in simulations]
 
     def lead(simulation):
-        simulation.set_natural_curvature("arm", (0.0, 10.0 * simulation.time))
+        simulation.set("arm", natural_curvature=(0.0, 10.0 * simulation.time))
 
     options = {"record_every": 0.02, "before_step": lead, "progress": False}
     records = withe.run_many(simulations, 0.1, client=client, **options)

@@ -15,7 +15,7 @@ def test_natural_curvature_bends_towards_its_director(component, axis):
     assert np.allclose(simulation.directors(arm)[0, component], np.eye(3)[axis])
     kappa = np.zeros(2)
     kappa[component] = 2.0
-    simulation.set_natural_curvature(arm, kappa)
+    simulation.set(arm, natural_curvature=kappa)
     simulation.equilibrium()
     tip = simulation.positions(arm)[-1]
     expected = np.array([np.sin(0.4) / 2, 0, 0])
@@ -27,7 +27,7 @@ def test_natural_curvature_bends_towards_its_director(component, axis):
 
 def test_natural_curvature_is_ramped_over_time():
     _, arm, simulation = weightless(integrator="static", time_step=0.1)
-    simulation.set_natural_curvature(arm, (0.0, 3.0), over=1.0)
+    simulation.set(arm, natural_curvature=(0.0, 3.0), over=1.0)
     assert np.allclose(simulation.get(arm, "natural_curvature"), 0)
     simulation.step(5)
     assert np.allclose(simulation.get(arm, "natural_curvature"), (0, 1.5))
@@ -38,13 +38,13 @@ def test_natural_curvature_is_ramped_over_time():
 
 def test_discrete_natural_curvature_is_the_sources_number():
     _, arm, simulation = weightless()
-    simulation.set_natural_curvature(arm, (0.0, 2 * np.tan(0.05)), discrete=True)
+    simulation.set(arm, discrete_curvature=(0.0, 2 * np.tan(0.05)))
     assert np.allclose(simulation.get(arm, "natural_curvature"), (0, 0.1 / 0.01))
 
 
 def test_natural_twist_turns_the_tip():
     _, arm, simulation = weightless(integrator="static", planar=False)
-    simulation.set_natural_twist(arm, 5.0)
+    simulation.set(arm, natural_twist=5.0)
     simulation.equilibrium()
     assert np.allclose(simulation.twists(arm), 5.0, atol=1e-8)
     d1 = simulation.directors(arm)[-1, 0]
@@ -59,20 +59,20 @@ def test_a_planar_simulation_leaves_its_plane_when_it_is_actuated_out_of_it():
     assert simulation.plan.planar
     simulation.equilibrium()
     before = simulation.positions(arm)
-    simulation.set_natural_curvature(arm, (3.0, 0.0))
+    simulation.set(arm, natural_curvature=(3.0, 0.0))
     assert not simulation.plan.planar
     assert np.allclose(simulation.positions(arm), before, atol=1e-14)
     simulation.equilibrium()
     _, _, spatial = cantilever(integrator="static", planar=False)
-    spatial.set_natural_curvature("arm", (3.0, 0.0))
+    spatial.set("arm", natural_curvature=(3.0, 0.0))
     spatial.equilibrium()
     assert abs(simulation.positions(arm)[-1, 1]) > 1e-3
     assert np.allclose(simulation.positions(arm), spatial.positions("arm"), atol=1e-8)
 
 
 @pytest.mark.parametrize("act", [
-    lambda s, arm: s.set_natural_curvature(arm, (3.0, 0.0)),
-    lambda s, arm: s.set_natural_twist(arm, 1.0),
+    lambda s, arm: s.set(arm, natural_curvature=(3.0, 0.0)),
+    lambda s, arm: s.set(arm, natural_twist=1.0),
     lambda s, arm: s.set("tip", force=(0, 1, 0)),
     lambda s, arm: s.set("turn", moment=(0, 0, 1)),
     lambda s, arm: s.set(gravity=(0, 1, 0)),
@@ -251,7 +251,7 @@ def test_a_natural_twist_that_grows_like_a_motor_does_not_warn():
     arm, simulation = shaft()
     twist = np.zeros(arm.stencils)
     twist[2] = 2 * np.pi * 5 / 0.02
-    simulation.set_natural_twist(arm, twist, over=1.0)
+    simulation.set(arm, natural_twist=twist, over=1.0)
     simulation.step(240)
     turned = simulation.directors(arm)
     assert np.abs(simulation.twists(arm)).max() == pytest.approx(twist[2], rel=0.01)
@@ -290,8 +290,8 @@ def test_natural_twist_warns_where_it_winds_what_bends_unevenly_faster_than_the_
     simulation = scene.build()
     twist = np.zeros(rod.stencils)
     twist[stencils] = 2.0 * np.pi / 0.01
-    simulation.set_natural_curvature(rod, (curvature, 0.0))
-    simulation.set_natural_twist(rod, twist)
+    simulation.set(rod, natural_curvature=(curvature, 0.0))
+    simulation.set(rod, natural_twist=twist)
     simulation.equilibrium()
     said = [str(w.message) for w in recwarn.list if issubclass(w.category, withe.CoarseMeshWarning)]
     assert len(said) == warns
@@ -313,3 +313,62 @@ def test_a_shaft_that_is_wound_up_between_two_clamps_warns(advance):
     with pytest.warns(withe.CoarseMeshWarning, match=r"twists by \d+ degrees against the next") as caught:
         advance(simulation)
     assert [warning.filename for warning in caught] == [__file__]  # the line of the user
+
+
+# Old names
+
+OLD_NAMES = {
+    "set_natural_curvature": (("rod", (0.0, 2.0)), {"natural_curvature": (0.0, 2.0)}),
+    "set_natural_twist": (("rod", 3.0), {"natural_twist": 3.0}),
+    "set_natural_stretch": (("rod", 1.02), {"natural_stretch": 1.02}),
+}
+
+
+@pytest.mark.parametrize("old", OLD_NAMES)
+@pytest.mark.parametrize("over", [0.0, 0.02])
+def test_old_names_of_set_warn_and_do_the_same(old, over):
+    arguments, words = OLD_NAMES[old]
+    _, arm, simulation = weightless(planar=False)
+    copy = simulation.copy()
+    with pytest.warns(DeprecationWarning, match=f"{old} is deprecated"):
+        getattr(simulation, old)(arm, *arguments[1:], over=over)
+    copy.set(arm, **words, over=over)
+    for each in (simulation, copy):
+        each.step(3)
+    assert np.array_equal(simulation.positions(), copy.positions())
+    batch = weightless(planar=False)[0].build_batch(2)
+    value = np.repeat(np.array(arguments[1])[None], 2, axis=0)
+    with pytest.warns(DeprecationWarning, match=f"{old} is deprecated"):
+        getattr(batch, old)(arm.name, value, over=over)
+
+
+def test_old_names_of_pairs_warn_and_set_the_pair():
+    scene = withe.Scene()
+    arm = scene.add_rod(start=(0, 0, 0.01), end=(0.1, 0, 0.01), nodes=5, radius=0.01, material=RUBBER)
+    floor = scene.add_floor(0.0, friction=0.3)
+    simulation = scene.build()
+    for word, value in {"friction": 0.2, "restitution": 0.4, "contact_stiffness": 2e3}.items():
+        old = f"set_{word}"
+        with pytest.warns(DeprecationWarning, match=f"{old} is deprecated"):
+            getattr(simulation, old)(arm, floor, value)
+        assert simulation.get((floor, arm), word) == value
+        simulation.set((arm, floor), **{word: 0.5 * value})
+        assert simulation.get((arm, floor), word) == 0.5 * value
+
+
+def test_words_are_set_together_or_not_at_all():
+    scene = withe.Scene()
+    arm = scene.add_rod(start=(0, 0, 0.01), end=(0.1, 0, 0.01), nodes=5, radius=0.01, material=RUBBER)
+    floor = scene.add_floor(0.0, friction=0.3)
+    simulation = scene.build(planar=True)
+    with pytest.raises(ValueError, match="restitution of"):
+        simulation.set((arm, floor), friction=0.1, restitution=2.0)
+    assert simulation.get((arm, floor), "friction") == 0.3
+
+
+def test_what_is_not_ramped_must_be_set_at_once():
+    _, arm, simulation = weightless()
+    with pytest.raises(ValueError, match=r"youngs_modulus of rod .* must be set without over="):
+        simulation.set(arm, youngs_modulus=1e6, over=0.1)
+    with pytest.raises(ValueError, match="gravity of the scene must be set without over="):
+        simulation.set(gravity=(0, 0, -1), over=0.1)

@@ -239,7 +239,7 @@ def test_a_moment_that_follows_stays_about_the_tangent_of_its_edge():
     found = []
     for natural in (0.0, np.pi / 2 / 0.2):
         simulation = scene.build(planar=False, integrator="static")
-        simulation.set_natural_curvature(arm, (0.0, natural))
+        simulation.set(arm, natural_curvature=(0.0, natural))
         simulation.equilibrium()
         simulation.add_moment(arm.end, (2e-4, 0, 0), follower=True)
         simulation.equilibrium()

@@ -116,7 +116,7 @@ def test_settings_go_on_with_the_factorisation_that_there_is():
     # A natural curvature that changes little from step to step asks for no more matrices than one that stays.
     still, driven = swinging(), swinging()
     for i in range(40):
-        driven.set_natural_curvature("arm", (0.0, 1e-4 * i))
+        driven.set("arm", natural_curvature=(0.0, 1e-4 * i))
         still.step()
         driven.step()
     assert driven.statistics.factorizations <= still.statistics.factorizations + 1
@@ -190,7 +190,7 @@ def test_words_set_together_are_as_given_in_every_lane_of_a_batch():
 
 def test_a_ramp_ends_where_a_natural_curvature_is_set_at_once_to_what_it_is():
     simulation = swinging()
-    simulation.set_natural_curvature("arm", (0.0, 5.0), over=1.0)
+    simulation.set("arm", natural_curvature=(0.0, 5.0), over=1.0)
     simulation.step(5)
     now = simulation.get("arm", "natural_curvature")
     simulation.set("arm", natural_curvature=now)
@@ -236,16 +236,16 @@ def sliding(
 CONTACT = [
     ({"friction": 0.1}, lambda s: s.set("table", friction=0.1)),
     ({"friction": (0.1, 0.4)}, lambda s: s.set("table", friction=(0.1, 0.4))),
-    ({"own": 0.05}, lambda s: s.set_friction("block", "table", 0.05)),
+    ({"own": 0.05}, lambda s: s.set(("block", "table"), friction=0.05)),
     (
         {"slip_tolerance": 1e-2, "friction_model": "implicit", "pull": (0.3, 0.1, 0.0)},
         lambda s: s.set(slip_tolerance=1e-2),
     ),
     ({"stiffness": 4e4}, lambda s: s.set(contact_stiffness=4e4)),
-    ({"own_stiffness": 4e4}, lambda s: s.set_contact_stiffness("block", "table", 4e4)),
+    ({"own_stiffness": 4e4}, lambda s: s.set(("block", "table"), contact_stiffness=4e4)),
     ({"restitution": 0.2}, lambda s: s.set(restitution=0.2)),
     ({"table_restitution": 0.2}, lambda s: s.set("table", restitution=0.2)),
-    ({"own_restitution": 0.2}, lambda s: s.set_restitution("block", "table", 0.2)),
+    ({"own_restitution": 0.2}, lambda s: s.set(("block", "table"), restitution=0.2)),
 ]
 
 
@@ -360,8 +360,8 @@ def test_contact_that_was_set_comes_back_with_a_snapshot_and_in_copies():
     simulation.step(10)
     simulation.set(contact_stiffness=3e4, restitution=0.4)
     simulation.set("table", restitution=0.3)
-    simulation.set_contact_stiffness("block", "table", 5e4)
-    simulation.set_restitution("block", "table", 0.2)
+    simulation.set(("block", "table"), contact_stiffness=5e4)
+    simulation.set(("block", "table"), restitution=0.2)
     fresh, _ = sliding()
     fresh.restore(simulation.snapshot())
     copies = [simulation.copy(), pickle.loads(pickle.dumps(simulation)), fresh]
@@ -403,9 +403,12 @@ def test_what_is_wrong_with_contact_that_is_set_is_named():
         (lambda: simulation.set(contact_stiffness=0.0), "contact_stiffness must be positive, got 0"),
         (lambda: simulation.set(table, restitution=-0.1), "restitution of 'table' must be from 0 to 1, got -0.1"),
         (lambda: simulation.set(table, stiffness=1e3), "obstacle 'table' has no 'stiffness' to set; it has friction"),
-        (lambda: simulation.set_restitution("block", table, 2.0), "restitution of 'block' and 'table' must be from 0"),
         (
-            lambda: simulation.set_contact_stiffness("block", table, -1.0),
+            lambda: simulation.set(("block", table), restitution=2.0),
+            "restitution of 'block' and 'table' must be from 0",
+        ),
+        (
+            lambda: simulation.set(("block", table), contact_stiffness=-1.0),
             "stiffness of 'block' and 'table' must be pos",
         ),
     ]

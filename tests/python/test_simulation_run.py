@@ -61,7 +61,7 @@ def test_before_step_is_called_once_a_time_step():
     def controller(s):
         assert s is simulation
         calls.append(s.time)
-        s.set_natural_curvature(arm, (0.0, 100 * np.sin(20 * s.time)))
+        s.set(arm, natural_curvature=(0.0, 100 * np.sin(20 * s.time)))
 
     record = simulation.run(0.1, record_every=0.05, before_step=controller, progress=False)
     assert np.allclose(calls, 0.005 * np.arange(20))
@@ -182,7 +182,7 @@ def test_ctrl_c_ends_a_static_solve_and_leaves_the_last_accepted_state(act):
     scene.clamp(arm.start)
     scene.add_custom_force(no_force)
     simulation = scene.build(integrator="static", time_step=0.1, planar=False)
-    simulation.set_natural_curvature(arm, (3.0, 2.0), over=0.2)
+    simulation.set(arm, natural_curvature=(3.0, 2.0), over=0.2)
     before = simulation.positions()
     with pytest.raises(KeyboardInterrupt), ctrl_c_once(solving.is_set):
         getattr(simulation, act)()
@@ -287,7 +287,7 @@ def test_a_mesh_too_coarse_for_the_motion_warns_once(moved, recwarn):
     if moved == "twisted":
         simulation.move(arm.end, roll=3.0 * np.pi, over=1.0)  # 135 degrees an edge
     elif moved == "folded":
-        simulation.set_natural_curvature(arm, (2.5 / 0.05, 0.0), over=0.5, discrete=True)
+        simulation.set(arm, discrete_curvature=(2.5 / 0.05, 0.0), over=0.5)
     simulation.run(2.0, progress=False)
     simulation.equilibrium()
     said = [str(w.message) for w in recwarn.list if issubclass(w.category, withe.CoarseMeshWarning)]

@@ -277,7 +277,7 @@ def pinned_pair():
     scene.add_drag(0.05, name="drag")
     scene.add_floor(0.09, friction=0.3)
     simulation = scene.build(integrator="backward_euler", time_step=2e-3)
-    simulation.set_natural_twist(b, 4.0)
+    simulation.set(b, natural_twist=4.0)
     return simulation
 
 

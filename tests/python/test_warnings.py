@@ -189,7 +189,7 @@ def test_the_first_clause_of_the_engine_s_warnings_says_what_is_wrong():
 
 def folded():
     simulation = arm(gravity=0.0, integrator="static")
-    simulation.set_natural_curvature("arm", (0.0, 78.0))
+    simulation.set("arm", natural_curvature=(0.0, 78.0))
     return simulation
 
 

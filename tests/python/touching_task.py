@@ -19,7 +19,7 @@ class Touch(withe.learning.Task):
         return scene.build(time_step=0.02)
 
     def act(self, robots, actions, chosen):
-        robots.set_natural_curvature("arm", 6.0 * actions, over=self.control_step, lanes=chosen)
+        robots.set("arm", natural_curvature=6.0 * actions, over=self.control_step, lanes=chosen)
 
     def observe(self, robots):
         return np.hstack([robots.positions("arm")[:, -1], robots.velocities("arm")[:, -1]])
