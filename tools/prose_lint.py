@@ -6,7 +6,8 @@
     python tools/prose_lint.py FILE ...            # these files
 
 BASE is by default the commit where this branch left the published main branch, or the commit before this one. The exit
-status is 1 if there is a finding. Code in backticks, doctests and fenced blocks is not prose.
+status is 1 if there is a finding. Code in backticks, doctests, fenced blocks and strings that contain Python is not
+prose. Each cell of an aligned table is a text of its own.
 
 Findings:
 
@@ -22,9 +23,11 @@ Findings:
 from __future__ import annotations
 
 import argparse
+import ast
 import re
 import subprocess
 import sys
+import textwrap
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -53,9 +56,10 @@ DIRECTIVE = re.compile(r"^\s*(?:noqa|type:|ruff:|mypy:|NOLINT|clang-format|IWYU|
 
 LIST_MARK = re.compile(r"\s*(?:[-*+]|\d+\.)\s+(?:\[.\]\s+)?")
 CODE_SPAN = re.compile(r"``[^`]+``|`[^`]+`")
-PLACEHOLDER = re.compile(r"\{[^{}]*\}")
+PLACEHOLDER = re.compile(r"\{(?:[^{}]|\{[^{}]*\})*\}")
+GAP = re.compile(r"(?<=\S) {2,}(?=\S)")
 ABBREVIATION = re.compile(
-    r"(?:\b(?:e\.g|i\.e|cf|vs|al|eqs?|secs?|figs?|chap|pp?|no|vol|approx|St|resp)|\b[A-Z])\.$", re.I
+    r"(?:\b(?i:e\.g|i\.e|cf|vs|al|eqs?|secs?|figs?|chap|pp?|no|vol|approx|St|resp)|(?<!\d )(?<!/)\b[A-Z])\.$"
 )
 SENTENCE_END = re.compile(r"(?<=[.!?])[\"')\]*_]*\s+(?=[\"'(\[*_`-]*[A-Z0-9])|(?<=[.!?])[\"')\]*_]*\s+(?=`)")
 WORD = re.compile(r"[A-Za-z0-9]")
@@ -144,6 +148,22 @@ def passages_of(path: str, text: str) -> Iterator[Passage]:
         yield Passage("message", message)
 
 
+def is_code(text: str) -> bool:
+    """Return True if the text of a string is Python."""
+    try:
+        ast.parse(textwrap.dedent(text))
+    except (SyntaxError, ValueError):
+        return False
+    return True
+
+
+def table_rows(rows: list[str]) -> set[int]:
+    """Return the indices of the rows that belong to an aligned table: neighbours share the start of a column."""
+    columns = [{gap.end() for gap in GAP.finditer(row.rstrip())} for row in rows]
+    pairs = [index for index in range(len(rows) - 1) if columns[index] & columns[index + 1]]
+    return {index + offset for index in pairs for offset in (0, 1)}
+
+
 def paragraphs_of(passage: Passage) -> Iterator[Lines]:
     """Join the lines of each paragraph, list item, table cell or description; leave out code."""
     paragraph: Lines = []
@@ -151,10 +171,12 @@ def paragraphs_of(passage: Passage) -> Iterator[Lines]:
     in_fence = in_doctest = False
     if passage.kind == "message":
         words = sum(bool(SPOKEN.search(word)) for _, row in passage.lines for word in row.split())
+        unescaped = "\n".join(row for _, row in passage.lines).replace("\\n", "\n")
         is_markup = "".join(row for _, row in passage.lines).lstrip().startswith("<")
-        if words >= MIN_MESSAGE_WORDS and not is_markup:
+        if words >= MIN_MESSAGE_WORDS and not is_markup and not is_code(unescaped):
             yield [(number, PLACEHOLDER.sub("{}", row).replace("\\n", " ")) for number, row in passage.lines]
         return
+    tabular = table_rows([row for _, row in passage.lines]) if passage.kind != "markdown" else set()
     for index, (number, raw) in enumerate(passage.lines):
         row = raw.rstrip()
         text = row.strip()
@@ -166,11 +188,11 @@ def paragraphs_of(passage: Passage) -> Iterator[Lines]:
                 yield paragraph
             paragraph, indent = [], -1
             continue
-        if text.startswith("|"):
+        if text.startswith("|") or index in tabular:
             if paragraph:
                 yield paragraph
             paragraph, indent = [], -1
-            for cell in text.strip("|").split(" | "):
+            for cell in GAP.split(text) if index in tabular else text.strip("|").split(" | "):
                 yield [(number, cell.strip())]
             continue
         marker = LIST_MARK.match(row)
