@@ -2,14 +2,15 @@
 
 python benchmarks/deployment_uses.py [--quick] [--trials 1] [--uses S U trefoil reef] [--resume]
 
-Each use without noise, through equilibria where it is placement, and in noisy trials, in time: those of `deploy`, in
-Lgb, friction, natural curvature and what the gripper is off by. For placement the planner has measured the cable: its
-loop with a ruler that is off by 0.5 mm, and, for the way "optimised", how it bends by itself, from pictures of it as it
-hangs. For knots it has not. A placement succeeds if the cable passes every post on its right side; a knot if it is
-there when its ends were pulled 20 mm apart. While a cable is placed its free end is held. Knots are tied without
-looking: grippers reach where a rehearsal with exact grasps found the cable. The cases are those of
-examples/place_cable.py and examples/tie_knot.py. Goals are of the way "exact". Each trial is printed, and written to
-out/benchmarks/deployment_uses.jsonl, as it ends. Ctrl-C makes the table of what there is; --resume goes on after that.
+Each use runs without noise and in noisy trials. Placement without noise goes through equilibria; noisy trials run in
+time. The noise is that of `deploy`: in Lgb, friction, natural curvature and the error of the gripper. For placement the
+planner has measured the cable. A ruler that is off by 0.5 mm measures its loop. For the way "optimised", pictures of
+the hanging cable show how the cable bends by itself. For knots the planner has not measured the cable. A placement
+succeeds if the cable passes every post on its right side; a knot if it is there when its ends were pulled 20 mm apart.
+While a cable is placed its free end is held. Knots are tied without looking: grippers reach where a rehearsal with
+exact grasps found the cable. The cases are those of examples/place_cable.py and examples/tie_knot.py. Goals are of the
+way "exact". Each trial is printed, and written to out/benchmarks/deployment_uses.jsonl, as it ends. Ctrl-C makes the
+table of what there is; --resume goes on after that.
 """
 
 from __future__ import annotations

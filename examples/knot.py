@@ -2,10 +2,14 @@
 
 A rope of bending stiffness B and radius h is tied loosely and pulled slowly at its ends, which may spin. With e its
 length minus the distance of its ends, the pull F only depends on e / h and on friction. Audoly, Clauvelin and Neukirch
-(2007) give the limit of loose knots, F h^2 / B = epsilon^4 / 2 +- 0.492 mu epsilon^3 with epsilon = sqrt(2 pi h / e),
-plus while it tightens; tighter knots pull harder (knot_limit.py goes towards that limit). Fails when a pull is more
-than 6 % off what an independent code found, one that shares nothing with this one but the knot; when without friction
-it is more than 3 % off the energy stored over the way, -dU/de; or when friction does not lock the knot as it loosens.
+(2007) give the limit of loose knots, with epsilon = sqrt(2 pi h / e): F h^2 / B = epsilon^4 / 2 +- 0.492 mu epsilon^3.
+The sign is plus while the knot tightens. Tighter knots pull harder (knot_limit.py goes towards that limit).
+
+Fails in any of these cases:
+
+- A pull is more than 6 % off the pull of an independent code, which shares nothing with this code but the knot.
+- Without friction, a pull is more than 3 % off the energy stored over the way, -dU/de.
+- Friction does not lock the knot as it loosens.
 
 Writes out/knot.png and out/knot_plot.png. `--speed 1e-3` is half the speed: no pull changes by 1 %.
 """

@@ -1,10 +1,10 @@
 """Loose trefoil knots, looser and looser: the limit that Audoly, Clauvelin and Neukirch found for them.
 
-A knot without friction in a rope of radius h and bending stiffness B, its ends pulled. With e the shortening (length
-minus distance of the ends) and epsilon = sqrt(2 pi h / e), the limit of small epsilon has a pull F of
-F h^2 / B = epsilon^4 / 2 and normal forces that sum to 0.492 epsilon^3 B / h^2 (2007). Knots of epsilon from 0.13 to
-0.07 come to rest here, their pulls and forces over those of the limit are fitted by a parabola, and that is read off at
-epsilon = 0. Fails when either is more than 0.03 off.
+A knot without friction in a rope of radius h and bending stiffness B, its ends pulled. Let e be the shortening (length
+minus distance of the ends) and epsilon = sqrt(2 pi h / e). In the limit of small epsilon the pull F satisfies
+F h^2 / B = epsilon^4 / 2, and normal forces sum to 0.492 epsilon^3 B / h^2 (2007). Knots of epsilon from 0.13 to 0.07
+come to rest here. A parabola is fitted to their pulls and forces over those of the limit, and is read off at
+epsilon = 0. Fails when either value is more than 0.03 off.
 
 The strands rest on each other's corners, so that the force in the grips scatters by some percent from knot to knot.
 Their energies U do not: the mean pull between two knots is their difference over that of the shortenings, -dU/de, and

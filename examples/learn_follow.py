@@ -1,8 +1,8 @@
 """An arm learns to follow a target: soft actor-critic, its learning curve, and the learned arm as a film.
 
-An action adds to the bends, so that noise of actions adds up: with deviations of 1 the tip is 12 cm off after 0.3 s and
-27 cm after 1 s, where rewards begin within 10 cm. Soft actor-critic learns how much noise each state bears, and learns
-from all that it remembers, not from the last steps only.
+An action adds to the bends, so that noise of actions adds up. With deviations of 1 the tip is 12 cm off after 0.3 s and
+27 cm after 1 s; rewards begin within 10 cm. Soft actor-critic learns how much noise each state tolerates. It learns
+from all steps that it remembers, not from the last steps only.
 
 python examples/learn_follow.py [STEPS] [SEED] [FOLDER]; 1,300,000 steps by default, in out/learn_follow, which take
 some 20 minutes of one processor.

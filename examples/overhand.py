@@ -1,11 +1,11 @@
 """Overhand knots with more and more turns are pulled tight with friction: against the theory of Jawed, and beyond it.
 
 Two strands of an overhand knot wind about each other by (2 n + 1) half turns, and the rest is a loop. Jawed, Dieleman,
-Audoly and Reis (2015) take the braid for long and leave its bending out; then the pull over the shortening e (length
-minus distance of the grips) has a closed form. A knot of bending strands pulls less hard, 0.75 to 0.92 of it for n = 1
-and 2, and one with many turns inverts: its loop, too small at last, flips over its braid, and the pull drops. Fails
-when a ratio lies outside (0.8 to 1 for n = 4 before it inverts), or the knot n = 4 does not lose a third of its pull
-when it is pulled to e = 250 radii and a little farther.
+Audoly and Reis (2015) assume a long braid and leave its bending out. The pull over the shortening e (length minus
+distance of the grips) then has a closed form. A knot of bending strands pulls less hard: 0.75 to 0.92 of the closed
+form for n = 1 and 2. A knot with many turns inverts: its loop, too small at last, flips over its braid, and the pull
+drops. Fails when a ratio lies outside its range (0.8 to 1 for n = 4 before it inverts). Fails as well when the
+knot n = 4 does not lose a third of its pull on the way to e = 250 radii and a little farther.
 
 Writes out/overhand.png. `--nodes 601` is the finer mesh, `--speed 2e-3` half the speed.
 """

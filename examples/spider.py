@@ -2,8 +2,8 @@
 
 The scene of section 6.4.1.1 of Choi's dissertation, on the slope that its gravity makes. Nothing damps there but the
 steps of backward Euler of 1 ms, as a viscosity of E x 1 ms would. Here the material has that viscosity and the midpoint
-rule adds none, so that steps can be halved: backward Euler at 1 ms leaves nodes a limb's length elsewhere after the
-impact, and without viscosity steps of 0.1 and 0.05 ms part at the second one, by 3 % of a limb.
+rule adds none, so that steps can be halved. Backward Euler at 1 ms leaves nodes a limb's length elsewhere after the
+impact. Without viscosity, steps of 0.1 and 0.05 ms part at the second impact, by 3 % of a limb.
 
 Fails when half the step, or twice the edges, moves a node by more than 2 % of a limb at any time, when the top is more
 than 1 mm from where the public code has it before the floor acts, or when the spider does not come to rest. The fall

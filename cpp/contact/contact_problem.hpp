@@ -9,9 +9,9 @@
 
 namespace withe {
 
-/// Law of the pressing force in a step (see pressing_law.hpp): in statics and explicit steps, where nothing is known of
-/// impacts; by the force at its end; by that of the whole step, where they have just met; and along the mean direction
-/// too, so that sliding gains nothing.
+/// Law of the pressing force in a step (see pressing_law.hpp). `still`: for statics and explicit steps, which know
+/// nothing of impacts. `end`: the force at the end of the step. `mean`: the force of the whole step, for surfaces that
+/// have just met. `mean_direction`: as `mean`, and along the mean direction too, so that sliding gains no energy.
 enum class Pressing { still, end, mean, mean_direction };
 
 /// Gradient and Hessian of one contact in its own unknowns.

@@ -116,9 +116,9 @@ double force_at(const ContactProblem& problem, const Touching& t, double ratio, 
   return -ratio * t.stiffness * law_at(problem, t, ratio, yielded).energy(t.proximity.distance).first;
 }
 
-/// Stiffness that stops an edge's mass at the speed at which the ends meet (along the normal of a plane, which is known
-/// before they do), within the step or within the depth of contact; and what stores its energy in that depth, where a
-/// step's force does as much work as contact stores.
+/// Stiffness that stops an edge's mass, within the step or within the depth of contact, at the speed at which the ends
+/// meet. For a plane that speed is along the normal, which is known before the ends meet. Where a step's force does as
+/// much work as contact stores, the stiffness also stores the energy of the mass in that depth.
 double impact_stiffness(const ContactProblem& problem, const ContactPair& pair) {
   if (problem.fixed(pair)) return 0.0;
   const Model& model = problem.model();

@@ -10,9 +10,9 @@ namespace {
 // Time after which an impact presses less elastically, in swings of its contact and in steps; after twice as long it
 // does so no more.
 constexpr double kImpactSwings = 12.0, kImpactSteps = 4.0;
-// Surfaces that part faster than kPartingShare of the speed at which they will have parted give back no more than
-// their restitution: slower ones have a four-hundredth, kPartingShare^2, of the energy that is to be left. That speed
-// is at least kMinPartingSpeed of the speed of approach.
+// Surfaces that part faster than kPartingShare of their final parting speed give back no more than their restitution.
+// Slower surfaces have a four-hundredth, kPartingShare^2, of the energy that is to be left. The final parting speed
+// counts as at least kMinPartingSpeed of the speed of approach.
 constexpr double kPartingShare = 0.05, kMinPartingSpeed = 0.3;
 // The same as kImpactSwings, for restitution. Surfaces that give nothing back leave at kPartingShare kMinPartingSpeed
 // of the speed of approach: within some 90 swings of a contact at its stiffest. The energy stored until then is lost

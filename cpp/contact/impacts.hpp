@@ -19,8 +19,8 @@ double nearing(const ContactProblem& problem, const ContactPair& pair);
 inline double approach_speed(const ContactProblem& problem, const ContactPair& pair) {
   return std::max(0.0, nearing(problem, pair));
 }
-/// True if an impact is still on its way in at the end of a step: it has not pressed surfaces together yet, nor turned
-/// them round within the tolerance, where what is light enough rests.
+/// True if an impact is still on its way in at the end of a step. The impact has not pressed the surfaces together yet,
+/// nor turned them round within the tolerance, where light bodies rest.
 bool comes_near(const ContactProblem& problem, const Touching& t);
 /// True if surfaces meet in this step.
 bool meets(const ContactProblem& problem, const ContactPair& pair);

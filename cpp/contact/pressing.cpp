@@ -58,10 +58,10 @@ void add_curve_start(const ContactProblem& problem, const Touching& t, bool geom
                       along, derivative);
 }
 
-/// Pressing of a smooth curve, along the gradient of D at the end of the step; or, where its force is that of the whole
-/// step and the matrix need not be symmetric, along the gradients at the start and the end in those shares b and 1 - b
-/// with which it does the work f (D1 - D0): where a ring rolls, the points that touch at the end came down onto the
-/// surface within the step, and their force alone would slow it.
+/// Pressing of a smooth curve, along the gradient of D at the end of the step. Where the force is that of the whole
+/// step and the matrix need not be symmetric, it acts along the gradients at the start and the end. With their shares b
+/// and 1 - b the force does the work f (D1 - D0). Where a ring rolls, the points that touch at the end came down onto
+/// the surface within the step. The force of these points alone would slow the ring.
 void add_curve_pressing(const ContactProblem& problem, const Touching& t, bool with_hessian, bool geometric,
                         ContactLocal& out) {
   const CurvePiece& piece = t.pair.piece;

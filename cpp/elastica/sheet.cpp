@@ -26,9 +26,9 @@ double longest_step_at(const SheetWidth& width, const SheetProblem::Path& path, 
   return piece.slope == 0 ? step : std::min(step, 0.3 * b / std::abs(piece.slope));
 }
 
-/// Runge-Kutta steps across each segment: at most 0.4 Lgb, and so many that the first integral, of which an error is
-/// about 1e-5 F (h / sqrt(EI / F))^8 at a step h and a force F, holds to some 1e-9 w Lgb^2. Where the width changes by
-/// itself within r, 1 / b has a pole at that distance, and the error is about 1e-5 (h / r)^8.
+/// Number of Runge-Kutta steps across each segment. A step h is at most 0.4 Lgb, and so short that the error of the
+/// first integral is below some 1e-9 w Lgb^2. At a force F this error is about 1e-5 F (h / sqrt(EI / F))^8. Where the
+/// width changes by itself within r, 1 / b has a pole at that distance, and the error is about 1e-5 (h / r)^8.
 std::array<int, SheetProblem::kSegments> steps_of(const SheetWidth& width, const SheetProblem::Path& path) {
   const auto& [up, forward, length] = path.values;
   const double part = length / SheetProblem::kSegments;

@@ -56,8 +56,8 @@ struct PlanarForces {
   Mat2<Scalar> by[2][2];  ///< of the first by the second [N / m]; where asked for
 };
 
-/// Derivatives of the bending `p` between two edges: phi is the angle of the second less that of the first, and an
-/// edge's angle has the gradient n = (-ty, tx) / l and the Hessian -(t n^T + n t^T) / l.
+/// Derivatives of the bending `p` between two edges. The bend phi is the angle of the second edge less that of the
+/// first edge. The angle of an edge has the gradient n = (-ty, tx) / l and the Hessian -(t n^T + n t^T) / l.
 template <bool with_matrix, class Scalar>
 void planar_bend_forces(const PlanarBend<Scalar>& p, const PlanarEdge<Scalar> (&edge)[2], PlanarForces<Scalar>& out) {
   const Vec2<Scalar> by_edge[2] = {-edge[0].inverse_length * turned(edge[0].tangent),

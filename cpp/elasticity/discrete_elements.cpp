@@ -165,8 +165,8 @@ AttachedStep attached_frame(const Model& model, const DiscreteStep& step, int st
           row_of(step.end.half_strain, stencil), model.half[at(stencil)].frame_first};
 }
 
-/// Derivative of the moment `m` between an edge and a frame by the unknowns of a half stencil at the end: the frame
-/// turns there by J(w) dw, and by its hinge's angle about the hinge's `axis`.
+/// Derivative of the moment `m` between an edge and a frame by the unknowns of a half stencil at the end of the step.
+/// The frame turns there by J(w) dw, and by its hinge's angle about the hinge's `axis`.
 Eigen::Matrix<double, 3, 11> moment_columns(const EdgeColumns<double>& by_edge, const Mat3<double>& by_frame,
                                             const Vector3& w, const Vector3& axis) {
   Matrix3 by_spin, by_vector;

@@ -14,9 +14,10 @@ struct ResistiveCoefficients {
 };
 
 /// Resistance coefficients of waves of length L (along the rod): c_t = 2 pi / ln(0.18 L / a), c_n = 4 pi / (ln(0.18 L /
-/// a) + 1/2) [Lighthill 1976, SIAM Review 18, section 5]. Without waves (0), of a straight rod of length l, as of the
-/// spheroid with its length and radius: c_t = 2 pi / (ln(l / a) - 1/2), c_n = 4 pi / (ln(l / a) + 1/2) [Happel and
-/// Brenner 1965, section 5-11]. Throws std::invalid_argument where the rod is too thick for either.
+/// a) + 1/2) [Lighthill 1976, SIAM Review 18, section 5]. Without waves (L = 0), the coefficients are those of a
+/// straight rod of length l, taken as the spheroid with its length and radius. They are c_t = 2 pi / (ln(l / a) - 1/2)
+/// and c_n = 4 pi / (ln(l / a) + 1/2) [Happel and Brenner 1965, section 5-11]. Throws std::invalid_argument where the
+/// rod is too thick for either.
 ResistiveCoefficients resistive_coefficients(double radius, double length, double wavelength);
 
 /// Minus the force on an edge's nodes, each half of it, over a step in which they move by `change` within `duration`;

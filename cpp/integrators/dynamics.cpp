@@ -19,8 +19,8 @@ namespace {
 // for equal steps, 2 where the step before was three times as long.
 constexpr double kMaxUsualTime = 2.0;
 
-/// Displacement by a force that acts over a step [m]: filtered by (M / h^2 + K)^-1, so that modes which the step
-/// does not resolve, and which it therefore leaves bounded, count for as little as they move [Hosea and Shampine 1996].
+/// Displacement by a force that acts over a step [m], filtered by (M / h^2 + K)^-1 [Hosea and Shampine 1996]. Modes
+/// that the step does not resolve, and therefore leaves bounded, then count for as little as they move.
 double moved_by(VectorX& force, Equations& equations, const Newton& newton, double h, StepWorkspace& work) {
   equations.assembler().project(force);
   MatrixRecord& matrix = work.newton.matrix;

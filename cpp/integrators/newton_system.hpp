@@ -30,8 +30,8 @@ struct NewtonWorkspace {
 /// Rounding error of a number, over it; and the bound of what the rounding errors of a sum over many of them may reach:
 /// larger numbers are surely not zero.
 inline constexpr double kEpsilon = std::numeric_limits<double>::epsilon(), kMaxRounding = 64.0 * kEpsilon;
-/// This share of the diagonal of a stiffness, per row. kEpsilon, added to it, keeps neutral motions (of a free body, of
-/// a rod that may spin about its axis) from going anywhere by rounding. kMaxRounding, taken off it, leaves motions
+/// Share of the diagonal of a stiffness, per row. Adding the share kEpsilon keeps neutral motions (of a free body, of a
+/// rod that may spin about its axis) from going anywhere by rounding. Subtracting the share kMaxRounding leaves motions
 /// positive that are surely not neutral. Needs the matrix of the last evaluation.
 VectorX neutral_shift(const Equations& equations, double share);
 

@@ -166,9 +166,9 @@ class Statics {
 
   int most_iterations() const { return std::min(kMaxPathIterations, options_.max_iterations); }
 
-  /// Iterations of the border of slip: where Coulomb's friction holds a limp rod, the border of what slips goes on by a
-  /// contact an iteration, and the solution follows when it has arrived: so many iterations are no sign that there is
-  /// none.
+  /// Iterations for the border of slip. Where Coulomb's friction holds a limp rod, the border of the slipping contacts
+  /// advances by one contact per iteration. The solution follows when the border has arrived, so these iterations are
+  /// no sign that there is no solution.
   int border_iterations() const {
     return equations_.contact() && !equations_.has_potential() ? equations_.contact()->count() : 0;
   }
@@ -177,9 +177,9 @@ class Statics {
     return tangent_.factorization.status == FactorStatus::ok && tangent_.factorization.negative_pivots == 0;
   }
 
-  /// True if the residual force of the present state would not hold it: it falls then, as what is let go between
-  /// two wells does, and a path on which that force fades would lead back to the saddle between them. Surfaces that an
-  /// obstacle has been pushed into are to leave each other, not to fall.
+  /// True if the residual force of the present state does not hold the scene in place. The scene falls then, as a body
+  /// does that is let go between two wells. A path on which that force fades would lead back to the saddle between the
+  /// wells. Surfaces that an obstacle has been pushed into are to leave each other, not to fall.
   bool falls() {
     // Signs of pivots are known of symmetric matrices only.
     if (!equations_.has_potential_here() || (equations_.has_potential() && firm()) || !tangent_.found) return false;
@@ -274,9 +274,9 @@ class Statics {
   /// one minimises the potential plus M |z - q|^2 / (2 h^2), which is convex where the interval begins: Newton's method
   /// is not drawn back to a saddle, nor across it. Mixed Newton keeps slender rods from crawling. Where next to nothing
   /// moves any more, Newton's method without inertia ends it, unless it leads away, as back to a saddle.
-  /// Loads without a potential drive the scene round its equilibria, if not for ever: what is monotone where the
-  /// interval begins takes the place of what is convex, only until the scene is slow, and after every
-  /// kIntervalsPerDoubling intervals they may be twice as long as that, as longer ones damp more.
+  /// Loads without a potential drive the scene round its equilibria, if not for ever. Their problem is monotone,
+  /// instead of convex, where an interval begins; intervals are kept so short only until the scene is slow. After every
+  /// kIntervalsPerDoubling intervals the longest interval is twice as long, as longer intervals damp more.
   bool settle(double factor, StaticResult& result) {
     const bool conservative = equations_.has_potential();
     evaluate(factor);

@@ -82,8 +82,9 @@ inline bool may_spin(SupportKind kind) {
   return kind == SupportKind::spinning_clamp || kind == SupportKind::spinning_edge;
 }
 
-/// Part of a rod that a hand holds: from `at` - `length` / 2 to `at` + `length` / 2, as one piece of the shape that it
-/// has as it is grasped, or, where the hand yields, by a bed of springs as long; see forces/hand.hpp.
+/// Part of a rod that a hand holds, from `at` - `length` / 2 to `at` + `length` / 2. A rigid hand holds the part as one
+/// piece, in the shape that the part has when it is grasped. A yielding hand holds the part by a bed of springs of the
+/// same length; see forces/hand.hpp.
 struct HandDescription {
   double at = 0, length = 0;  ///< arc length at rest [m]
   /// Pose of the hand in the world as it grasps: its position, and its axes as columns. Not posed: the rod's point and

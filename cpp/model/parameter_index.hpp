@@ -44,9 +44,9 @@ enum class ParameterKind {
   pair_contact_stiffness,
 };
 
-/// Extent of a parameter, which has one row of numbers for: the scene; every node; every edge, or stencil, of a rod;
-/// every obstacle; every spring; every revolute joint; every tendon; every load, or each of its edges; every pair of
-/// bodies that has something of its own.
+/// Extent of a parameter: the objects that have one row of numbers each. `joint` stands for every revolute joint,
+/// `load` for every load or each of its edges, and `pair` for every pair of bodies with values of its own. Edges and
+/// stencils are those of a rod.
 enum class Extent { scene, node, edge, stencil, spring, joint, tendon, load, obstacle, pair };
 
 enum class Range { any, non_negative, positive };

@@ -47,8 +47,8 @@ void collect_directions(const SceneDescription& scene, std::vector<Vector3>& dir
       for (const auto& value : load.values.rowwise()) add(value.transpose(), 0.0);
 }
 
-/// True if an obstacle meets rods in a plane as its cut by the plane does: a plane that stands on it, a capsule whose
-/// axis lies in it or stands on it and goes through.
+/// True if an obstacle meets rods in a plane as its cut by the plane does. Such obstacles are a plane that is normal to
+/// the plane of the rods, and a capsule whose axis lies in the plane of the rods or crosses it at a right angle.
 bool fits(const ObstacleDescription& o, const Vector3& corner, const Vector3& normal) {
   if (o.kind == ObstacleKind::plane) return std::abs(o.other.dot(normal)) < 1e-9;
   const double start = (o.point - corner).dot(normal), end = (o.other - corner).dot(normal);

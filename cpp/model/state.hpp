@@ -82,7 +82,7 @@ struct HandState {
   /// As it was grasped, from the hand and in its axes: nodes that it spans, or points on edges where it yields [m].
   std::vector<Vector3> points;
   std::vector<Matrix3> edges;  ///< columns d1, d2, t of the edges that it touches
-  // Of a hand that yields, per edge:
+  // Yielding hands only, per edge:
   std::vector<Vector3> slip;  ///< along d1, d2, t of what was grasped [m]
   VectorX twist;              ///< of the edge against that, which fixes the branch of the angle [rad]
   RingState ring;             ///< where it slides

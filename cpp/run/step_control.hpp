@@ -1,15 +1,15 @@
 #pragma once
-/// Lengths of the parts in which a time step is taken, as pure functions of what is known: a part that is rejected is
-/// subdivided, and parts grow back after some that had more accuracy than was asked for.
+/// Lengths of the parts in which a time step is taken, as pure functions of what is known. A part that is rejected is
+/// subdivided. Parts grow back after some parts that were more accurate than required.
 ///
 /// Lengths change by powers of two and rarely, or symmetry and energy suffer; under error control, whose error would
 /// change by four, by the fourth root of two.
 ///
-/// Error control bounds the error per unit of time, allowed(dt) = (1 - s) tolerance dt / duration. In an impact that
-/// would cost far more steps than it is worth: of all ways to make the same error in sum, equal errors in every step
-/// take the fewest. So an event may make as great an error in a step as the steps around it make on average, as long as
-/// what it makes beyond its time is left in a share s of the tolerance that is kept for events, and that time brings
-/// back. A step may grow where C (times dt)^p, C the greatest of the last errors over dt^p, is allowed.
+/// Error control bounds the error per unit of time, allowed(dt) = (1 - s) tolerance dt / duration. In an impact this
+/// bound would cost far more steps than it is worth: of all ways to make the same total error, equal errors in every
+/// step take the fewest steps. So an event may make as great an error in a step as the steps around it make on average.
+/// The error beyond the event's time must be left in a share s of the tolerance, which is kept for events and which
+/// time fills again. A step may grow where C (times dt)^p, C the greatest of the last errors over dt^p, is allowed.
 
 #include <optional>
 

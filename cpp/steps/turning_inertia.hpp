@@ -47,10 +47,10 @@ template <class Scalar, class Number>
 }
 
 /// Inertia of a step under the midpoint rules over dt, such that angular momentum is kept exactly. The spin's part of
-/// it, I omega t, changes in a step by dt m, m = I (omega1 t1 - omega0 t0) / dt: nodes and angle of the edge take that
-/// moment like any other, about where the edge is in the middle. In energy-momentum steps omega is 2 tan(D theta / 2) /
-/// dt, as in a rigid rotation of the whole, and an axial force that vanishes with the square of the step makes the work
-/// of m what kinetic energy changes by.
+/// it, I omega t, changes in a step by dt m with m = I (omega1 t1 - omega0 t0) / dt. The moment m acts on the nodes and
+/// the angle of the edge like any other moment, about the edge's position in the middle of the step. In energy-momentum
+/// steps omega is 2 tan(D theta / 2) / dt, as in a rigid rotation of the whole. An axial force that vanishes with the
+/// square of the step makes the work of m equal to the change of kinetic energy.
 template <class Scalar, class Number>
 [[gnu::always_inline]] inline TurningForce<Scalar> midpoint_turning(const Number& inertia, double dt,
                                                                     bool conserves_energy,

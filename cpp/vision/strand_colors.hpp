@@ -14,7 +14,7 @@ namespace withe {
 std::vector<double> hue_borders(const ColorImage& image, const SkeletonLine& line, const WidthRun& run);
 
 /// Share of the brightness across a run that does not fit `count` equal strands, from 0 for strands that look alike to
-/// about 1 for a single round cable; none where it is too flat to tell.
+/// about 1 for a single round cable. Empty where the brightness is too flat to tell.
 std::optional<double> shading_misfit(const ColorImage& image, const SkeletonLine& line, const WidthRun& run, int count);
 
 }  // namespace withe

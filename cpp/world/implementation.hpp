@@ -197,14 +197,14 @@ struct World::Implementation : Running {
   /// Shares of the time step: that of the next part, and that taken in so many tries.
   [[noreturn]] void fail_error_control(long tries, double duration, double share_of_part, double share_taken) const;
   [[noreturn]] void fail_step(Verdict why, double dt) const;
-  /// What a part was found to do.
+  /// Error and turns of a part.
   struct PartResult {
     double error = 0;      ///< estimated [m]
     double turn = 0;       ///< greatest of an edge [rad]
     double held_turn = 0;  ///< greatest of what supports hold [rad]
   };
-  /// What parts are rejected for, beside errors: turn of what is held over the greatest that is accurate; way of an
-  /// obstacle [m].
+  /// Excess for which parts are rejected, beside errors: turn of supported edges over the greatest accurate turn; way
+  /// of an obstacle [m].
   struct Excess {
     double turn = 0, way = 0;
   };

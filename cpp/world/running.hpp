@@ -120,7 +120,7 @@ struct Moving {
   double impulse_time = 0;
 };
 
-/// What the next steps are chosen and judged by.
+/// History by which the next steps are chosen and judged.
 struct StepHistory {
   StepLengths lengths;
   double grid_origin = 0;  ///< time = grid_origin + grid_steps time_step after whole steps, free of summed rounding
