@@ -165,7 +165,7 @@ def test_column_buckles_however_little_more_than_its_load_it_carries(nodes):
 
 
 def stable_column(nodes, overload):
-    """How far aside its tip is in equilibrium, and two frequencies there; both ways of asking call it stable."""
+    """Sideways displacement of the tip in equilibrium, and two frequencies there, after a check that it is stable."""
     simulation, column, _ = loaded_column(nodes, overload)
     found = simulation.equilibrium()
     assert found.stable

@@ -147,8 +147,8 @@ def test_a_rope_wound_about_a_post_multiplies_its_tension(turns, bound):
         natural="straight",
     )
     scene.add_capsule((0, -1, 0), (0, 1, 0), POST, friction=friction)
-    # Hard surfaces: those that begin a tenth of the radius before they touch, and press a hundredth of it deep, lead
-    # to an error of 0.0012 at one turn, however many nodes there are; with corners its error is of the other sign.
+    # Hard surfaces. Surfaces that begin to press a tenth of the radius before they touch, and press a hundredth of it
+    # deep, lead to an error of 0.0012 at one turn, for any number of nodes. With corners the error has the other sign.
     scene.enable_contact(
         slip_tolerance=1e-4,
         centreline_friction=True,

@@ -137,7 +137,7 @@ def deflections_before_in_and_after_a_hold(edges, after, planar):
 def test_a_hand_beside_a_joint_takes_what_bends_there_as_it_is_and_leaves_a_beam_as_soft_as_it_was(after, planar):
     for edges in (20, 40, 80):
         errors, jump = deflections_before_in_and_after_a_hold(edges, after, planar)
-        # Of second order; a twelfth of an edge too soft or too stiff is of first, 0.06 / edges.
+        # Error of second order; a twelfth of an edge too soft or too stiff makes an error of first order, 0.06 / edges.
         assert np.abs(errors[1:]).max() < 0.5 / edges**2
         assert abs(jump) < 0.5 / edges**2
 

@@ -111,7 +111,7 @@ def test_soft_helix_converges_with_the_mesh_to_the_same_rest_from_an_edge_and_fr
 
     Tips [mm] with every edge cut in 1, 2, 4 and 8, and their limit; corners of the lead-in make that first order:
 
-    held by its first edge            clamped, the default
+    held by its first edge             clamped, the default
     (-16.27, -0.59, -198.76)           (-16.53, -0.67, -198.78)
     (-16.49, -0.54, -199.00)           (-16.65, -0.63, -199.01)
     (-16.59, -0.53, -199.07)           (-16.67, -0.57, -199.08)

@@ -100,7 +100,7 @@ def test_steps_that_outlast_an_impact_that_gives_nothing_back_are_not_cut() -> N
 
 @pytest.mark.parametrize("integrator", [*CONSERVING, "backward_euler"])
 def test_what_gives_nothing_back_stays_where_it_falls(integrator: Any) -> None:
-    """What contact stores in the impact was given back as the impact came of age: 0.07 of the fall in short steps."""
+    """Stored energy of contact stays lost as the impact ends; if given back, it is 0.07 of the fall in short steps."""
     for time_step in (2e-3, 5e-4, 1e-4):
         simulation, rod, fall = falling(4e-3, 0.01, time_step, integrator, restitution=0.0)
         simulation.run(1.2 * fall, progress=False)

@@ -51,7 +51,7 @@ def out_of_round(edges: int) -> float:
 
 
 def unevenness(degrees: float) -> float:
-    """What a metre of height changes of the speed gained between 0.5 s and 1.5 s, over that: G = (1 + k) v dv."""
+    """Relative change per metre of height of the speed gained between 0.5 s and 1.5 s: G = (1 + k) v dv."""
     gain = 0.5 * G * np.sin(np.radians(degrees))
     return float(0.5 * G * (1.0 / (0.5 * gain) + 1.0 / (1.5 * gain)) / gain)
 

@@ -14,8 +14,9 @@ def pattern(cv2, number):
 def render_tags(cv2, tags, to_tag, size=(1280, 720), blur=0.8, noise=3.0, seed=0):
     """A picture of tags.
 
-    tags: {number: (x, y) of its centre in the picture, and how far around it to draw, in pixels}; to_tag(number, x, y)
-    gives coordinates in the tag, x right and y down from its centre, the black square from -0.5 to 0.5.
+    tags: {number: (x, y) of its centre in the picture, and how far around it to draw, in pixels}. The function
+    to_tag(number, x, y) gives coordinates in the tag, x right and y down from its centre. The black square goes from
+    -0.5 to 0.5.
     """
     width, height = size
     picture = np.full((height, width), 190.0)

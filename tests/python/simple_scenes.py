@@ -56,7 +56,7 @@ def same_state(a: withe.Simulation, b: withe.Simulation) -> bool:
 
 
 def steps_elsewhere(simulation: withe.Simulation) -> bool:
-    """Whether another thread steps it: it is not to be read then."""
+    """True if another thread steps the simulation, which is not to be read then."""
     try:
         simulation.positions()
     except RuntimeError:

@@ -1,4 +1,4 @@
-"""What was set while a simulation runs goes with copies, snapshots, pickles and files, and `reset` takes it back."""
+"""Values set while a simulation runs go with copies, snapshots, pickles and files, and `reset` takes them back."""
 
 import copy
 import pickle

@@ -98,7 +98,7 @@ def test_a_position_and_a_rotation_go_on_when_the_other_is_given(pair, planar, p
     first, second = WAYS[pair]
 
     def moved(*calls):
-        """Where the support is at 0.5 s and at 2 s, of calls (time, arguments)."""
+        """Poses of the support at 0.5 s and at 2 s, after calls (time, arguments)."""
         scene = withe.Scene(gravity=(0, 0, -1e-3))
         arm = scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=9, radius=5e-3, material=RUBBER)
         if part != "hand":

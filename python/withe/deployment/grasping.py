@@ -119,10 +119,10 @@ def grasp(
 
     A rod of radius r rests on its surface, where friction acts: m(0) has the additional part r (force_x y - force_y x),
     and -r force_y twists the suspended part. The jaw is turned by this twist, so that the laid rod rolls only close
-    behind the lift-off point. There it moves aside as it rolls: friction f across bends it, EI d^4y/ds^4 = f, and
-    turns it, GJ d^2y/ds^2 = r^2 f. So f decays as exp(-s / b) with b = r sqrt(EI / GJ), force_y acts b behind the
-    lift-off point, and m(0) has the additional part b force_y z. This part is not in the dissertation, whose cables are
-    thin.
+    behind the lift-off point. There the rod moves aside as it rolls. The friction f across the rod bends it,
+    EI d^4y/ds^4 = f, and turns it, GJ d^2y/ds^2 = r^2 f. So f decays as exp(-s / b) with b = r sqrt(EI / GJ), force_y
+    acts b behind the lift-off point, and m(0) has the additional part b force_y z. This part is not in the
+    dissertation, whose cables are thin.
 
     Examples
     --------

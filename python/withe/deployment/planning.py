@@ -220,9 +220,9 @@ def plan(
     Raises
     ------
     ValueError
-        The cable is shorter than pattern and tail, or the pattern bends too tightly; pattern or tail cross; a post is
-        too close; no friction is enough; a speed, tail, time step or friction is not positive; "optimised" without
-        friction; or "network" outside of its range.
+        The cable is shorter than pattern and tail, or the pattern bends too tightly. Pattern or tail cross, a post is
+        too close, or no friction is enough. A speed, tail, time step or friction is not positive. The method
+        is "optimised" without friction, or "network" outside of its range.
 
     Warns
     -----

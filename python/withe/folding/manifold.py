@@ -84,10 +84,14 @@ def elastica(
     Returns
     -------
     Elastica
-        Refused (`valid` False) are positions that need a lifted length outside 0.958 to 6.84 Lgb, where x and z do not
-        name one pose, tips below the table, sheets that touch the table elsewhere or bend below it, and taut
-        sheets, pulled back by more than 40 w Lgb. By length and angle also what has the direction of such taut
-        sheets: strips shorter than 0.9 Lgb that are lifted by only a few hundredths of a radian.
+        Poses, with `valid` False for refused ones. These positions are refused:
+
+        * positions that need a lifted length outside 0.958 to 6.84 Lgb, where x and z do not name one pose
+        * tips below the table
+        * sheets that touch the table elsewhere or bend below it
+        * taut sheets, pulled back by more than 40 w Lgb
+        * by length and angle, also poses in the direction of such taut sheets: strips shorter than 0.9 Lgb that are
+          lifted by only a few hundredths of a radian
 
     Raises
     ------

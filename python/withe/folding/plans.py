@@ -39,11 +39,11 @@ def flat_forces(width: Width) -> tuple[float, float, float]:
 class FoldPlan(PlanFile):
     """Poses and times of a jaw that folds a sheet.
 
-    The origin of the world is the middle of the lifted edge in the flat sheet. x points along the sheet to its far
-    edge, z up, and y across; table and flat sheet are at z = 0. A pose is the position and rotation of the *outer
-    edge*, which is lifted. The frame of the edge is that of the world in the flat sheet, and turns about y with the
-    edge: its x points from the outer edge into the sheet, along the straight part in the jaw. The inner edge of the
-    jaw, where the sheet begins to hang freely, is at `jaw.depth` along this x.
+    The origin of the world is the middle of the lifted edge in the flat sheet. The x axis points along the sheet to its
+    far edge, z up, and y across. The table and the flat sheet are at z = 0. A pose is the position and rotation of the
+    *outer edge*, which is lifted. In the flat sheet the frame of the edge is that of the world. The frame turns about y
+    with the edge. Its x axis points from the outer edge into the sheet, along the straight part in the jaw. The inner
+    edge of the jaw, where the sheet begins to hang freely, is at `jaw.depth` along this x axis.
 
     Attributes
     ----------

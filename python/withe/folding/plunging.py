@@ -88,12 +88,12 @@ def plunge(
     It is led down within a `duration` instead, before the sheet can follow, and `press` lower than it can go: the jaw
     yields, and presses both layers on the table with that times its stiffness, up to its force limit, so that they
     stay. It goes down from over the target: from the least height to which the sheet is led without slide, whatever of
-    the plan's `uncertainty` it is, or from where least friction is needed. The plan is made anew up to there. How much
-    to the side it goes, within what time, and whether the edge ends level or as the plan has it, is tried on simulated
-    sheets without noise, those of `FoldPlan.papers`: aimed so that the paper as it is thought to be is folded right, it
-    is the way on which the worst of them is best, by how far its crease is off and by half of how far it slides, of
-    those that fold all of them. Jaws that hold sheets at the bounds are off by 0.5 mm to either side: an edge that
-    comes down on the last of a sheet must not miss it.
+    the plan's `uncertainty` it is, or from where least friction is needed. The plan is made anew up to there. The way
+    down is chosen by trials on simulated sheets without noise, those of `FoldPlan.papers`. The trials vary how far the
+    edge goes to the side, within what time, and whether it ends level or as in the plan. Each way is aimed so that the
+    nominal paper is folded right. Among the ways that fold all sheets, the chosen way has the smallest error on its
+    worst sheet: the error of the crease plus half of the slide. Jaws that hold sheets at the bounds are off by 0.5 mm
+    to either side: an edge that comes down on the last of a sheet must not miss it.
 
     Parameters
     ----------

@@ -224,9 +224,9 @@ class Reach(Arm):
     """The tip is to come to a pose: a position, and upright but for a yaw of up to 90 degrees.
 
     Actions: for each segment curvatures and twist, (15,). Observed besides the arm: twists, quaternion of the tip,
-    position and quaternion of the target, scalar last, (86,). With o = 1 - (q . q*)^2 the reward is -d^2 - o^2 / 2, and
-    besides 1 - o / 2 (1.5 if o < 0.1) within 0.1 m, or 4 - 2 o (4.5 if o < 0.1, 6 if o < 0.05) within 0.05 m. 100 steps
-    of 0.1 s.
+    position and quaternion of the target, scalar last, (86,). With o = 1 - (q . q*)^2 the reward is -d^2 - o^2 / 2,
+    plus a bonus near the target. The bonus within 0.1 m is 1 - o / 2 (1.5 if o < 0.1). Within 0.05 m it is 4 - 2 o
+    instead (4.5 if o < 0.1, 6 if o < 0.05). An episode has 100 steps of 0.1 s.
 
     Examples
     --------

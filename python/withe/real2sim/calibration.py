@@ -92,9 +92,9 @@ def calibrate(
     gravity, is seen at offset + scale R(roll) (x, -y), with x right and y down in the picture. The offset is always
     fitted.
 
-    Cameras on both sides of the plane are tried, and the one with the smaller residuals is kept. If both residuals are
-    equally small, as for a robot that is drawn straight down, `Calibration.unobservable` names the side, and the side
-    is the one from which the robot appears, on the mean, as it is drawn.
+    Cameras on both sides of the plane are tried, and the one with the smaller residuals is kept. Both residuals are
+    equally small, for example, for a robot that is drawn straight down. `Calibration.unobservable` then names the side,
+    and the camera is on the side from which the robot appears, on the mean, as it is drawn.
 
     Parameters
     ----------

@@ -60,7 +60,7 @@ def fit(
         * ``(rod, "natural_curvature", basis)``: basis "constant", "linear" (values at both ends), "segment" (one per
           stencil), or functions along the rod of shape (stencils, n). In space each function counts for both directors.
         * ``(rod, "natural_twist", basis)``: in space only.
-        * ``(part, word)``: a positive parameter of a part, or of a tuple of parts that share one factor, such as
+        * ``(part, word)``: a positive parameter of a part, or of a tuple of parts that share one factor. Examples are
           youngs_modulus, density or bend_stiffness of rods, mass, friction of an obstacle, stiffness and damping of
           revolute joints and springs.
         * ``(rod, "points", basis)``: the drawn shape of a rod in a plane, by rotations of its edges over functions of

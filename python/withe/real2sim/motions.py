@@ -104,8 +104,8 @@ def fit_motion(
     -----
     "gauss_newton" finds derivatives by finite differences at the beginning and at the end, one run per unknown, and
     updates them by secants in between. Derivatives by the delay are velocities. Positions between time steps follow
-    from cubic polynomials. "lbfgs" finds the gradient by one pass backwards through each run (`Record.gradient`) for
-    any number of unknowns, and makes one run per unknown at the end, for the covariance.
+    from cubic polynomials. The method "lbfgs" finds the gradient by one pass backwards through each run
+    (`Record.gradient`) for any number of unknowns, and makes one run per unknown at the end, for the covariance.
 
     The covariance includes errors of the discretisation. A run with half the time step estimates the error of the time
     step. Residuals that are correlated from frame to frame indicate an error of the mesh or model. `Fit.reasons` names

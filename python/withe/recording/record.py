@@ -109,9 +109,9 @@ class Record:
             * "friction" of an obstacle, or of a pair: ``((arm, floor), "friction")``
             * "friction" between rods, and "slip_tolerance"
 
-            "position" and "rotation" of a support and "position" of an obstacle displace it during the whole run, with
-            the same initial state of all free nodes. "points" of a rod needs a run that begins in the drawn state. The
-            sequence may be empty if only ``calls`` are of interest.
+            The values "position" and "rotation" of a support and "position" of an obstacle displace it during the whole
+            run, with the same initial state of all free nodes. The value "points" of a rod needs a run that begins in
+            the drawn state. The sequence may be empty if only ``calls`` are of interest.
 
         Returns
         -------
@@ -125,9 +125,9 @@ class Record:
         Raises
         ------
         ValueError
-            A run without ``differentiable=True``; a run without a gradient, with the reason (contact without a given
-            stiffness, anchored friction, restitution below 1, Stokeslets, integrator "verlet"); a wrong shape; a
-            derivative out of the plane of a planar scene; or a friction of 0.
+            A run without ``differentiable=True``. A run without a gradient, with the reason (contact without a given
+            stiffness, anchored friction, restitution below 1, Stokeslets, integrator "verlet"). A wrong shape, a
+            derivative out of the plane of a planar scene, or a friction of 0.
 
         Notes
         -----

@@ -284,9 +284,9 @@ class Contacts:
         R. Soc. A 431]. With e below 1, steps are subdivided until the impact is resolved; this may take hundreds of
         times more steps when rods come to rest on balls and posts. ``adaptive=False`` and `max_halvings` of `build`
         limit the subdivision. Weight also does work over the penetration p: v1^2 = e^2 v0^2 - (1 - e^2) 2 g p. Rods
-        vibrate after an impact, so their mean velocity is less than e times the velocity before. Surfaces that meet
-        more slowly than sqrt(g r / 100), with the smaller radius r, or than the slip tolerance, come to rest on each
-        other; so do surfaces that stay in contact for longer than an impact.
+        vibrate after an impact, so their mean velocity is less than e times the velocity before. Surfaces come to rest
+        on each other if they meet more slowly than the slip tolerance, or more slowly than sqrt(g r / 100) with the
+        smaller radius r. Surfaces that stay in contact for longer than an impact also come to rest.
 
         Momentum. Contact and friction between rods conserve linear and angular momentum in implicit midpoint and
         energy-momentum steps. "lagged" and "semi_explicit" friction conserve linear momentum, and angular momentum to
@@ -331,8 +331,8 @@ class Contacts:
             The two bodies.
         friction : float, pair or tuple of three of float, array_like of shape (edges,), or callable
             One coefficient. For a rod and an obstacle also two or three coefficients by direction, or a function of
-            position on the obstacle, as in `add_floor`; or one coefficient per edge of the rod (as an array if the rod
-            has three edges).
+            position on the obstacle, as in `add_floor`. Also one coefficient per edge of the rod (as an array if the
+            rod has three edges).
 
         Raises
         ------

@@ -188,10 +188,10 @@ class Loads:
             [N], at a time [s], for positions [m] and velocities [m/s] of shape (nodes, 3). The function must be
             deterministic; it is also called for states that no step ends in.
         jacobian : callable
-            ``jacobian(time, positions, velocities)`` returns the derivative of the forces by positions: a SciPy sparse
-            matrix or an array of shape (3 nodes, 3 nodes) [N/m], in the order x, y, z of the first node, then of the
-            second. Or a pair with the derivative by velocities [N s/m]. `Simulation.check_jacobian` compares the
-            jacobian with finite differences.
+            ``jacobian(time, positions, velocities)`` returns the derivative of the forces by positions. The derivative
+            is a SciPy sparse matrix or an array of shape (3 nodes, 3 nodes) [N/m], in the order x, y, z of the first
+            node, then of the second. The function may also return a pair with the derivative by velocities [N s/m].
+            `Simulation.check_jacobian` compares the jacobian with finite differences.
         moments : bool
             True if the function returns a pair (forces, moments), with moments of shape (nodes, 3) [N m] in world axes.
             Each moment acts on the joint or clamp at its node, or in equal parts on the edges there. The jacobian may

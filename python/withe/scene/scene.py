@@ -358,9 +358,9 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
               about 0.1 rad in a step; a drift above 1 % of the greatest kinetic energy warns with
               :class:`withe.EnergyDriftWarning`.
             * "fourth_order" composes five energy-momentum steps, the third of which goes back in time. It does not
-              support contact and viscosity, and drag only up to mass over time_step. Once a support has moved, the
-              mass of held edges is lumped at their nodes: for a cantilever with an accelerated clamp, the deflection
-              is wrong by 3 % with 5 nodes and by 0.02 % with 17 nodes, at any time step.
+              support contact and viscosity, and drag only up to mass over time_step. Once a support has moved, the mass
+              of held edges is lumped at their nodes. For a cantilever with an accelerated clamp, the deflection is then
+              wrong by 3 % with 5 nodes and by 0.02 % with 17 nodes, at any time step.
             * "verlet" (second order) is explicit and stable for short time steps only.
             * "static" takes quasi-static steps, without mass.
         time_step : float [s]
@@ -380,8 +380,9 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         duration : float [s]
             Time over which `tolerance` bounds the error. By default 1 s.
         bending : {"angle", "tangent"}
-            Measure of bending strain: the angle phi between two edges, to sixth order; or 2 tan(phi / 2)
-            [Bergou et al. 2008], which is too stiff on coarse meshes and does not model the arcs of edges.
+            Measure of bending strain. For "angle", it is the angle phi between two edges, to sixth order. For
+            "tangent", it is 2 tan(phi / 2) [Bergou et al. 2008], which is too stiff on coarse meshes and does not model
+            the arcs of edges.
         solver : withe.Solver
             Options of Newton's method, of its linear equations and of the subdivision of steps.
 

@@ -99,8 +99,9 @@ class Measurements:
     def tensions(self, rod: Rod | str) -> FloatArray:
         """Return the tension of each edge, positive in tension, shape (edges,) [N].
 
-        After an implicit midpoint step, the tension is the one in the middle of the step, where the forces balance (an
-        edge that turns by w in a step ends with the spurious strain w^2 / 8). Otherwise it is the one of the state.
+        After an implicit midpoint step, the tension is the one in the middle of the step, where the forces balance. An
+        edge that turns by w in a step ends with the spurious strain w^2 / 8. After other steps the tension is the one
+        of the state.
         """
         return self._session.world.tensions(self._session.directory.rod(rod).index)
 
@@ -206,8 +207,8 @@ class Measurements:
         """Return the linear momentum of the scene, and its angular momentum about the origin.
 
         The masses are the ones of the equations of motion, supported nodes included. The angular momentum is the sum of
-        x cross (M v) over nodes, with the mass matrix M; of I omega t over edges, with spin omega about the tangent t;
-        and of the momentum of joint frames.
+        x cross (M v) over nodes, with the mass matrix M, and of I omega t over edges, with spin omega about the
+        tangent t. The angular momentum of joint frames is added.
 
         Returns
         -------

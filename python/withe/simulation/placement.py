@@ -270,9 +270,9 @@ class Placement:
         Raises
         ------
         ValueError
-            A wrong shape or a value that is not finite; directors that are not normal to their edges; twist that does
-            not close a closed rod; an edge of zero length or folded back; a moved supported node; overlapping surfaces;
-            or a state out of the plane with planar=True. Then nothing is changed.
+            A wrong shape or a value that is not finite. Directors that are not normal to their edges, or twist that
+            does not close a closed rod. An edge of zero length or folded back, a moved supported node, or overlapping
+            surfaces. A state out of the plane with planar=True. In all these cases nothing is changed.
 
         Examples
         --------

@@ -164,9 +164,9 @@ class Equilibrium:
         Raises
         ------
         ValueError
-            The simulation has left this equilibrium; the equilibrium is not determined by the parameters (a rod that
-            can spin freely, a limit point, friction, or a hand at its force limit); contact without a given stiffness;
-            a wrong shape; a parameter without a gradient; or derivatives out of the plane with planar=True.
+            The simulation has left this equilibrium. The equilibrium is not determined by the parameters (a rod that
+            can spin freely, a limit point, friction, or a hand at its force limit). Contact without a given stiffness,
+            a wrong shape, a parameter without a gradient, or derivatives out of the plane with planar=True.
 
         Notes
         -----
