@@ -89,11 +89,12 @@ class Control:
             Parameters of the target:
 
             * rod: youngs_modulus, poisson_ratio, density, viscosity, stretch_stiffness, bend_stiffness,
-              twist_stiffness, line_density, viscous_time, drag (one number, or one per edge);
-              natural_curvature towards d1 and d2, (2,) or (stencils, 2) [1/m], or discrete_curvature, the same as
-              2 tan(phi / 2) [-] with phi the angle between two edges; natural_twist, one or (stencils,) [rad/m];
-              natural_stretch s, one or (edges,) [-]: the tension is EA (l / L - s) with the drawn length L of an edge
-              [Antman 2005, chapter 8]
+              twist_stiffness, line_density, viscous_time, drag (one number, or one per edge)
+            * rod: natural_curvature towards d1 and d2, (2,) or (stencils, 2) [1/m], or discrete_curvature, the same
+              curvature as 2 tan(phi / 2) [-] with phi the angle between two edges
+            * rod: natural_twist, one or (stencils,) [rad/m]
+            * rod: natural_stretch s, one or (edges,) [-]. The tension is EA (l / L - s) with the drawn length L of an
+              edge [Antman 2005, chapter 8].
             * load: force, moment, load or pressure, constant or a function of time
             * mass: mass
             * spring: stiffness, rest_length, damping
