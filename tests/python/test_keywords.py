@@ -58,9 +58,8 @@ WRONG = [
 ]
 
 
-@pytest.mark.parametrize("case", range(len(WRONG)))
-def test_an_unknown_keyword_is_refused_with_what_may_have_been_meant(case):
-    call, message = WRONG[case]
+@pytest.mark.parametrize(("call", "message"), WRONG)
+def test_an_unknown_keyword_is_refused_with_what_may_have_been_meant(call, message):
     scene, _, simulation = cantilever()
     with pytest.raises(TypeError) as error:
         call(scene, simulation)
@@ -98,9 +97,8 @@ BY_POSITION = [
 ]
 
 
-@pytest.mark.parametrize("case", range(len(BY_POSITION)))
-def test_what_must_not_be_given_by_position_is_refused_with_how_to_name_it(case):
-    call, message = BY_POSITION[case]
+@pytest.mark.parametrize(("call", "message"), BY_POSITION)
+def test_what_must_not_be_given_by_position_is_refused_with_how_to_name_it(call, message):
     scene, _, simulation = cantilever()
     with pytest.raises(TypeError) as error:
         call(scene, simulation)
@@ -207,9 +205,8 @@ WORDS = [
 ]
 
 
-@pytest.mark.parametrize("case", range(len(WORDS)))
-def test_near_misses_of_words_are_asked_about(case):
-    call, message = WORDS[case]
+@pytest.mark.parametrize(("call", "message"), WORDS)
+def test_near_misses_of_words_are_asked_about(call, message):
     with pytest.raises(ValueError, match=r"must be|is not in the scene") as error:
         call()
     assert str(error.value).endswith(message)

@@ -20,9 +20,9 @@ BUILDERS = [
 ]
 
 
-@pytest.fixture(params=range(len(BUILDERS)))
+@pytest.fixture(params=BUILDERS)
 def simulation(request):
-    return BUILDERS[request.param]()
+    return request.param()
 
 
 def test_a_restored_snapshot_goes_on_bit_by_bit(simulation):

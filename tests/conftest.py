@@ -1,0 +1,72 @@
+"""Names and fixtures of all tests in Python."""
+
+import linecache
+import signal
+import types
+
+import numpy as np
+import pytest
+
+NAMED = (bool, int, float, complex, np.number, type(None))
+
+
+def pytest_configure():
+    """Where a script started the tests in the background, Ctrl-C is ignored; some tests press it."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+# --- names of parameters ----------------------------------------------------------------------------------------------
+
+
+def pytest_make_parametrize_id(config, val, argname):
+    """Name values other than text by their argument, functions by what they do: `radius=0.01`, `rod(radius=0)`.
+
+    pytest appends numbers to names that are equal.
+    """
+    text = text_of(val)
+    if text is None or not 0 < len(text) <= 60 or not (text.isascii() and text.isprintable()):
+        return None
+    return text if callable(val) or isinstance(val, dict) else f"{argname}={text}"
+
+
+def text_of(value):
+    if isinstance(value, NAMED):
+        return str(value)
+    if isinstance(value, np.ndarray) and value.size > 4:
+        return "x".join(map(str, value.shape))
+    if isinstance(value, tuple | list | np.ndarray):
+        texts = [text_within(part) for part in value]
+        return None if None in texts else f"({','.join(texts)})"
+    if isinstance(value, dict):
+        texts = [text_within(part) for part in value.values()]
+        return ",".join(f"{key}={text}" if text else str(key) for key, text in zip(value, texts, strict=True))
+    if isinstance(value, types.FunctionType) and value.__name__ == "<lambda>":
+        return body_of(value)
+    return getattr(value, "__name__", None)
+
+
+def text_within(value):
+    return value if isinstance(value, str) else text_of(value)
+
+
+def body_of(function):
+    """The source of a lambda after its colon, where that stands on one line."""
+    places = [place for place in function.__code__.co_positions() if None not in place]
+    places = [place for place in places if place[3] > 0]
+    if len({line for place in places for line in place[:2]}) != 1:
+        return None
+    line = linecache.getline(function.__code__.co_filename, places[0][0]).encode()
+    return line[min(place[2] for place in places) : max(place[3] for place in places)].decode()
+
+
+@pytest.fixture
+def renderer():
+    """Skips with a reason where nothing can be rendered."""
+    pytest.importorskip("pyvista")
+    from withe.view.graphics import probe_rendering
+
+    try:
+        probe_rendering()
+    except RuntimeError as error:
+        pytest.skip(str(error))
