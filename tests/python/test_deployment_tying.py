@@ -84,5 +84,5 @@ def test_bad_moves_and_picks_are_named():
         Move(0, -0.1, [(0, 0, 1)])
     with pytest.raises(ValueError, match="picks must be one for each move"):
         tie([line()], [[Move(0, 0.0, [(0, 0, 1)])]], friction=0.5, picks=[[]])
-    with pytest.raises(ValueError, match="floor must be positive"):
+    with pytest.raises(ValueError, match="friction must be positive"):
         tie([line()], [[Move(0, 0.0, [(0, 0, 1)])]], friction=0.0)

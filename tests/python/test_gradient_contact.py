@@ -80,7 +80,7 @@ class Touching:
         yield "initial_velocities", moved, lambda h: sim.set_velocities(arm, self.velocity + h * ways[0]), 2e-6
         moved = np.concatenate([ways[1], zero])
         yield "initial_positions", moved, lambda h: move_with_directors(sim, arm, h * ways[1]), 4e-8
-        yield "slip_tolerance", self.tolerance, lambda h: sim.set(None, slip_tolerance=self.tolerance * (1.0 + h)), 1e-4
+        yield "slip_tolerance", self.tolerance, lambda h: sim.set(None, slip_tolerance=self.tolerance * (1.0 + h)), 5e-4
         if self.rubs == 0.0:
             return
         rubs, way = np.asarray(self.rubs), np.array([1.0, 0.7, -0.4])[: np.size(self.rubs)].reshape(np.shape(self.rubs))

@@ -106,11 +106,9 @@ def test_the_cable_of_the_readme_is_laid(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names = {}
     for block in blocks("deployment.plan"):
-        assert "friction=0.4)" in block
-        exec(
-            compile(block.replace("friction=0.4)", "friction=0.4, nodes=50, progress=False)"), str(README), "exec"),
-            names,
-        )
+        assert "(motion, friction=0.4)" in block
+        short = block.replace("(motion, friction=0.4)", "(motion, friction=0.4, nodes=50, progress=False)")
+        exec(compile(short, str(README), "exec"), names)
     assert (tmp_path / "motion.csv").stat().st_size > 1000
     assert names["found"].error < 2e-3
 

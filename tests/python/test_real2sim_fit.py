@@ -281,7 +281,7 @@ def test_targets_beside_the_plane_of_a_scene_are_said_to_be_and_unknowns_are_no_
     np.testing.assert_allclose(beside.covariance, right.covariance, rtol=1e-6)
     assert beside.unobservable == right.unobservable
     assert right.reasons == {}
-    assert "targets lie beside the plane of the scene by" in beside.reasons[0]
+    assert "targets lie outside of the plane of the scene by" in beside.reasons[0]
 
 
 def test_a_tag_that_jumps_in_one_frame_is_named():

@@ -60,10 +60,7 @@ class Moment:
                 index: (np.array(world.support_position(index)), np.array(world.support_rotation(index)))
                 for index, _ in session.settings.supports.values()
             },
-            [
-                float(world.parameter("spring_rest_length", i)[0, 0])
-                for i in range(len(session.directory.all(SpringPart)))
-            ],
+            [float(length) for length in world.parameter("spring_rest_length")[:, 0]],
             world.frames_as_drawn,
         )
 
