@@ -11,7 +11,7 @@ NAMED = (bool, int, float, complex, np.number, type(None))
 
 
 def pytest_configure():
-    """Where a script started the tests in the background, Ctrl-C is ignored; some tests press it."""
+    # Ctrl-C is ignored in tests that a script starts in the background; some tests press it.
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
