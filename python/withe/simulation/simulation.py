@@ -52,10 +52,12 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
 
     Methods and properties by purpose:
 
-    * describe: `set`, `set_natural_curvature`, `set_natural_twist`, `set_natural_stretch`
+    * describe: `set`, for every parameter; old names are `set_natural_curvature`, `set_natural_twist` and
+      `set_natural_stretch`
     * hold: `clamp`, `pin`, `grasp`, `release`, `move`, `hand`, `feed`
     * load: `add_force`, `add_moment`, `add_load`, `add_pressure`, `remove`
-    * touch: `set_friction`, `set_restitution`, `set_contact_stiffness`
+    * touch: ``set((a, b), friction=...)``; old names are `set_friction`, `set_restitution` and
+      `set_contact_stiffness`
     * run: `step`, `run`, `equilibrium`, `set_state`, `set_velocities`, `snapshot`, `restore`, `reset`, `copy`
     * read the scene: `time`, `time_step`, `rods`, `get`, `energy`, `momentum`, `statistics`, `plan`, `record`
     * read rods: `positions`, `velocities`, `directors`, `spins`, `curvatures`, `twists`, `tensions`, `link`
