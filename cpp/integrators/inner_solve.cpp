@@ -94,7 +94,8 @@ class InnerSolve {
         work_(work),
         records_(work.newton.guesses),
         frictional_(equations.contact() && equations.contact()->frictional()),
-        regularised_(frictional_ && equations.contact()->regularises()) {}
+        regularised_(frictional_ && equations.contact()->regularises()),
+        starts_at_rest_(frictional_ && predictor.choice(plan.slot).points == 0) {}
 
   NewtonResult run() {
     NewtonResult found;
@@ -115,7 +116,7 @@ class InnerSolve {
 
  private:
   bool applies(Guess guess) const {
-    if (guess == Guess::accelerated && !uses(Heuristic::start_accelerated)) return false;
+    if (guess == Guess::accelerated && (!uses(Heuristic::start_accelerated) || starts_at_rest_)) return false;
     if (guess == Guess::plain && !uses(Heuristic::start_plain)) return false;
     if (guess == Guess::continuation && !uses(Heuristic::start_continuation)) return false;
     return guess != Guess::continuation || regularised_;
@@ -188,6 +189,9 @@ class InnerSolve {
   GuessRecords& records_;
   bool frictional_;
   bool regularised_;  ///< whether friction's regularisation is what Newton's method may fail on
+  /// True if no past motion predicts the step better than the present velocity, and friction acts: that velocity lets
+  /// surfaces slip that stick. Energy-momentum steps of twelve rods that pile up take 17 % more iterations without.
+  bool starts_at_rest_;
 };
 
 }  // namespace
