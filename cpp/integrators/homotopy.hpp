@@ -80,7 +80,7 @@ class Homotopy {
   void evaluate(const VectorX& z, bool with_matrix, const double* axial_force);
 
  private:
-  /// Parameters and hands at a factor, with which equations begin anew.
+  /// Sets parameters and hands to a factor, and begins a problem with these.
   void apply(double factor);
 
   Equations& equations_;

@@ -160,10 +160,10 @@ class InnerSolve {
         work_.newton);
   }
 
-  /// Continuation in the slip tolerance: where surfaces stop or turn round, friction jumps within a slip far smaller
-  /// than an iteration, and Newton's method goes to and fro across it. So the slip over which it grows is made great
-  /// first, and small little by little: what sticks slips in proportion to it, which leads from one solution to the
-  /// next.
+  /// Continuation in the slip tolerance. Where surfaces stop or reverse, friction jumps within a slip far smaller than
+  /// an iteration, and the iterates of Newton's method alternate across the jump. So the slip tolerance is large at
+  /// first and decreases in steps. The slip of sticking surfaces is proportional to the tolerance, which leads from one
+  /// solution to the next.
   NewtonResult solve_by_continuation() {
     NewtonResult found;
     int spent = 0;

@@ -5,8 +5,8 @@ namespace {
 
 // Halvings of a step before it is taken as it is: a thousandth of the step is left.
 constexpr int kMaxHalvings = 10;
-// Share of a step uphill that must be kept; else it is made anew without contact's geometric stiffness. Three halvings
-// cost about as much as a new matrix.
+// Share of an uphill step that must be kept; else the step is solved again with a matrix that lacks the geometric
+// stiffness of contact. Three halvings cost about as much as a new matrix.
 constexpr double kMinUphillShare = 0.125;
 
 }  // namespace

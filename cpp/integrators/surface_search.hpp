@@ -31,7 +31,7 @@ class SurfaceSearch {
   bool evaluated() const { return evaluated_; }
   /// True if `work.next_step` is the step from there with the same matrix.
   bool solved() const { return solved_; }
-  /// True if the step was made anew, with a matrix that lacks geometric stiffness.
+  /// True if the step was solved again with a matrix that lacks geometric stiffness.
   bool remade() const { return remade_; }
 
  private:

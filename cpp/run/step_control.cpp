@@ -41,11 +41,11 @@ StepControl::StepControl(const Options& options)
       tolerance_(options.tolerance),
       duration_(options.duration.value_or(1.0)) {}
 
-double StepControl::share_at(int level) const { return std::exp2(-static_cast<double>(level) / levels_per_halving()); }
+double StepControl::parts_at(int level) const { return std::exp2(static_cast<double>(level) / levels_per_halving()); }
 
 Division StepControl::divided(const Division& division, int level) const {
-  const double from = division.reached(), wanted = std::exp2(static_cast<double>(level) / levels_per_halving());
-  return {from, std::max(1L, static_cast<long>(std::ceil((1.0 - from) * wanted - 1e-9))), 0};
+  const double from = division.reached();
+  return {from, std::max(1L, static_cast<long>(std::ceil((1.0 - from) * parts_at(level) - 1e-9))), 0};
 }
 
 StepProgress StepControl::begin(StepLengths lengths, bool has_history) const {
@@ -96,7 +96,7 @@ StepProgress StepControl::grown(StepProgress now, double dt) const {
   lengths.easy_steps = 0;
   lengths.grown = true;
   int up = levels_per_halving();
-  while (up > 1 && !may_grow(lengths, dt, std::exp2(static_cast<double>(up) / levels_per_halving()))) --up;
+  while (up > 1 && !may_grow(lengths, dt, parts_at(up))) --up;
   lengths.level = std::max(0, lengths.level - up);
   return now;
 }
@@ -124,7 +124,7 @@ StepControl::Accepted StepControl::accept(StepLengths lengths, double error, dou
   if (!tolerance_) return {lengths, Verdict::easy};
   const double rate = error > kRoundingShare * allowed ? error / std::pow(dt, order_) : 0.0;
   lengths.error_rate = std::max(rate, lengths.error_rate * (1.0 - kForgetting));
-  return {lengths, may_grow(lengths, dt, std::exp2(1.0 / levels_per_halving())) ? Verdict::easy : Verdict::hard};
+  return {lengths, may_grow(lengths, dt, parts_at(1)) ? Verdict::easy : Verdict::hard};
 }
 
 /// True if a part of dt `times` longer would be accurate enough, the allowed error growing with it.

@@ -88,8 +88,8 @@ class StepControl {
 
   int levels_per_halving() const { return tolerance_ ? 4 : 1; }
   int deepest_level() const { return levels_per_halving() * max_halvings_; }
-  /// Length of parts at a level over that of the time step.
-  double share_at(int level) const;
+  /// Number of parts in a time step at a level.
+  double parts_at(int level) const;
 
  private:
   /// The rest of a time step in parts no longer than `level` has them.

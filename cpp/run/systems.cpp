@@ -41,25 +41,25 @@ void Systems::drop_scratch() {
   work = std::move(fresh);
 }
 
-Options Systems::static_options() const {
+EquationOptions Systems::static_options() const {
   Options symmetric = *options_;
   symmetric.integrator = Integrator::statics;
-  return symmetric;
+  return equation_options(symmetric);
 }
 
 Equations& Systems::statics() {
   if (serves_statics(model_->description, options_->integrator)) return *scheme_;
-  if (!statics_) statics_ = std::make_unique<Equations>(*model_, equation_options(static_options()));
+  if (!statics_) statics_ = std::make_unique<Equations>(*model_, static_options());
   return *statics_;
 }
 
 Equations& Systems::readout() const {
-  if (!readout_) readout_ = std::make_unique<Equations>(*model_, equation_options(static_options()));
+  if (!readout_) readout_ = std::make_unique<Equations>(*model_, static_options());
   return *readout_;
 }
 
 StepGradient& Systems::gradient() const {
-  if (!gradient_) gradient_ = std::make_unique<StepGradient>(*model_, equation_options(static_options()));
+  if (!gradient_) gradient_ = std::make_unique<StepGradient>(*model_, static_options());
   return *gradient_;
 }
 
@@ -125,7 +125,7 @@ void Systems::mark() {
 }
 
 void Systems::return_to_mark() {
-  if (!scheme_->marked()) {  // made anew since, for other supports or outside of a plane
+  if (!scheme_->marked()) {  // built after the mark, for other supports or outside of a plane
     forget_matrix();
     return;
   }

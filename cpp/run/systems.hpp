@@ -38,6 +38,8 @@ class Systems {
   Equations& statics();
   /// Symmetric equations for read-outs, which leave every factorisation alone.
   Equations& readout() const;
+  /// Form of symmetric equations of equilibria.
+  EquationOptions static_options() const;
   /// The adjoint of equilibria.
   StepGradient& gradient() const;
   /// Nothing where there are no such equations yet.
@@ -54,7 +56,6 @@ class Systems {
   StepWorkspace work;
 
  private:
-  Options static_options() const;
   void factorize_again(System owner);
 
   const Model* model_ = nullptr;

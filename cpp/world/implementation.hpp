@@ -153,12 +153,16 @@ struct World::Implementation : Running {
   void spread_jumps(double duration);
   /// The held unknowns when supports are there.
   void hold(const std::vector<SupportPose>& supports, HeldTarget& target) const;
-  CustomForces custom_forces(double time, const VectorX& q, const VectorX& v, bool derivatives);
+  CustomForces custom_forces(double time, const VectorX& q, const VectorX& v, bool derivatives) const;
+  /// Keeps custom forces as the present ones.
+  void note(const CustomForces& now);
+  /// Custom forces at a time, without velocities; empty where there are none.
+  CustomResponse custom_response_at_rest(double time) const;
   /// Prescribes the custom forces of a step of dt, whose held unknowns are prescribed already.
   void prescribe_custom(double dt, Prescribed& out);
   /// Prescribes custom forces at rest at a time, which are solved for.
   void prescribe_custom_at_rest(double time, Prescribed& out);
-  /// Evaluates custom forces at a time and a state.
+  /// Evaluates custom forces at a time and a state, which become the present ones.
   void find_custom_force(double time, const VectorX& q, const VectorX& v);
   /// Evaluates custom forces where the explicit rules of a step of dt have them act.
   void find_custom_force_of_step(double dt, Prescribed& out);
@@ -194,8 +198,8 @@ struct World::Implementation : Running {
   // stepping.cpp
   void advance(double duration);
   void advance_in_parts(double duration);
-  /// Shares of the time step: that of the next part, and that taken in so many tries.
-  [[noreturn]] void fail_error_control(long tries, double duration, double share_of_part, double share_taken) const;
+  /// `dt`: length of the next part; `share_taken`: of the time step, in so many tries.
+  [[noreturn]] void fail_error_control(long tries, double duration, double dt, double share_taken) const;
   [[noreturn]] void fail_step(Verdict why, double dt) const;
   /// Error and turns of a part.
   struct PartResult {

@@ -50,36 +50,23 @@ Linearisation World::linearise() const {
   Implementation& self = *implementation_;
   const Model& model = self.model;
   // Equations of its own: what is read out changes no matrix that is yet to serve.
-  Options symmetric = self.options;
-  symmetric.integrator = Integrator::statics;
-  Equations system(model, equation_options(symmetric));
-  const MatrixX3 forces = self.custom_force, moments = self.custom_moments;
-  Prescribed prescribed;
-  self.prescribe_custom_at_rest(self.state.time, prescribed);
+  Equations system(model, self.systems.static_options());
+  Prescribed prescribed = self.at_rest();
+  prescribed.respond = self.custom_response_at_rest(self.state.time);
   system.begin(self.state, self.parameters, StepRule::statics, 0.0, prescribed);
   StepData evaluation;
   const SparseMatrix basis = free_basis(model), back = basis.transpose();
-  std::optional<StrainParts> parts;
-  VectorX imbalance;
-  try {
-    system.evaluate(self.state.q, false, nullptr, evaluation);
-    parts.emplace(system, self.state, evaluation.configuration);
-    imbalance = evaluation.residual;
-    system.elastic() = parts->without();
-    system.evaluate(self.state.q, true, nullptr, evaluation);
-  } catch (...) {
-    self.custom_force = forces;
-    self.custom_moments = moments;
-    throw;
-  }
-  self.custom_force = forces;
-  self.custom_moments = moments;
+  system.evaluate(self.state.q, false, nullptr, evaluation);
+  const StrainParts parts(system, self.state, evaluation.configuration);
+  const VectorX imbalance = evaluation.residual;
+  system.elastic() = parts.without();
+  system.evaluate(self.state.q, true, nullptr, evaluation);
 
   Linearisation out;
   out.geometric = back * matrix_of(system.assembler()) * basis;
-  const auto strains = static_cast<Eigen::Index>(parts->stiffnesses().size());
-  out.gradients = assembled(strains, model.dof_count, parts->gradients()) * basis;
-  out.stiffnesses = Eigen::Map<const VectorX>(parts->stiffnesses().data(), strains);
+  const auto strains = static_cast<Eigen::Index>(parts.stiffnesses().size());
+  out.gradients = assembled(strains, model.dof_count, parts.gradients()) * basis;
+  out.stiffnesses = Eigen::Map<const VectorX>(parts.stiffnesses().data(), strains);
   out.imbalance = back * imbalance;
   out.mass = back * matrix_of(model, system.mass()) * basis;
   Entries moves;

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "common/check.hpp"
 #include "geometry/rotation.hpp"
@@ -179,7 +180,8 @@ void World::Implementation::hold(const std::vector<SupportPose>& supports, HeldT
   }
 }
 
-CustomForces World::Implementation::custom_forces(double time, const VectorX& q, const VectorX& v, bool derivatives) {
+CustomForces World::Implementation::custom_forces(double time, const VectorX& q, const VectorX& v,
+                                                  bool derivatives) const {
   MatrixX3 positions(model.node_count, 3), velocities(model.node_count, 3);
   for (int i = 0; i < model.node_count; ++i) {
     positions.row(i) = node_position(model, q, i);
@@ -205,13 +207,16 @@ CustomForces World::Implementation::custom_forces(double time, const VectorX& q,
     require(m->size() == 0 || (m->rows() == rows && m->cols() == columns), "derivatives of a custom force must have " +
                                                                                std::to_string(rows) + " rows and " +
                                                                                std::to_string(columns) + " columns");
-  custom_force = now.forces;
-  if (description.custom_moments) custom_moments = now.moments;
   return now;
 }
 
+void World::Implementation::note(const CustomForces& now) {
+  custom_force = now.forces;
+  if (description.custom_moments) custom_moments = now.moments;
+}
+
 void World::Implementation::find_custom_force(double time, const VectorX& q, const VectorX& v) {
-  custom_forces(time, q, v, false);
+  note(custom_forces(time, q, v, false));
 }
 
 /// Custom forces of a step of dt are those where the scheme's own forces act.
@@ -219,7 +224,9 @@ void World::Implementation::prescribe_custom(double dt, Prescribed& out) {
   if (!description.has_custom_force) return;
   if (callbacks.force && description.custom_implicit && options.integrator != Integrator::verlet) {
     out.respond = [this, time = force_time(state.time, dt)](const VectorX& q, const VectorX& v, bool derivatives) {
-      return custom_forces(time, q, v, derivatives);
+      CustomForces now = custom_forces(time, q, v, derivatives);
+      note(now);
+      return now;
     };
     return;
   }
@@ -227,13 +234,22 @@ void World::Implementation::prescribe_custom(double dt, Prescribed& out) {
   put_custom_force(out);
 }
 
-/// In balance, whatever moves towards it, velocities are zero.
-void World::Implementation::prescribe_custom_at_rest(double time, Prescribed& out) {
-  put_custom_force(out);
-  if (!callbacks.force) return;
-  out.respond = [this, time](const VectorX& q, const VectorX& v, bool derivatives) {
+CustomResponse World::Implementation::custom_response_at_rest(double time) const {
+  if (!callbacks.force) return nullptr;
+  return [this, time](const VectorX& q, const VectorX& v, bool derivatives) {
     CustomForces now = custom_forces(time, q, VectorX::Zero(v.size()), derivatives);
     now.by_velocity.resize(0, 0);
+    return now;
+  };
+}
+
+void World::Implementation::prescribe_custom_at_rest(double time, Prescribed& out) {
+  put_custom_force(out);
+  CustomResponse at_rest = custom_response_at_rest(time);
+  if (!at_rest) return;
+  out.respond = [this, at_rest = std::move(at_rest)](const VectorX& q, const VectorX& v, bool derivatives) {
+    CustomForces now = at_rest(q, v, derivatives);
+    note(now);
     return now;
   };
 }

@@ -64,7 +64,7 @@ void World::Implementation::watch_step(double dt, const Equations& system) {
     warnings.report(Warning::steps, unresolved_in_time(of_part, c));
 }
 
-/// Adds a step of dt to the sums over steps, from which the first one begins anew.
+/// Adds a step of dt to the sums over steps. The first step of a period resets the sums.
 void World::Implementation::sum_motion(double dt, bool first, const Equations& system) {
   auto& [change, motion, greatest, pull, moved, before] = step_watch;
   if (first || change.size() != model.component_count)

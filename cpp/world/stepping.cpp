@@ -67,7 +67,7 @@ void World::Implementation::advance_in_parts(double duration) {
     lengths = progress.lengths;
     division = progress.division;
     if (options.tolerance && tries >= max_steps)
-      fail_error_control(tries, duration, control.share_at(lengths.level), (state.time - base) / duration);
+      fail_error_control(tries, duration, duration / control.parts_at(lengths.level), (state.time - base) / duration);
     const double dt = duration * division.share();
     const Verdict verdict = try_step(control, dt, rejected);
     progress.lengths = lengths;
@@ -84,9 +84,8 @@ void World::Implementation::advance_in_parts(double duration) {
   lengths = progress.lengths;
 }
 
-void World::Implementation::fail_error_control(long tries, double duration, double share_of_part,
-                                               double share_taken) const {
-  fail(NewtonResult{}, duration * share_of_part,
+void World::Implementation::fail_error_control(long tries, double duration, double dt, double share_taken) const {
+  fail(NewtonResult{}, dt,
        "error control has taken " + std::to_string(tries) + " inner steps for " + text(100.0 * share_taken, 3) +
            " % of one time_step of " + text(duration) + " s",
        "Undamped motion of high frequency needs steps as short as its period. Use a larger tolerance, viscosity of the "
@@ -104,7 +103,7 @@ void World::Implementation::fail_step(Verdict why, double dt) const {
                                        : "");
 }
 
-/// One part of dt, taken back where it gains energy from nowhere or is not accurate enough.
+/// Takes one part of dt, and rejects it where it gains energy that no load supplies or is not accurate enough.
 Verdict World::Implementation::try_step(const StepControl& control, double dt, Excess& rejected) {
   const bool keeps = may_take_back();
   if (keeps) static_cast<Moving&>(kept) = *this;

@@ -85,15 +85,15 @@ def plunge(
     """End a plan quickly, and with the edge pressed onto the sheet that it comes down on.
 
     Where more friction is needed in the end than there is, the edge is drawn back or pushed on as it comes down slowly.
-    It is led down within a `duration` instead, before the sheet can follow, and `press` lower than it can go: the jaw
-    yields, and presses both layers on the table with that times its stiffness, up to its force limit, so that they
-    stay. It goes down from over the target: from the least height to which the sheet is led without slide, whatever of
-    the plan's `uncertainty` it is, or from where least friction is needed. The plan is made anew up to there. The way
-    down is chosen by trials on simulated sheets without noise, those of `FoldPlan.papers`. The trials vary how far the
-    edge goes to the side, within what time, and whether it ends level or as in the plan. Each way is aimed so that the
-    nominal paper is folded right. Among the ways that fold all sheets, the chosen way has the smallest error on its
-    worst sheet: the error of the crease plus half of the slide. Jaws that hold sheets at the bounds are off by 0.5 mm
-    to either side: an edge that comes down on the last of a sheet must not miss it.
+    A plunge leads the edge down within a `duration`, before the sheet can follow, and `press` lower than it can go. The
+    jaw yields, and presses both layers on the table by `press` times its stiffness, up to its force limit, so that they
+    stay. The edge goes down from above the target. The way down begins at the least height to which every sheet within
+    the plan's `uncertainty` is led without slide, or where least friction is needed; the plan is recomputed up to that
+    height. The way down is chosen by trials on simulated sheets without noise, those of `FoldPlan.papers`. The trials
+    vary how far the edge goes to the side, within what time, and whether it ends level or as in the plan. Each way is
+    aimed so that the nominal paper is folded right. Among the ways that fold all sheets, the chosen way has the
+    smallest error on its worst sheet: the error of the crease plus half of the slide. Jaws that hold sheets at the
+    bounds are off by 0.5 mm to either side: an edge that comes down on the last of a sheet must not miss it.
 
     Parameters
     ----------

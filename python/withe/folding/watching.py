@@ -58,7 +58,7 @@ def watched_parts(
         if abs(latest - known) > tolerance:
             known = latest
             if len(poses) > 1:
-                present, poses = _anew(present, poses, known)
+                present, poses = _rest_of_plan(present, poses, known)
         if len(poses) == 1:
             break
     if plunge is not None:
@@ -66,8 +66,8 @@ def watched_parts(
         yield Part(plunge.times, np.vstack([poses[-1:], shifted(plunge.poses[1:], farther)]))
 
 
-def _anew(present: FoldPlan, poses: FloatArray, slide: float) -> tuple[FoldPlan, FloatArray]:
-    """The rest of a plan made anew, and the poses that are left: from the first one at which the sheet can be held.
+def _rest_of_plan(present: FoldPlan, poses: FloatArray, slide: float) -> tuple[FoldPlan, FloatArray]:
+    """Recompute the rest of a plan. Return it, and the poses from the first one at which the sheet can be held.
 
     Where the jaw is now, a sheet that has slid may be beyond the border of the manifold without moment.
     """

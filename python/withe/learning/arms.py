@@ -306,7 +306,7 @@ class Obstacles2D(_Obstructed):
 
 
 class Obstacles3D(_Obstructed):
-    """The tip is to come to (0.8, 0, 0.35) m through eight capsules of radius 0.03 m, which every episode draws anew.
+    """Move the tip to (0.8, 0, 0.35) m through eight capsules of radius 0.03 m. Each episode draws other capsules.
 
     Actions: as in `Follow`, (10,). Observed: positions and velocities of nodes 2, 4 .. 20, bends, the goal, ends of the
     capsules, (121,). Reward as in `Follow`. 50 steps of 0.5 s.

@@ -244,8 +244,8 @@ class Placement:
     ) -> None:
         """Set the state of a rod. Arguments that are not given keep their present values.
 
-        Joints turn with their edges. The energy balance of ``energy()`` begins anew, without counting the change as
-        work. Contacts of the moved rod are detected anew, as at the start; other contacts keep their history. A state
+        Joints turn with their edges. The energy balance of ``energy()`` restarts, without counting the change as work.
+        Contacts of the moved rod lose their history, as at the start; other contacts keep theirs. A state
         out of the plane of a planar simulation makes the simulation three-dimensional, unless it was built with
         planar=True.
 

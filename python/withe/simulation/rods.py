@@ -135,7 +135,7 @@ def rod_slopes(session: Session, part: RodPart, word: str) -> dict[str, FloatArr
 def sum_of_slopes(
     found: _core.ParameterGradient, slopes: dict[str, FloatArray], word: str, first: int, last: int
 ) -> FloatArray:
-    """By a word of a rod, whose edges are those from `first` to before `last`; one an edge, or a pair."""
+    """Return derivatives by a word of a rod with the edges `first` to `last` - 1: a value, or a pair, per edge."""
     out = np.zeros((last - first, 2) if word == "bend_stiffness" else last - first)
     for name, slope in slopes.items():
         part = np.asarray(getattr(found, name))[first:last] * slope
