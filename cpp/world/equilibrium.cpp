@@ -6,6 +6,9 @@
 #include "geometry/rotation.hpp"
 #include "integrators/arc_length.hpp"
 #include "integrators/stiffness_signs.hpp"
+#include "run/drive.hpp"
+#include "run/hold.hpp"
+#include "run/transfer.hpp"
 #include "world/implementation.hpp"
 
 namespace withe {
@@ -52,6 +55,16 @@ void find_poses_between(const std::vector<SupportMotion>& from, const std::vecto
   }
 }
 
+/// True if a hand that yields moves.
+bool hands_move(const Model& model, const std::vector<SupportMotion>& from, const std::vector<SupportMotion>& to) {
+  for (std::size_t s = 0; s < to.size(); ++s)
+    if (model.supports[s].active && model.supports[s].yields() &&
+        (from[s].position != to[s].position || from[s].rotation != to[s].rotation || to[s].roll != Vector3::Zero() ||
+         from[s].fed != to[s].fed))
+      return true;
+  return false;
+}
+
 void put(const std::vector<SupportPose>& poses, std::vector<SupportMotion>& motions) {
   for (std::size_t s = 0; s < motions.size(); ++s) motions[s].put(poses[s]);
 }
@@ -64,7 +77,7 @@ Boundary World::Implementation::boundary_between(Equations& system, const std::v
   boundary.hold = [this, &system, &from, &to, poses = std::vector<SupportPose>{}, there = HeldTarget{}](
                       double present, double factor, VectorX& q) mutable {
     find_poses_between(from, to, factor, poses);
-    hold(poses, there);
+    hold(model, *this, poses, there);
     for (std::size_t s = 0; s < to.size(); ++s) {
       const double turn = to[s].roll.norm() + swing_between(from[s], to[s]).norm();
       if (to[s].roll != Vector3::Zero() && std::abs(factor - present) * turn > kMostTurn) there.reachable = false;
@@ -72,7 +85,7 @@ Boundary World::Implementation::boundary_between(Equations& system, const std::v
     system.assembler().add_held_change(q, there.q, 1.0, q);
     return there.reachable;
   };
-  if (hands_move(from, to))
+  if (hands_move(model, from, to))
     boundary.move = [&from, &to, &out](double factor) { find_poses_between(from, to, factor, out.supports); };
   return boundary;
 }
@@ -164,12 +177,12 @@ EquilibriumResult World::Implementation::equilibrium(double dt, Saddles saddles)
   const MatrixX3 loads = parameters.loads;
   const double time = state.time + dt;
   const bool actuation_changed_before = actuation_changed;
-  if (actuated()) {
+  if (are_active(ramps)) {
     note_actuation();
-    apply_ramps(time, configuration(), actuation_work);
+    ledger.actuation_work += apply_ramps(model, ramps, time, configuration(), parameters, energy_scratch);
   }
   const Actuation wanted = actuation_changed ? actuation_of(parameters) : Actuation{};
-  prescribe(time, prescribed);
+  prescribe(model, *this, *this, time, prescribed);
   Equations& system = systems.statics();
   const MatrixX3 forces_before = custom_force, moments_before = custom_moments;
   const auto undo = [&] {
@@ -177,7 +190,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt, Saddles saddles)
     custom_moments = moments_before;
     static_cast<Moving&>(*this) = before;
     if (actuation_changed) set_actuation_between(model, wanted, wanted, 1.0, parameters);
-    apply_ramps(state.time);
+    apply_ramps(model, ramps, state.time, parameters);
     actuation_changed = actuation_changed_before;
     parameters.loads = loads;
     systems.recall(lagged_before);  // and no more of `system`, which this may drop
@@ -234,7 +247,7 @@ bool World::Implementation::buckles_out_of_plane() {
   if (!model.planar() || options.planar.value_or(false) || !systems.statics().has_potential_here()) return false;
   if (spatial_twin) {
     static_cast<Running&>(*spatial_twin) = *this;
-    spatial_twin->state = spatial_twin->transferred(model, state);
+    spatial_twin->state = transferred(model, state, spatial_twin->model);
     update_derived(spatial_twin->model, spatial_twin->parameters);
   } else {
     spatial_twin = std::make_unique<Implementation>(*this, Unbuilt{});

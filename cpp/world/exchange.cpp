@@ -140,8 +140,7 @@ void exchange(Archive& io, std::vector<Wrench>& wrenches) {
 
 template <class Archive>
 void exchange(Archive& io, Moving& moving) {
-  auto& [state, predictor, motions, support_work, actuation_work, dissipated, load_work, impulses, impulse_time] =
-      moving;
+  auto& [state, predictor, motions, ledger, impulses, impulse_time] = moving;
   exchange(io, state);
   predictor.exchange(io);
   for (auto& motion : motions) {
@@ -151,6 +150,7 @@ void exchange(Archive& io, Moving& moving) {
     io(roll), exchange(io, shift), exchange(io, turn), io(stretch), io(fed), io(fed_before), io(feed_rate),
         io(feeds_since);
   }
+  auto& [support_work, actuation_work, dissipated, load_work] = ledger;
   for (double* x : {&support_work, &actuation_work, &dissipated, &load_work, &impulse_time}) io(*x);
   exchange(io, impulses);
 }

@@ -5,38 +5,13 @@
 
 #include "integrators/statics.hpp"
 #include "model/edge_vectors.hpp"
+#include "run/crossings.hpp"
+#include "run/running.hpp"
 #include "run/systems.hpp"
-#include "world/crossings.hpp"
-#include "world/running.hpp"
+#include "run/warnings.hpp"
+#include "world/world.hpp"
 
 namespace withe {
-
-/// What energies are made of besides the state, as parameters say.
-struct EnergyCoefficients {
-  ElasticCoefficients elastic;
-  MassMatrix mass;
-  VectorX node_mass;                             ///< [kg]
-  Vector3 gravity;                               ///< [m/s^2]
-  VectorX spring_stiffness, spring_rest_length;  ///< [N/m], [m]
-  long version = -1, natural_version = -1;       ///< of the parameters
-
-  void set(const Model& model, const Parameters& parameters);
-};
-
-/// Per connected component: kinetic energy beside a frame that travels along with it, what that leaves out, elastic
-/// energy [J]; mass [kg], momentum [kg m/s], velocity of the frame [m/s].
-struct ComponentEnergies {
-  VectorX kinetic, travelling, elastic, mass, held_nodes;
-  MatrixX3 momentum, frame;
-};
-
-/// Scratch for energies.
-struct EnergyScratch {
-  Configuration configuration;
-  EnergyCoefficients coefficients;
-  ContactAtRest contact;
-  ComponentEnergies components;
-};
 
 /// Functions of who runs the scene, which copies do not take over.
 struct Callbacks {
@@ -101,7 +76,6 @@ struct World::Implementation : Running {
   void begin_as_drawn();
   void note_drawn_actuation();
   void carry_over(const Model& old, Rebuild why);
-  void keep_moments(const Model& old, const ElasticCoefficients& before);
   void make_plan();
   /// Equations for other loads than before.
   void remake_equations();
@@ -110,11 +84,6 @@ struct World::Implementation : Running {
   std::string fluid_note() const;
   /// Drops the plane; throws when the user asked for it. `why` names the argument that leaves the plane.
   void leave_plane(const std::string& why);
-  State transferred(const Model& old, const State& from) const;
-  void relax_frames(const std::vector<bool>& is_new);
-  void orient_frame(int frame, const Matrix3& free);
-  void relax_together(const std::vector<int>& frames, const std::vector<Matrix3>& free);
-  void add_frame_forces(const std::vector<int>& dofs, VectorX& g, Eigen::MatrixXd& H) const;
 
   // set_state.cpp
   bool leaves_plane(const RodState& rod) const;
@@ -123,8 +92,6 @@ struct World::Implementation : Running {
   void place_rods(const std::vector<RodState>& rods);
   void place_directors(const RodState& rod, const VectorX& q, const Configuration& before);
   void set_rates(const std::vector<RodState>& rods);
-  void relax_joints(const std::vector<bool>& is_told);
-  void turn_frames(const std::vector<bool>& is_told);
   std::vector<bool> moved_rods(const VectorX& before, const VectorX& now) const;
   void meet_anew(const std::vector<bool>& moved);
   /// What came before no longer tells what comes next.
@@ -138,21 +105,14 @@ struct World::Implementation : Running {
   /// Leaves the plane of a planar scene where a parameter of the kind does.
   void leave_plane_for(const ParameterSetting& setting);
   void set(std::span<const ParameterSetting> settings);
-  void apply_ramps(double time);
-  Eigen::VectorBlock<VectorX> natural_stretch(int rod);
-  void apply_ramps(double time, const Configuration& c, double& work);
+  /// Configuration of the present state.
   const Configuration& configuration() const;
+  /// Contact in time steps; none where nothing can touch.
+  Contact* contact() const { return systems.scheme().contact(); }
   void retire_ramps();
   void note_actuation();
-  bool actuated() const;
-  bool turns_rods() const;
-  /// Sets the poses of supports, the held unknowns and the places of obstacles at a time. No custom forces.
-  void prescribe(double time, Prescribed& out) const;
   /// The present custom forces, and nothing else.
   Prescribed at_rest() const;
-  void spread_jumps(double duration);
-  /// The held unknowns when supports are there.
-  void hold(const std::vector<SupportPose>& supports, HeldTarget& target) const;
   CustomForces custom_forces(double time, const VectorX& q, const VectorX& v, bool derivatives) const;
   /// Keeps custom forces as the present ones.
   void note(const CustomForces& now);
@@ -170,10 +130,8 @@ struct World::Implementation : Running {
   void put_custom_force(Prescribed& out) const;
 
   // hands.cpp
-  bool has_hands() const;
   bool has_rings() const;
   bool release_left_rings();
-  bool hands_move(const std::vector<SupportMotion>& from, const std::vector<SupportMotion>& to) const;
   /// Present poses of supports.
   std::vector<SupportPose> support_poses() const;
   VectorX neutral_motion() const;
@@ -186,14 +144,6 @@ struct World::Implementation : Running {
   StepGradient& begin_gradient(AtEquilibrium& at) const;
   EquilibriumGradient equilibrium_gradient(const CoefficientAdjoint& coefficients, const HeldAdjoint& held) const;
   double hand_energy_of(int hand) const;
-  void grasp(int hand);
-  void regrip(const std::vector<std::vector<int>>& held_before);
-  /// The unknowns that hands hold.
-  void hold_hands(const std::vector<SupportPose>& supports, HeldTarget& target) const;
-  /// Sets angles of the edges that a hand holds at a rotation, once all nodes have their places in `q`. False where an
-  /// edge would turn by too much.
-  bool hold_edges(int hand, const Matrix3& rotation, VectorX& q) const;
-  Wrench hand_reaction(int hand, const VectorX& held) const;
 
   // stepping.cpp
   void advance(double duration);
@@ -231,34 +181,15 @@ struct World::Implementation : Running {
   void check_impacts(const ContactDescription& contact) const;
   void check_reversible(const Parameters& p) const;
 
-  // failure.cpp
-  struct Place {
-    int rod = -1, node = -1;
-    std::string words;
-  };
-  Place place_of(int row) const;
-  Place place_of_node(int node) const;
-  std::string crushed() const;
-  std::string unresolved() const;
+  // watches.cpp
   void check_resolution();
-  std::string what_to_try() const;
+  void check_squeeze();
+  void check_squeezed(Equations& system, const Prescribed& given, const VectorX& q, double dt);
+  void begin_crossing_watch();
+  void check_crossings();
   /// `hint`: what to try, where the caller knows better than `what_to_try`.
   [[noreturn]] void fail(const NewtonResult& newton, double dt, const std::string& what,
                          const std::string& hint = "") const;
-
-  // squeezed.cpp
-  void check_squeeze();
-  void check_squeezed(Equations& system, const Prescribed& given, const VectorX& q, double dt);
-  [[noreturn]] void fail_squeezed(const Equations& system, const Squeezed& squeezed, double dt) const;
-
-  // step_length.cpp
-  void watch_step(double dt, const Equations& system);
-  void sum_motion(double dt, bool first, const Equations& system);
-  void forget_component(int component);
-  std::string unresolved_in_time(double dt, int component) const;
-  std::string unresolved_impact(double dt, const Equations& system);
-  double bending_time(int edge) const;
-  void add_step_notes();
 
   // gradients.cpp
   void check_tape();
@@ -266,7 +197,6 @@ struct World::Implementation : Running {
   Reached reached() const;
 
   // supports.cpp
-  SupportMotion standing(const Support& support) const;
   void check_pose(int support, const std::optional<Vector3>& position, const std::optional<Matrix3>& rotation);
   void lump_held();
   void note_reactions();
@@ -274,8 +204,6 @@ struct World::Implementation : Running {
   bool tensions_in_middle() const;
   void note_tensions();
   void keep_reactions(double dt, bool begins);
-  void make_frame_moments();
-  Wrench reaction_of(int support, const VectorX& held) const;
 
   // equilibrium.cpp
   EquilibriumResult equilibrium(double dt, Saddles saddles = Saddles::leave);
@@ -300,9 +228,6 @@ struct World::Implementation : Running {
   void check_overlap() const;
 
   // obstacles.cpp
-  ObstacleWay obstacle_way(int obstacle) const;
-  double farthest_obstacle(const State& since) const;
-  std::vector<ObstaclePlace> obstacle_places(const std::function<ObstacleWay(int)>& way) const;
   void check_turn(int obstacle, const Vector3& turn) const;
 
   // separation.cpp
@@ -312,39 +237,15 @@ struct World::Implementation : Running {
 
   // energy.cpp
   Energy energy() const;
-  Energy rod_energy(int rod) const;
-  Energy energy_of(const State& at, double loads, double work_done, double lost) const;
   /// To be called before parameters are set, and before the state moves or what is set is copied.
   void begin_setting();
   void account_for_settings();
-  /// What has been set since changed the energy of the present state by this [J].
-  double work_of_settings() const;
-  double elastic_energy() const;
-  bool gains_under_pressure();
-  void find_component_energies(const State& then, ComponentEnergies& out) const;
-  double touching_energy(const State& then);
-  bool contact_pumps(double dt);
   /// Energies as they are now become those that the energy of steps is compared with, where a scheme does not conserve
   /// it by itself.
   void begin_energy_watch();
   void check_energy();
   std::string longest_explicit_step();
   void check_explicit();
-  void check_drift();
-
-  // crossings.cpp
-  void begin_crossing_watch();
-  void check_crossings();
 };
-
-/// Puts a node in space into a configuration vector.
-void put_node(const Model& model, int node, const Vector3& position, VectorX& q);
-/// Row of a stencil of another model of the same scene, or -1.
-Eigen::Index same_stencil(const Model& model, const BendStencil& stencil);
-Eigen::Index same_stencil(const Model& model, const FrameStencil& stencil);
-/// Rotation of a joint frame from the drawn axes.
-Matrix3 frame_rotation(const Model& model, const State& state, int frame);
-/// Of an edge, by its nodes and its spin [rad/s].
-Vector3 angular_velocity(const Model& model, const State& state, const Configuration& c, int edge);
 
 }  // namespace withe

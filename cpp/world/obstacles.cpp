@@ -6,37 +6,10 @@
 #include <Eigen/Geometry>
 
 #include "common/check.hpp"
+#include "run/drive.hpp"
 #include "world/implementation.hpp"
 
 namespace withe {
-
-ObstacleWay ObstacleMotion::at(double time) const {
-  const double share = shift.fraction(time), turned = turn.fraction(time);
-  return {(1.0 - share) * from.shift + share * to.shift, (1.0 - turned) * from.turn + turned * to.turn};
-}
-
-/// How far an obstacle is from where it is drawn; in a plane, within it.
-ObstacleWay World::Implementation::obstacle_way(int obstacle) const {
-  return way_from_drawn(model, description.contact.obstacles[at(obstacle)], state.obstacles[at(obstacle)]);
-}
-
-/// Places of all obstacles, each as far from where it is drawn as `way` says.
-std::vector<ObstaclePlace> World::Implementation::obstacle_places(const std::function<ObstacleWay(int)>& way) const {
-  std::vector<ObstaclePlace> places;
-  for (const ObstacleDescription& drawn : description.contact.obstacles)
-    places.push_back(obstacle_place(model, drawn, way(static_cast<int>(places.size()))));
-  return places;
-}
-
-/// How far an obstacle has moved since [m].
-double World::Implementation::farthest_obstacle(const State& since) const {
-  double square = 0.0;
-  for (std::size_t o = 0; o < state.obstacles.size(); ++o) {
-    const Vec3d way = state.obstacles[o].point - since.obstacles[o].point;
-    square = std::max(square, dot(way, way));
-  }
-  return std::sqrt(square);
-}
 
 /// Only what leaves the shape where it is can be told by the motion of the surface alone.
 void World::Implementation::check_turn(int obstacle, const Vector3& turn) const {
@@ -53,7 +26,7 @@ void World::move_obstacle(int obstacle, const std::optional<Vector3>& position, 
   Implementation& self = *implementation_;
   require(std::isfinite(over) && over >= 0.0, "over must be finite and not negative");
   const Vector3 from = obstacle_position(obstacle);
-  const ObstacleWay before = self.obstacle_way(obstacle);
+  const ObstacleWay before = obstacle_way(self.model, self.state, obstacle);
   prescribe_obstacle(obstacle, position, turn);
   ObstacleMotion& m = self.obstacle_motions[at(obstacle)];
   const Span way{self.state.time, self.state.time + over};
@@ -83,7 +56,8 @@ void World::prescribe_obstacle(int obstacle, const std::optional<Vector3>& posit
   if (self.obstacle_motions.empty()) {
     self.obstacle_motions.resize(self.description.contact.obstacles.size());
     for (std::size_t o = 0; o < self.obstacle_motions.size(); ++o)
-      self.obstacle_motions[o].from = self.obstacle_motions[o].to = self.obstacle_way(static_cast<int>(o));
+      self.obstacle_motions[o].from = self.obstacle_motions[o].to =
+          obstacle_way(self.model, self.state, static_cast<int>(o));
   }
   ObstacleMotion& m = self.obstacle_motions[at(obstacle)];
   const Span now{self.state.time, self.state.time};
@@ -102,12 +76,12 @@ Vector3 World::obstacle_position(int obstacle) const {
   const Implementation& self = *implementation_;
   require(obstacle >= 0 && obstacle < static_cast<int>(self.description.contact.obstacles.size()),
           "no such obstacle: " + std::to_string(obstacle));
-  return self.description.contact.obstacles[at(obstacle)].point + self.obstacle_way(obstacle).shift;
+  return self.description.contact.obstacles[at(obstacle)].point + obstacle_way(self.model, self.state, obstacle).shift;
 }
 
 Vector3 World::obstacle_turn(int obstacle) const {
   (void)obstacle_position(obstacle);  // refuses one that is not there
-  return implementation_->obstacle_way(obstacle).turn;
+  return obstacle_way(implementation_->model, implementation_->state, obstacle).turn;
 }
 
 }  // namespace withe

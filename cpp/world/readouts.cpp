@@ -7,6 +7,7 @@
 #include "elasticity/stretch.hpp"
 #include "forces/tendon.hpp"
 #include "model/edge_vectors.hpp"
+#include "run/frames.hpp"
 #include "steps/joint_forces.hpp"
 #include "steps/spring_forces.hpp"
 #include "world/implementation.hpp"
@@ -215,7 +216,10 @@ VectorX World::spins(int rod) const {
 }
 
 Energy World::energy() const { return implementation_->energy(); }
-Energy World::rod_energy(int rod) const { return implementation_->rod_energy(rod); }
+Energy World::rod_energy(int rod) const {
+  const Implementation& self = *implementation_;
+  return withe::rod_energy(self.model, self.parameters, self.state, rod, self.energy_scratch);
+}
 
 /// What the kinetic energy changes by with a velocity common to all, and with an angular velocity about the origin:
 ///   P = sum of (M v) over nodes,  J = sum of x x (M v) + sum of I omega t over edges + sum of I w over joints' frames.

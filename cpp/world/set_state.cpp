@@ -9,6 +9,9 @@
 #include "common/text.hpp"
 #include "geometry/rotation.hpp"
 #include "model/edge_vectors.hpp"
+#include "run/frames.hpp"
+#include "run/hold.hpp"
+#include "run/places.hpp"
 #include "steps/ring_forces.hpp"
 #include "world/implementation.hpp"
 
@@ -100,7 +103,7 @@ bool World::Implementation::arrives(int support, const std::vector<bool>& told, 
   if (held.yields() || !motion.jumps()) return false;
   const Vector3 before = motion.position;
   motion.position = motion.to_position;
-  hold(support_poses(), there);
+  hold(model, *this, support_poses(), there);
   for (const Constraint& c : model.constraints)
     for (int node : held.nodes)
       if (c.first == model.node_dof[at(node)] &&
@@ -125,7 +128,7 @@ VectorX World::Implementation::placed(const std::vector<RodState>& rods) {
         own = Vector2(from.dot(model.plane->first), from.dot(model.plane->second));
       }
       require(!told[at(node)] || (q.segment(dof, model.dimension) - own).norm() <= kHeld * model.length_scale,
-              "positions of rods that share a node must agree" + place_of_node(node).words);
+              "positions of rods that share a node must agree" + place_of_node(model, node).words);
       told[at(node)] = true;
       q.segment(dof, model.dimension) = own;
     }
@@ -140,7 +143,7 @@ VectorX World::Implementation::placed(const std::vector<RodState>& rods) {
         const Vector3 moved = c.held_change(arrived ? there.q : state.q, q);
         require(moved.norm() <= kHeld * model.length_scale,
                 "positions must not move a node that a support holds, but do by " + text(moved.norm()) + " m" +
-                    place_of_node(node).words +
+                    place_of_node(model, node).words +
                     (moves ? ": the support is on a ramp (over=), so move the support without over=, or "
                              "release it"
                            : ": move the support there first, or release it"));
@@ -152,7 +155,7 @@ VectorX World::Implementation::placed(const std::vector<RodState>& rods) {
     const double length =
         (q.segment(model.head_dof[at(e)], model.dimension) - q.segment(model.tail_dof[at(e)], model.dimension)).norm();
     require(length > 1e-6 * model.edge_length(e),
-            "positions must not give an edge zero length" + place_of_node(model.edge_tail[at(e)]).words);
+            "positions must not give an edge zero length" + place_of_node(model, model.edge_tail[at(e)]).words);
   }
   return q;
 }
@@ -161,7 +164,7 @@ VectorX World::Implementation::placed(const std::vector<RodState>& rods) {
 void World::Implementation::place_directors(const RodState& rod, const VectorX& q, const Configuration& before) {
   for (Eigen::Index e = 0; e < rod.directors.rows(); ++e) {
     const int edge = model.rod_first_edge[at(rod.rod)] + static_cast<int>(e);
-    const std::string where = place_of_node(model.edge_tail[at(edge)]).words;
+    const std::string where = place_of_node(model, model.edge_tail[at(edge)]).words;
     const Vector3 t = (q.segment<3>(model.head_dof[at(edge)]) - q.segment<3>(model.tail_dof[at(edge)])).normalized();
     const Vector3 told = rod.directors.row(e);
     require(std::abs(told.norm() - 1.0) < kAligned && std::abs(told.dot(t)) < kAligned,
@@ -174,7 +177,7 @@ void World::Implementation::place_directors(const RodState& rod, const VectorX& 
           support.active && std::find(support.edges.begin(), support.edges.end(), edge) != support.edges.end();
       const bool turns = state.time <= motions[s].turn.end && motions[s].rotation != motions[s].to_rotation;
       require(!holds || (d1 - now).norm() < kAligned,
-              "directors must not turn an edge that a support holds" + place_of_node(support.node).words +
+              "directors must not turn an edge that a support holds" + place_of_node(model, support.node).words +
                   (turns ? ": the support is on a ramp (over=), so call step() first, or release the "
                            "support"
                          : ": turn the support first, and call step(), or release the support"));
@@ -208,7 +211,7 @@ void World::Implementation::place_rods(const std::vector<RodState>& rods) {
     for (int e = 0; e < model.edge_count; ++e)
       require(is_told[at(e)] || dot(before.edge[at(e)].tangent, c.edge[at(e)].tangent) > -1.0 + 1e-6,
               "positions must not turn an edge of another rod by half a turn" +
-                  place_of_node(model.edge_tail[at(e)]).words);
+                  place_of_node(model, model.edge_tail[at(e)]).words);
     const VectorX bend_tau = state.bend_tau, half_tau = state.half_tau;
     accept_configuration(model, q, c, state);
     // Frames of edges that are told are theirs; which turn a twist is in follows from what is told too.
@@ -222,7 +225,7 @@ void World::Implementation::place_rods(const std::vector<RodState>& rods) {
   } else {
     state.q = q;
   }
-  relax_joints(is_told);
+  relax_joints(model, parameters, is_told, state);
   compute_configuration(model, state, state.q, c);
   require(c.bend_strain.allFinite() && c.half_strain.allFinite(), "positions must not fold an edge back onto the next");
   accept_configuration(model, VectorX(state.q), c, state);
@@ -254,31 +257,6 @@ void World::Implementation::meet_anew(const std::vector<bool>& moved) {
   check_overlap();
 }
 
-/// Frames that edges are attached to turn with them, as far as nothing holds them, and with those that hinges have
-/// beside them in a plane.
-void World::Implementation::relax_joints(const std::vector<bool>& is_told) {
-  std::vector<bool> which(at(model.frame_count), false);
-  for (const FrameStencil& half : model.half)
-    if (is_told[at(half.edge)]) which[at(half.frame)] = true;
-  const auto free_of = [&](int f) -> Matrix3 {
-    for (const Constraint& c : model.constraints)
-      if (c.first == model.frame_dof[at(f)]) return c.free;
-    return Matrix3::Identity();
-  };
-  for (int f = 0; f < model.frame_count; ++f) {
-    if (!which[at(f)]) continue;
-    std::vector<int> together{f};
-    for (int other = 0; model.planar() && !model.joint_angles.empty() && other < model.frame_count; ++other)
-      if (other != f && model.frame_node[at(other)] == model.frame_node[at(f)]) together.push_back(other);
-    std::vector<Matrix3> free;
-    for (int each : together) {
-      free.push_back(free_of(each));
-      which[at(each)] = false;
-    }
-    relax_together(together, free);
-  }
-}
-
 void World::Implementation::set_rates(const std::vector<RodState>& rods) {
   std::vector<bool> is_told(at(model.edge_count), false);
   for (const RodState& rod : rods) {
@@ -297,42 +275,8 @@ void World::Implementation::set_rates(const std::vector<RodState>& rods) {
       for (Eigen::Index e = 0; e < rod.spins.size(); ++e)
         state.v(model.edge_dof[at(first + static_cast<int>(e))]) = rod.spins(e);
   }
-  turn_frames(is_told);
+  turn_frames(model, is_told, state);
   forget_motion();
-}
-
-/// Frames turn as the edges at them do, on the mean; hinges as what is left of that about their axes.
-void World::Implementation::turn_frames(const std::vector<bool>& is_told) {
-  Configuration c;
-  compute_configuration(model, state, state.q, c);
-  const auto rate = [&](int e) { return angular_velocity(model, state, c, e); };
-  for (int f = 0; f < model.frame_count; ++f) {
-    bool told = false;
-    int count = 0;
-    Vector3 turn = Vector3::Zero();
-    for (const FrameStencil& half : model.half) {
-      if (half.frame != f) continue;
-      if (is_told[at(half.edge)]) told = true;
-      if (half.hinge >= 0) continue;
-      turn += rate(half.edge);
-      ++count;
-    }
-    if (!told) continue;
-    const int dof = model.frame_dof[at(f)];
-    if (count > 0) {
-      turn /= count;
-      if (model.planar())
-        state.v(dof) = turn.dot(model.plane->normal);
-      else
-        state.v.segment<3>(dof) = turn;
-    }
-    for (const FrameStencil& half : model.half)
-      if (half.frame == f && half.hinge >= 0) {
-        const Hinge& hinge = model.hinges[at(half.hinge)];
-        const Vector3 axis = frame_rotation(model, state, f) * hinge.axis;
-        state.v(hinge.dof) = axis.dot(rate(half.edge) - Vector3(state.v.segment<3>(dof)));
-      }
-  }
 }
 
 void World::Implementation::forget_motion() {

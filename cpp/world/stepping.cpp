@@ -4,6 +4,10 @@
 
 #include "common/check.hpp"
 #include "common/text.hpp"
+#include "run/drive.hpp"
+#include "run/energy_watch.hpp"
+#include "run/squeeze.hpp"
+#include "run/step_watch.hpp"
 #include "world/implementation.hpp"
 
 namespace withe {
@@ -35,7 +39,7 @@ void World::Implementation::advance(double duration) {
   mark.motions = motions;
   mark.history = *this;
   systems.mark();
-  spread_jumps(duration);
+  spread_jumps(model, state, duration, motions, obstacle_motions);
   try {
     advance_in_parts(duration);
   } catch (...) {
@@ -127,7 +131,8 @@ Verdict World::Implementation::try_step(const StepControl& control, double dt, E
     return judged;
   }
   rejected = {};
-  watch_step(dt, systems.scheme());
+  watch_step({model, options, parameters, state, systems.scheme(), dt, steps_taken}, step_watch, warnings,
+             energy_scratch);
   commit_step(part);
   const Contact* contact = watched_contact();
   const bool near_limit = 2.5 * held_turn_of(part) > 1.0 || (contact && contact->unresolved(2.0 * dt));
@@ -140,7 +145,7 @@ Verdict World::Implementation::try_step(const StepControl& control, double dt, E
 bool World::Implementation::may_take_back() const {
   const bool euler = options.adaptive && options.integrator == Integrator::backward_euler;
   return euler || watched_contact() || options.tolerance || options.integrator == Integrator::fourth_order ||
-         turns_rods();
+         turns_rods(model, motions, state.time, callbacks.prescribes);
 }
 
 /// Contact by which parts are judged; nothing where they are not.
@@ -158,7 +163,8 @@ double World::Implementation::held_turn_of(const PartResult& part) const {
 Verdict World::Implementation::judge(const StepControl& control, const PartResult& part, double dt, Excess& rejected) {
   if (!control.bears(lengths, part.error, dt)) return Verdict::inaccurate;
   Contact* contact = watched_contact();
-  const Excess now{held_turn_of(part), contact && !obstacle_motions.empty() ? farthest_obstacle(kept.state) : 0.0};
+  const Excess now{held_turn_of(part),
+                   contact && !obstacle_motions.empty() ? farthest_obstacle(kept.state, state) : 0.0};
   const bool unresolved =
       (now.turn > 1.0 && lessens(now.turn, rejected.turn)) ||
       (contact && ((contact->unresolved(dt) && lessens(now.way, rejected.way)) || contact->missed(kept.state.q)));
@@ -167,7 +173,11 @@ Verdict World::Implementation::judge(const StepControl& control, const PartResul
     return Verdict::inaccurate;
   }
   const bool euler = options.adaptive && options.integrator == Integrator::backward_euler;
-  if (!unresolved && ((euler && gains_under_pressure()) || (contact && contact_pumps(dt))))
+  if (unresolved) return Verdict::easy;
+  const bool gains =
+      euler && gains_under_pressure(model, parameters, state, systems.work.pressure.gains, energy_scratch);
+  if (gains || (contact && contact_pumps(model, parameters, *contact, kept, *this, dt, options.time_step, contact_guard,
+                                         energy_scratch)))
     return Verdict::gained_energy;
   return Verdict::easy;
 }
@@ -182,7 +192,7 @@ void World::Implementation::take_back() {
 void World::Implementation::return_to_start() {
   static_cast<Moving&>(*this) = kept;
   if (tape) tape->cut(kept.taped, state, support_poses());
-  apply_ramps(state.time);
+  apply_ramps(model, ramps, state.time, parameters);
 }
 
 /// What only steps that stay may do.
@@ -250,13 +260,13 @@ void World::Implementation::call_before_step(double force_time, double end_time)
 bool World::Implementation::inner_step(double dt, int slot, PartResult& part) {
   const double start = state.time, end = start + dt, middle = force_time(start, dt);
   call_before_step(middle, end);
-  const bool ramped = actuated();
+  const bool ramped = are_active(ramps);
   double actuation = 0.0;
-  if (ramped) apply_ramps(middle, configuration(), actuation);
-  prescribe(end, prescribed);
+  if (ramped) actuation += apply_ramps(model, ramps, middle, configuration(), parameters, energy_scratch);
+  prescribe(model, *this, *this, end, prescribed);
   Equations& system = systems.scheme();
   const auto undo = [&] {
-    if (ramped) apply_ramps(start);
+    if (ramped) apply_ramps(model, ramps, start, parameters);
   };
   if (tape) check_tape();
   StepResult r;
@@ -264,7 +274,7 @@ bool World::Implementation::inner_step(double dt, int slot, PartResult& part) {
     prescribe_custom(dt, prescribed);
     r = step_by_rule(dt, slot);
     for (int tries = 0; r.too_deep && tries < kMostStiffenings; ++tries) {
-      dissipated -= system.contact()->stiffen(state, false);
+      ledger.dissipated -= system.contact()->stiffen(state, false);
       systems.work.newton.matrix.owner = nullptr;
       r = step_by_rule(dt, slot);
     }
@@ -275,7 +285,7 @@ bool World::Implementation::inner_step(double dt, int slot, PartResult& part) {
   last_newton = r.newton;
   if (!r.accepted) {
     undo();
-    if (r.squeezed) fail_squeezed(system, r.squeezed, dt);
+    if (r.squeezed) fail_squeezed(model, system, state, r.squeezed, dt);
     return false;
   }
   for (std::size_t s = 0; s < motions.size(); ++s) motions[s].put(prescribed.supports[s]);
@@ -285,14 +295,15 @@ bool World::Implementation::inner_step(double dt, int slot, PartResult& part) {
   part.turn = std::max(part.turn, r.largest_turn);
   part.held_turn = std::max(part.held_turn, prescribed.held.turn);
   if (rule_of_step() == StepRule::energy_momentum) part.held_turn = std::max(part.held_turn, prescribed.held.spin);
-  load_work += r.load_work;
-  dissipated += r.dissipated;
-  support_work += r.support_work;
+  ledger.load_work += r.load_work;
+  ledger.dissipated += r.dissipated;
+  ledger.support_work += r.support_work;
   contact_guard.put_in = r.pressing_gain;
   keep_reactions(dt, begins);
   if (ramped) {
-    apply_ramps(end, model.planar() ? configuration() : systems.work.after, actuation);
-    actuation_work += actuation;
+    const Configuration& there = model.planar() ? configuration() : systems.work.after;
+    actuation += apply_ramps(model, ramps, end, there, parameters, energy_scratch);
+    ledger.actuation_work += actuation;
   }
   return true;
 }

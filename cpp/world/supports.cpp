@@ -6,33 +6,13 @@
 #include <Eigen/LU>
 
 #include "common/check.hpp"
-#include "geometry/rotation.hpp"
 #include "model/edge_vectors.hpp"
+#include "run/frames.hpp"
+#include "run/grips.hpp"
+#include "run/reactions.hpp"
 #include "world/implementation.hpp"
 
 namespace withe {
-/// That of a support which has just been put on, where what it holds is.
-SupportMotion World::Implementation::standing(const Support& support) const {
-  SupportMotion m;
-  m.position = node_position(model, state.q, support.node);
-  if (support.frame >= 0) {
-    m.rotation = frame_rotation(model, state, support.frame);
-  } else if (support.edge >= 0) {
-    const Configuration& c = configuration();
-    const Vector3 t = to_eigen(model.initial_tangent[at(support.edge)]),
-                  d1 = to_eigen(model.initial_director[at(support.edge)]);
-    Matrix3 drawn;
-    drawn << d1, t.cross(d1), t;
-    m.rotation = edge_directors(model, c, support.edge) * drawn.transpose();
-    const auto& x = description.positions;
-    m.stretch = c.length(support.edge) / (x.row(support.other_node) - x.row(support.node)).norm();
-  }
-  m.from_position = m.to_position = m.position;
-  m.from_rotation = m.to_rotation = m.rotation;
-  m.shift = m.turn = {state.time, state.time};
-  return m;
-}
-
 int World::add_support(const SupportDescription& support) {
   Implementation& self = *implementation_;
   const Implementation backup(self);
@@ -76,10 +56,10 @@ int World::add_support(const SupportDescription& support) {
     self.rebuild(Rebuild::running);
   }
   if (self.model.supports[at(index)].is_hand()) {
-    self.grasp(index);
+    grasp(self.model, self.configuration(), index, self.state, self.motions);
     return index;
   }
-  self.motions[at(index)] = self.standing(self.model.supports[at(index)]);
+  self.motions[at(index)] = standing(self.model, self.state, self.configuration(), self.model.supports[at(index)]);
   return index;
 }
 
@@ -89,7 +69,7 @@ void World::remove_support(int support) {
       support >= 0 && support < static_cast<int>(self.model.supports.size()) && self.model.supports[at(support)].active,
       "no such support, or it is released already: " + std::to_string(support));
   // What is stored in a hand that lets go stays with it.
-  if (self.model.supports[at(support)].yields()) self.support_work -= self.hand_energy_of(support);
+  if (self.model.supports[at(support)].yields()) self.ledger.support_work -= self.hand_energy_of(support);
   self.model.supports[at(support)].active = false;
   self.rebuild(Rebuild::running);
 }
@@ -142,11 +122,11 @@ void World::Implementation::lump_held() {
   account_for_settings();
   MassMatrix mass;
   set_mass(model, parameters, mass);
-  support_work -= kinetic_energy(model, mass, state.v);
+  ledger.support_work -= kinetic_energy(model, mass, state.v);
   parameters.held_lumped = true;
   update_derived(model, parameters);
   set_mass(model, parameters, mass);
-  support_work += kinetic_energy(model, mass, state.v);
+  ledger.support_work += kinetic_energy(model, mass, state.v);
   plan_current = false;
 }
 
@@ -196,7 +176,8 @@ void World::Implementation::note_residual() {
 void World::Implementation::keep_reactions(double dt, bool begins) {
   note_residual();
   note_tensions();
-  make_frame_moments();
+  if (!model.planar() && rule_of_step() != StepRule::energy_momentum)
+    make_frame_moments(model, prescribed.held.q, conserving() ? 0.5 : 1.0, *this);
   if (begins) {
     impulses.clear();
     impulse_time = 0.0;
@@ -210,45 +191,10 @@ void World::Implementation::keep_reactions(double dt, bool begins) {
   systems.scheme().assembler().set_held_part(reaction_residual, held);
   for (std::size_t s = 0; s < model.supports.size(); ++s) {
     if (!model.supports[s].active) continue;
-    const Wrench found = reaction_of(static_cast<int>(s), held);
+    const Wrench found = reaction_of(model, *this, static_cast<int>(s), held);
     impulses[s].force += dt * found.force;
     impulses[s].moment += dt * found.moment;
   }
-}
-
-/// The residual of a frame's unknowns is J(w)^T moment, w its turn where the forces act; of an energy-momentum step,
-/// the moment.
-void World::Implementation::make_frame_moments() {
-  if (model.planar() || rule_of_step() == StepRule::energy_momentum) return;
-  for (const Support& support : model.supports) {
-    if (!support.active || support.frame < 0) continue;
-    const int dof = model.frame_dof[at(support.frame)];
-    const Matrix3 J = cayley_spin((conserving() ? 0.5 : 1.0) * prescribed.held.q.segment<3>(dof));
-    const Vector3 moment = reaction_residual.segment<3>(dof);
-    reaction_residual.segment<3>(dof) = J.transpose().inverse() * moment;
-  }
-}
-
-/// Of a support on the rod in the last evaluation: about its node, of a hand about the origin. `held`: its rows of what
-/// supports hold.
-Wrench World::Implementation::reaction_of(int support, const VectorX& held) const {
-  const Support& s = model.supports[at(support)];
-  if (s.is_hand()) return hand_reaction(support, held);
-  Wrench out;
-  out.force = node_vector(model, held, s.node);
-  if (s.frame >= 0) {
-    const int dof = model.frame_dof[at(s.frame)];
-    out.moment = model.planar() ? Vector3(held(dof) * model.plane->normal) : Vector3(held.segment<3>(dof));
-  }
-  if (s.other_node >= 0) {
-    const Vector3 other = node_vector(model, held, s.other_node);
-    const Vector3 arm =
-        node_position(model, reaction_place, s.other_node) - node_position(model, reaction_place, s.node);
-    out.force += other;
-    out.moment = arm.cross(other);
-    if (!model.planar()) out.moment += held(model.edge_dof[at(s.edge)]) * arm.normalized();
-  }
-  return out;
 }
 
 Reaction World::reaction(int support) const {
@@ -259,7 +205,7 @@ Reaction World::reaction(int support) const {
   self.refresh_reactions();
   Wrench found;
   if (self.impulses.empty()) {
-    found = self.reaction_of(support, self.systems.scheme().assembler().held_part(self.reaction_residual));
+    found = reaction_of(self.model, self, support, self.systems.scheme().assembler().held_part(self.reaction_residual));
   } else {
     found = self.impulses[at(support)];
     found.force /= self.impulse_time;

@@ -7,6 +7,8 @@
 #include "common/check.hpp"
 #include "common/timer.hpp"
 #include "forces/stokeslets.hpp"
+#include "run/drive.hpp"
+#include "run/frames.hpp"
 #include "steps/spring_forces.hpp"
 #include "world/implementation.hpp"
 
@@ -247,7 +249,7 @@ void World::set_contact(const ContactDescription& contact) {
       self.tape->refuse("the contact stiffness was set during the run; begin a new run at the change");
   }
   // What surfaces and anchors hold changes with the numbers that they are made of.
-  self.actuation_work += energy() - before;
+  self.ledger.actuation_work += energy() - before;
 }
 
 /// One share for each node and edge of the rod of a pair, not negative.
@@ -289,7 +291,7 @@ void World::set_friction_shares(int pair, const VectorX& shares) {
   } else {
     self.take_contact();
   }
-  self.actuation_work += energy() - before;
+  self.ledger.actuation_work += energy() - before;
 }
 
 /// As the description has it; the equations take another form only where friction comes or goes.
@@ -425,7 +427,7 @@ void World::set_natural_stretch(int rod, const VectorX& stretch, double over) {
   const ParameterSetting setting{ParameterKind::natural_stretch, rod, rows_of(stretch)};
   if (over == 0.0) return self.set({&setting, 1});
   check_setting(self.model, setting);
-  const VectorX now = self.natural_stretch(rod);
+  const VectorX now = natural_stretch(self.model, self.parameters, rod);
   const VectorX target = stretch.size() == now.size() ? stretch : VectorX(VectorX::Constant(now.size(), stretch(0)));
   self.begin_ramp(self.ramps[at(rod)].stretch, now, target, over);
 }

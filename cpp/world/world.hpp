@@ -16,22 +16,11 @@
 #include "gradients/tape.hpp"
 #include "integrators/options.hpp"
 #include "model/parameter_index.hpp"
+#include "run/energy.hpp"
+#include "run/failure.hpp"
 #include "run/warnings.hpp"
 
 namespace withe {
-
-struct Energy {  // [J]
-  double kinetic = 0, stretch = 0, bend = 0, twist = 0, gravity = 0;
-  double loads = 0;  ///< minus the work done by loads and custom forces since the start
-  double contact = 0;
-  double spring = 0;      ///< of springs, of revolute joints, and of hands that yield
-  double total = 0;       ///< sum of the above
-  double work = 0;        ///< done by supports and actuation since the start
-  double dissipated = 0;  ///< by viscosity, drag, dampers, fluids and contact since the start
-
-  /// Stored in what is deformed, but for contact.
-  double elastic() const { return stretch + bend + twist + spring; }
-};
 
 struct Statistics {
   long steps = 0;  ///< inner steps accepted
@@ -162,16 +151,6 @@ struct RodState {
   VectorX twists;       ///< per stencil [rad/m]: which of the angles that fit the directors; given where they are
   MatrixX3 velocities;  ///< per node [m/s]
   VectorX spins;        ///< per edge, angular velocity about the tangent [rad/s]
-};
-
-/// Non-convergence below the smallest step. Becomes withe.ConvergenceError.
-class ConvergenceFailure : public std::runtime_error {
- public:
-  ConvergenceFailure(const std::string& message, double time, double step, int rod, int node, double residual)
-      : std::runtime_error(message), time(time), step(step), rod(rod), node(node), residual(residual) {}
-  double time, step;  ///< [s]
-  int rod, node;      ///< where the residual is greatest; -1: not known
-  double residual;    ///< [N]
 };
 
 class World {

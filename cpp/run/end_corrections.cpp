@@ -1,9 +1,10 @@
-/// End corrections of bending that are given up while a scene runs, see `UncorrectedEnd`.
+#include "run/end_corrections.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-#include "world/implementation.hpp"
+#include "model/edge_vectors.hpp"
+#include "run/transfer.hpp"
 
 namespace withe {
 namespace {
@@ -24,12 +25,9 @@ Vector3 in_space(const Model& model, int edge, const Vector3& strain) {
 
 }  // namespace
 
-/// With the strains as they are, moments would jump by up to a sixth. Rest strains keep them: n' = s - f K (s - n) /
-/// K', where f, which is 1 but for the change of the moment over an edge, keeps the energy. They are of first order in
-/// the edge's length to either side of it, together of second.
-void World::Implementation::keep_moments(const Model& old, const ElasticCoefficients& before) {
+void keep_moments(const Model& old, const ElasticCoefficients& before, const Configuration& c, Model& model,
+                  Parameters& parameters) {
   std::vector<UncorrectedEnd>& ends = model.description.uncorrected_ends;
-  const Configuration& c = configuration();
   std::vector<Changed> changed;
   const auto add = [&](std::size_t end, bool at_frame, Eigen::Index row, Eigen::Index row_before) {
     const Vector3 s = measured(parameters.measure, (at_frame ? c.half_strain : c.bend_strain).row(row)),

@@ -1,4 +1,4 @@
-#include "world/crossings.hpp"
+#include "run/crossings.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,6 @@
 #include "common/text.hpp"
 #include "geometry/segment_distance.hpp"
 #include "model/edge_vectors.hpp"
-#include "world/implementation.hpp"
 
 namespace withe {
 namespace {
@@ -120,27 +119,6 @@ bool CrossingWatch::come_near(const Model& model, int a, int b, double share) co
   for (int k = 1; k < looks; ++k)
     if (distance(static_cast<double>(k) / looks) < wanted) return true;
   return false;
-}
-
-void World::Implementation::begin_crossing_watch() {
-  if (!description.contact.warns_of_crossings || description.rods.size() < 2 ||
-      warnings.has_reported(Warning::crossing))
-    return;
-  if (!crossing_watch) crossing_watch = std::make_unique<CrossingWatch>(model);
-  crossing_watch->begin(model, state.q);
-}
-
-void World::Implementation::check_crossings() {
-  if (!crossing_watch || warnings.has_reported(Warning::crossing)) return;
-  const auto [a, b] = crossing_watch->find(model, state.q);
-  if (a < 0) return;
-  const auto rod = [&](int edge) { return "'" + description.rods[at(model.edge_rod[at(edge)])].name + "'"; };
-  const auto edge = [&](int e) { return std::to_string(e - model.rod_first_edge[at(model.edge_rod[at(e)])]); };
-  warnings.report(Warning::crossing, "Rods " + rod(a) + " and " + rod(b) + " pass through each other, with edge " +
-                                         edge(a) + " and edge " + edge(b) + " (time " + text(state.time, 6) +
-                                         " s). Call scene.enable_contact() before scene.build(), or "
-                                         "scene.enable_contact(rods=False) if rods may pass through each other.");
-  crossing_watch.reset();
 }
 
 }  // namespace withe

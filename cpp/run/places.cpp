@@ -1,12 +1,14 @@
+#include "run/places.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <utility>
+#include <vector>
 
 #include <Eigen/Geometry>
 
 #include "common/text.hpp"
-#include "world/implementation.hpp"
+#include "model/edge_vectors.hpp"
 
 namespace withe {
 namespace {
@@ -23,8 +25,7 @@ constexpr double kMismatch = 1e6;
 
 }  // namespace
 
-/// Rod and node of a row of the residual, and how to say it; -1 and nothing where it is not known.
-World::Implementation::Place World::Implementation::place_of(int row) const {
+Place place_of(const Model& model, int row) {
   if (row < 0) return {};
   const auto holds = [&](int first, int count) { return first <= row && row < first + count; };
   int node = -1;
@@ -36,23 +37,22 @@ World::Implementation::Place World::Implementation::place_of(int row) const {
     if (holds(hinge.dof, 1)) node = model.frame_node[at(hinge.frame)];
   for (std::size_t e = 0; e < model.edge_dof.size(); ++e)
     if (holds(model.edge_dof[e], 1)) node = model.edge_tail[e];
-  return place_of_node(node);
+  return place_of_node(model, node);
 }
 
-World::Implementation::Place World::Implementation::place_of_node(int node) const {
-  for (std::size_t k = 0; k < description.rods.size(); ++k) {
-    const auto& nodes = description.rods[k].nodes;
+Place place_of_node(const Model& model, int node) {
+  const std::vector<RodDescription>& rods = model.description.rods;
+  for (std::size_t k = 0; k < rods.size(); ++k) {
+    const auto& nodes = rods[k].nodes;
     const auto found = std::find(nodes.begin(), nodes.end(), node);
     if (found == nodes.end()) continue;
     const int place = static_cast<int>(found - nodes.begin());
-    return {static_cast<int>(k), place,
-            " at node " + std::to_string(place) + " of rod '" + description.rods[k].name + "'"};
+    return {static_cast<int>(k), place, " at node " + std::to_string(place) + " of rod '" + rods[k].name + "'"};
   }
   return {};
 }
 
-/// Says so where an edge is crushed; nothing elsewhere.
-std::string World::Implementation::crushed() const {
+std::string crushed_edge(const Model& model, const State& state) {
   int shortest = -1;
   double least = kCrushed;
   for (int e = 0; e < model.edge_count; ++e) {
@@ -64,13 +64,13 @@ std::string World::Implementation::crushed() const {
   }
   if (shortest < 0) return "";
   return "; an edge is crushed to " + text(least, 2) + " of its length" +
-         place_of_node(model.edge_tail[at(shortest)]).words +
+         place_of_node(model, model.edge_tail[at(shortest)]).words +
          ", for example by a force above E A / 2 or an impact faster than sound in the "
          "rod, sqrt(E / density)";
 }
 
-/// Says so where an edge turns or twists too much against the next; nothing elsewhere.
-std::string World::Implementation::unresolved() const {
+std::string unresolved_mesh(const Model& model, const Parameters& parameters, const State& state,
+                            const Configuration& c) {
   int node = -1;
   double greatest = kSharp;
   const char* how = "";
@@ -80,7 +80,6 @@ std::string World::Implementation::unresolved() const {
     node = where;
     how = does;
   };
-  const Configuration& c = configuration();
   const auto see_twist = [&](double tau, const auto& kappa, double natural, int where) {
     const double x = kappa(0) * kappa(0) + kappa(1) * kappa(1);
     see(bend_factor(parameters.measure, x).value * tau - natural, where, "twists");
@@ -115,38 +114,31 @@ std::string World::Implementation::unresolved() const {
   }
   if (node < 0) return "";
   return std::string("an edge ") + how + " by " + text(greatest * 180.0 / std::numbers::pi, 3) +
-         " degrees against the next," + place_of_node(node).words + " (time " + text(state.time, 6) +
+         " degrees against the next," + place_of_node(model, node).words + " (time " + text(state.time, 6) +
          " s): the mesh is too coarse for the motion, so that bending and twisting are "
          "not accurate. Use more nodes";
 }
 
-/// Warns once.
-void World::Implementation::check_resolution() {
-  if (!warnings.has_reported(Warning::mesh)) warnings.report(Warning::mesh, unresolved());
-}
-
-Warnings World::take_warnings() { return implementation_->warnings.take(); }
-
-/// What may help where steps do not converge, by what is the matter; one sentence.
-std::string World::Implementation::what_to_try() const {
+std::string what_to_try(const Model& model, const Options& options, const Parameters& parameters, const State& state,
+                        const Configuration& c, bool frictional) {
   if (options.integrator == Integrator::verlet)
     return "Try a smaller time_step, or an implicit integrator, which takes longer ones";
-  if (!unresolved().empty()) return "Try more nodes there, or a gentler load or motion";
-  if (!crushed().empty()) return "Try a smaller load, a slower motion, or a rod that stretches less easily";
+  if (!unresolved_mesh(model, parameters, state, c).empty()) return "Try more nodes there, or a gentler load or motion";
+  if (!crushed_edge(model, state).empty())
+    return "Try a smaller load, a slower motion, or a rod that stretches less easily";
   if (!options.adaptive && !options.tolerance) return "Try adaptive=True, or a smaller time_step";
   const VectorX& stretch = parameters.edge_stretch;
   Eigen::Index soft = 0, stiff = 0;
   const double least = stretch.minCoeff(&soft), greatest = stretch.maxCoeff(&stiff);
   if (greatest > kMismatch * least)
     return "Try more similar stiffnesses: the stretching stiffnesses of rods '" +
-           description.rods[at(model.edge_rod[at(static_cast<int>(soft))])].name + "' and '" +
-           description.rods[at(model.edge_rod[at(static_cast<int>(stiff))])].name + "' differ by " +
+           model.description.rods[at(model.edge_rod[at(static_cast<int>(soft))])].name + "' and '" +
+           model.description.rods[at(model.edge_rod[at(static_cast<int>(stiff))])].name + "' differ by " +
            text(greatest / least, 2) + " times";
   if (options.integrator == Integrator::statics)
     return "Try a smaller change of load or motion per step, or "
            "integrator='backward_euler' with viscosity, which comes to rest after a jump";
-  if (systems.scheme().contact() && systems.scheme().contact()->frictional())
-    return "Try a smaller time_step, or a greater slip_tolerance of enable_contact";
+  if (frictional) return "Try a smaller time_step, or a greater slip_tolerance of enable_contact";
   if (options.integrator == Integrator::implicit_midpoint)
     return "Try integrator='energy_momentum', which conserves energy at any time_step, or "
            "'backward_euler', which damps motion that is too fast for the step";
@@ -154,16 +146,6 @@ std::string World::Implementation::what_to_try() const {
     return "Try a smaller time_step, viscosity of the material, or "
            "integrator='backward_euler', which damps motion that is too fast for the step";
   return "Try a smaller time_step, or more max_halvings";
-}
-
-void World::Implementation::fail(const NewtonResult& r, double dt, const std::string& what,
-                                 const std::string& hint) const {
-  const Place place = place_of(r.worst_row);
-  throw ConvergenceFailure(what + " (time " + text(state.time, 6) + " s" +
-                               (dt > 0.0 ? ", step " + text(dt) + " s" : "") + ", residual " + text(r.residual) + " N" +
-                               place.words + ")" + crushed() + "; the simulation keeps its last accepted state. " +
-                               (hint.empty() ? what_to_try() : hint),
-                           state.time, dt, place.rod, place.node, r.residual);
 }
 
 }  // namespace withe

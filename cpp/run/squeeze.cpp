@@ -1,31 +1,21 @@
-/// What is pressed by what does not yield ends in an error that names it.
-
-#include "integrators/squeezed.hpp"
+#include "run/squeeze.hpp"
 
 #include <algorithm>
 #include <numbers>
 
 #include "common/text.hpp"
-#include "world/implementation.hpp"
+#include "run/failure.hpp"
+#include "run/places.hpp"
 
 namespace withe {
 
-/// Refuses a place of supports in which what they hold is inside something that does not yield either. `q`: where they
-/// shall be, and all else as it is.
-void World::Implementation::check_squeezed(Equations& system, const Prescribed& given, const VectorX& q, double dt) {
-  if (!system.contact()) return;
-  system.begin(state, parameters, StepRule::statics, 0.0, given);
-  system.contact()->update(q);
-  if (const Squeezed found = squeezed_contact(system, systems.work.change, systems.work.mean))
-    fail_squeezed(system, found, dt);
-}
-
-/// Warns once of two obstacles that press on both sides of a rod with a stiffness of contact that nobody has given.
-void World::Implementation::check_squeeze() {
-  const Contact* contact = systems.scheme().contact();
-  if (contact == nullptr || warnings.has_reported(Warning::squeeze) || description.contact.obstacles.size() < 2) return;
-  const Squeezed found = opposite_contacts(systems.scheme(), systems.work.change, systems.work.mean);
-  if (!found) return;
+std::string squeeze_warning(const Model& model, const Parameters& parameters, const Equations& system,
+                            const State& state, StepWorkspace& work) {
+  const SceneDescription& description = model.description;
+  const Contact* contact = system.contact();
+  if (!contact || description.contact.obstacles.size() < 2) return "";
+  const Squeezed found = opposite_contacts(system, work.change, work.mean);
+  if (!found) return "";
   const Touching &a = contact->contacts()[found.contact], &b = contact->contacts()[found.against];
   const auto other = [&](const Touching& t) {
     return t.pair.key.b < 0 ? "'" + description.contact.obstacles[at(-1 - t.pair.key.b)].name + "'"
@@ -34,17 +24,18 @@ void World::Implementation::check_squeeze() {
   const int edge = a.pair.key.a;
   const double radius = contact->surfaces().radius(edge);
   const double modulus = parameters.edge_stretch(edge) / (std::numbers::pi * radius * radius);
-  warnings.report(Warning::squeeze, "Rod '" + description.rods[at(model.edge_rod[at(edge)])].name +
-                                        "' is squeezed between " + other(a) + " and " + other(b) + " (time " +
-                                        text(state.time, 6) +
-                                        " s). Both are rigid, so the force depends on the contact stiffness, which was "
-                                        "not given. Use stiffness= of scene.enable_contact: half of Young's modulus "
-                                        "times the edge length is " +
-                                        text(0.5 * modulus * model.edge_arc(edge), 2) +
-                                        " N/m here. Or press with a part that yields, such as a hand with stiffness=.");
+  return "Rod '" + description.rods[at(model.edge_rod[at(edge)])].name + "' is squeezed between " + other(a) + " and " +
+         other(b) + " (time " + text(state.time, 6) +
+         " s). Both are rigid, so the force depends on the contact stiffness, which was "
+         "not given. Use stiffness= of scene.enable_contact: half of Young's modulus "
+         "times the edge length is " +
+         text(0.5 * modulus * model.edge_arc(edge), 2) +
+         " N/m here. Or press with a part that yields, such as a hand with stiffness=.";
 }
 
-void World::Implementation::fail_squeezed(const Equations& system, const Squeezed& squeezed, double dt) const {
+void fail_squeezed(const Model& model, const Equations& system, const State& state, const Squeezed& squeezed,
+                   double dt) {
+  const SceneDescription& description = model.description;
   const ContactSet& set = system.contact()->contacts();
   const Touching& t = set[squeezed.contact];
   const double depth = t.pair.radii() - t.proximity.distance;
@@ -53,7 +44,7 @@ void World::Implementation::fail_squeezed(const Equations& system, const Squeeze
     return key.b < 0 ? "'" + description.contact.obstacles[at(-1 - key.b)].name + "'" : rod_of(key.b);
   };
   const int node = model.edge_tail[at(t.pair.key.a)];
-  const Place place = place_of_node(t.proximity.points.s > 0.5 ? model.edge_head[at(t.pair.key.a)] : node);
+  const Place place = place_of_node(model, t.proximity.points.s > 0.5 ? model.edge_head[at(t.pair.key.a)] : node);
   const auto share = [&](double length) { return text(100.0 * length / t.pair.small_radius(), 2); };
   const std::string when = place.words + " (time " + text(state.time, 6) + " s, step " + text(dt) + " s)";
   std::string what = rod_of(t.pair.key.a);

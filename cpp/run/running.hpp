@@ -9,8 +9,8 @@
 
 #include "integrators/dynamics.hpp"
 #include "model/actuation.hpp"
+#include "run/energy.hpp"
 #include "run/step_control.hpp"
-#include "world/world.hpp"
 
 namespace withe {
 
@@ -113,7 +113,7 @@ struct Moving {
   State state;
   Predictor predictor;
   std::vector<SupportMotion> motions;
-  double support_work = 0, actuation_work = 0, dissipated = 0, load_work = 0;  ///< [J]
+  Ledger ledger;
   /// Of supports, in the parts of a time step so far, [N s] and [N m s], and how long those are [s]: per support, as
   /// `reaction_of` has them. None: the last time step had one part.
   std::vector<Wrench> impulses;

@@ -1,0 +1,124 @@
+#include "run/drive.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "common/check.hpp"
+#include "run/hold.hpp"
+
+namespace withe {
+
+Eigen::VectorBlock<VectorX> natural_stretch(const Model& model, Parameters& parameters, int rod) {
+  const int first = model.rod_first_edge[at(rod)];
+  return parameters.edge_natural_stretch.segment(first, model.rod_first_edge[at(rod) + 1] - first);
+}
+
+bool are_active(const std::vector<NaturalRamp>& ramps) {
+  for (const NaturalRamp& ramp : ramps)
+    if (ramp.curvature.active || ramp.twist.active || ramp.stretch.active) return true;
+  return false;
+}
+
+void apply_ramps(const Model& model, const std::vector<NaturalRamp>& ramps, double time, Parameters& parameters) {
+  for (std::size_t r = 0; r < ramps.size(); ++r) {
+    const bool bent = ramps[r].curvature.apply(time, parameters.natural_curvature[r]),
+               twisted = ramps[r].twist.apply(time, parameters.natural_twist[r]),
+               stretched = ramps[r].stretch.apply(time, natural_stretch(model, parameters, static_cast<int>(r)));
+    if (bent || twisted || stretched) update_natural(model, parameters, static_cast<int>(r));
+  }
+}
+
+double apply_ramps(const Model& model, const std::vector<NaturalRamp>& ramps, double time, const Configuration& c,
+                   Parameters& parameters, EnergyScratch& scratch) {
+  EnergyCoefficients& before = scratch.coefficients;
+  before.set(model, parameters);
+  apply_ramps(model, ramps, time, parameters);
+  return natural_change_energy(model, before.elastic, parameters, c);
+}
+
+ObstacleWay obstacle_way(const Model& model, const State& state, int obstacle) {
+  return way_from_drawn(model, model.description.contact.obstacles[at(obstacle)], state.obstacles[at(obstacle)]);
+}
+
+double farthest_obstacle(const State& from, const State& to) {
+  double square = 0.0;
+  for (std::size_t o = 0; o < to.obstacles.size(); ++o) {
+    const Vec3d way = to.obstacles[o].point - from.obstacles[o].point;
+    square = std::max(square, dot(way, way));
+  }
+  return std::sqrt(square);
+}
+
+void spread_jumps(const Model& model, const State& state, double duration, std::vector<SupportMotion>& motions,
+                  std::vector<ObstacleMotion>& obstacle_motions) {
+  const Span step{state.time, state.time + duration};
+  for (SupportMotion& m : motions) {
+    if (m.jumps()) {
+      m.from_position = m.position;
+      m.shift = step;
+    }
+    if (m.turn.start == m.turn.end && m.rotation != m.to_rotation) {
+      m.from_rotation = m.rotation;
+      m.turn = step;
+    }
+  }
+  // One that has come there already, in an equilibrium say, is not where it set out from.
+  const auto jumps = [&](const Span& way, const Vector3& now, const Vector3& from, const Vector3& to) {
+    return way.start == way.end && way.end == state.time && (now - from).norm() < 0.5 * (to - from).norm();
+  };
+  for (std::size_t o = 0; o < obstacle_motions.size(); ++o) {
+    ObstacleMotion& m = obstacle_motions[o];
+    const ObstacleWay now = obstacle_way(model, state, static_cast<int>(o));
+    if (jumps(m.shift, now.shift, m.from.shift, m.to.shift)) m.shift = step;
+    if (jumps(m.turn, now.turn, m.from.turn, m.to.turn)) m.turn = step;
+  }
+}
+
+bool turns_rods(const Model& model, const std::vector<SupportMotion>& motions, double time, bool prescribes) {
+  if (model.planar()) return false;
+  for (std::size_t s = 0; s < model.supports.size(); ++s) {
+    const Support& support = model.supports[s];
+    const SupportMotion& motion = motions[s];
+    if (support.active && (support.frame >= 0 || !support.edges.empty()) && (prescribes || time < motion.turn.end))
+      return true;
+  }
+  return false;
+}
+
+void prescribe(const Model& model, const Settings& settings, const Moving& now, double time, Prescribed& out) {
+  out.supports.clear();
+  for (const SupportMotion& motion : now.motions) out.supports.push_back(motion.pose_at(time));
+  hold(model, now, out.supports, out.held);
+  out.obstacles.clear();
+  if (!settings.obstacle_motions.empty())
+    for (const ObstacleDescription& drawn : model.description.contact.obstacles)
+      out.obstacles.push_back(obstacle_place(model, drawn, settings.obstacle_motions[out.obstacles.size()].at(time)));
+  out.custom = {};
+  out.respond = nullptr;
+}
+
+void check_custom_forces(const Model& model, const CustomForces& now) {
+  const SceneDescription& description = model.description;
+  const auto check = [&](const MatrixX3& table, const std::string& what) {
+    require(table.rows() == model.node_count, what + " must have one row a node, " + std::to_string(model.node_count) +
+                                                  ", got " + std::to_string(table.rows()));
+    require(table.allFinite(), what + " must be finite");
+  };
+  check(now.forces, "custom force");
+  if (description.custom_moments) check(now.moments, "custom moment");
+  if (model.planar()) {
+    const Vector3& n = model.plane->normal;
+    const double off = description.custom_moments ? (now.moments - now.moments * n * n.transpose()).norm() : 0.0;
+    require((now.forces * n).norm() <= 1e-8 * now.forces.norm() && off <= 1e-8 * now.moments.norm(),
+            "a custom force leaves the plane of the scene: build the scene with "
+            "planar=False");
+  }
+  const Eigen::Index columns = 3 * model.node_count, rows = (description.custom_moments ? 2 : 1) * columns;
+  for (const SparseMatrix* m : {&now.by_position, &now.by_velocity})
+    require(m->size() == 0 || (m->rows() == rows && m->cols() == columns), "derivatives of a custom force must have " +
+                                                                               std::to_string(rows) + " rows and " +
+                                                                               std::to_string(columns) + " columns");
+}
+
+}  // namespace withe

@@ -1,0 +1,16 @@
+#pragma once
+/// Unknowns that supports hold at given poses.
+
+#include <vector>
+
+#include "run/running.hpp"
+
+namespace withe {
+
+/// Puts a node in space into a configuration vector.
+void put_node(const Model& model, int node, const Vector3& position, VectorX& q);
+
+/// Finds the held unknowns where supports have given poses.
+void hold(const Model& model, const Moving& now, const std::vector<SupportPose>& supports, HeldTarget& target);
+
+}  // namespace withe
