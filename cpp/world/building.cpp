@@ -8,10 +8,11 @@
 #include "forces/tendon.hpp"
 #include "geometry/rotation.hpp"
 #include "model/edge_vectors.hpp"
+#include "run/checks.hpp"
 #include "run/end_corrections.hpp"
 #include "run/frames.hpp"
 #include "run/grips.hpp"
-#include "run/step_watch.hpp"
+#include "run/separation.hpp"
 #include "run/transfer.hpp"
 #include "world/implementation.hpp"
 
@@ -30,14 +31,15 @@ World::Implementation::Implementation(SceneDescription scene, Options choice)
     : description(described_for(std::move(scene), choice)), drawn_contact(description.contact), options(choice) {
   require(options.time_step > 0.0 && std::isfinite(options.time_step), "time_step must be positive and finite");
   rebuild(Rebuild::first);
-  check_reversible(parameters);
-  if (description.contact.overlap == Overlap::separate) separate();
-  check_overlap();
+  check_reversible(model, options, parameters);
+  if (description.contact.overlap == Overlap::separate && contact())
+    separated = separate(model, parameters, options, state);
+  check_overlap(model, parameters, state, contact());
   if (options.integrator == Integrator::verlet) {
-    plan.stable_step = stable_step(systems.scheme(), parameters, at_rest(), state, systems.work);
-    require(options.time_step <= plan.stable_step,
-            "time_step must not exceed the stable step of the explicit scheme, " + text(plan.stable_step) + " s, got " +
-                text(options.time_step) + " s");
+    stable_explicit_step = stable_step(systems.scheme(), parameters, at_rest(), state, systems.work);
+    require(options.time_step <= stable_explicit_step,
+            "time_step must not exceed the stable step of the explicit scheme, " + text(stable_explicit_step) +
+                " s, got " + text(options.time_step) + " s");
   }
 }
 
@@ -51,11 +53,10 @@ World::Implementation::Implementation(const Implementation& other, Unbuilt /*unu
       drawn_contact(other.drawn_contact),
       options(other.options),
       model(other.model),
-      plan(other.plan),
-      plan_current(other.plan_current),
       plane_left_by(other.plane_left_by),
       statistics(other.statistics),
       separated(other.separated),
+      stable_explicit_step(other.stable_explicit_step),
       spatial(other.spatial),
       warnings(other.warnings) {
   systems.work.newton.counters = other.systems.work.newton.counters;
@@ -183,7 +184,7 @@ void World::Implementation::rebuild(Rebuild why) {
   if (why == Rebuild::running) ledger.support_work += elastic_energy(model, parameters, state, energy_scratch) - stored;
   if (Contact* contact = systems.scheme().contact()) contact->initialise(state, parameters);
   reaction_current = false;
-  make_plan();
+  plan_current = false;
 }
 
 void World::Implementation::remake_equations() {
@@ -193,104 +194,14 @@ void World::Implementation::remake_equations() {
   systems.forget_matrix();
   reaction_current = false;
   state.acceleration_current = false;
-  make_plan();
+  plan_current = false;
 }
-
-namespace {}  // namespace
 
 void World::Implementation::leave_plane(const std::string& why) {
   require(!options.planar.value_or(false), why + " leaves the plane of the scene: build the scene with planar=False");
   spatial = true;
   plane_left_by = why;
   rebuild(Rebuild::running);
-}
-
-void World::Implementation::add_contact_notes() {
-  const ContactDescription& contact = description.contact;
-  if (!contact.any()) {
-    plan.notes.emplace_back("no contact: no broad phase");
-    return;
-  }
-  if (!contact.obstacles.empty())
-    plan.notes.push_back(std::to_string(contact.obstacles.size()) +
-                         " obstacle(s): their terms stay between neighbouring nodes");
-  plan.notes.push_back(contact.rods ? "rods touch each other: they are coupled only where they are near"
-                                    : "rods do not touch each other: no broad phase");
-  if (contact.rods) add_coarse_notes();
-  if (separated > 0.0)
-    plan.notes.push_back("rods that overlapped as drawn were moved apart, by up to " + std::to_string(separated) +
-                         " m: they are stressed there");
-  if (!systems.scheme().contact()->frictional()) plan.notes.emplace_back("no friction: contact stays symmetric");
-  if (options.integrator == Integrator::verlet && systems.scheme().contact()->regularises())
-    plan.notes.emplace_back(
-        "static friction limits explicit steps to about slip_tolerance / (7.5 mu) "
-        "times the mass of a node over its contact force, which is unknown before the "
-        "run");
-}
-
-/// Warns of rods whose edges are longer than they are thick: to contact they are chains of straight pieces.
-void World::Implementation::add_coarse_notes() {
-  for (std::size_t r = 0; r < description.rods.size(); ++r) {
-    const VectorX& radius = description.rods[r].contact_radius;
-    if (radius.size() == 0 || !(radius.minCoeff() > 0.0)) continue;
-    const int first = model.rod_first_edge[r];
-    const double ratio = (model.edge_length.segment(first, radius.size()).array() / (2.0 * radius.array())).maxCoeff();
-    if (ratio <= 1.0 + 1e-9) continue;
-    plan.notes.push_back("warning: edges of rod '" + description.rods[r].name + "' are " + text(ratio) +
-                         " times as long as the rod is thick, and touch as straight pieces: more nodes "
-                         "make contact smooth");
-  }
-}
-
-std::string World::Implementation::fluid_note() const {
-  switch (description.fluid.model) {
-    case FluidModel::resistive:
-      return "fluid: resistive-force theory, implicit; rods do not interact through the "
-             "fluid";
-    case FluidModel::stokeslets:
-      return "fluid: regularized Stokeslet segments couple all " + std::to_string(model.node_count) +
-             " nodes, once a step by conjugate gradients; the matrix of the steps does not "
-             "change";
-    case FluidModel::none:
-      break;
-  }
-  return "no fluid: its terms are left out";
-}
-
-void World::Implementation::make_plan() {
-  plan_current = true;
-  const double stable = plan.stable_step;
-  plan = Plan{};
-  plan.stable_step = stable;
-  plan.planar = model.planar();
-  plan.unknowns = model.dof_count;
-  plan.solver =
-      options.integrator == Integrator::verlet ? "none (explicit)" : systems.scheme().assembler().solver().name();
-  auto& notes = plan.notes;
-  if (model.planar()) {
-    plan.plane_normal = model.plane->normal;
-    notes.push_back(
-        "planar: 2 unknowns a node, no twist; a scene that could buckle out of its "
-        "plane stays in its plane (build(planar=False) to force 3D)");
-  } else {
-    notes.push_back("3D: " + (options.planar.has_value() && !*options.planar ? std::string("planar=False")
-                              : spatial                                      ? std::string("the scene left its plane")
-                                                                             : model.plane_reason));
-  }
-  if (!plane_left_by.empty()) notes.push_back("left the plane while running: " + plane_left_by);
-  for (const std::string& reason : systems.scheme().asymmetries()) notes.push_back("unsymmetric Jacobian: " + reason);
-  if (parameters.held_lumped)
-    notes.emplace_back(
-        "fourth order, and a support has moved: the mass of edges that supports hold sits at their nodes");
-  if (!parameters.dragged) notes.push_back("no drag: its terms are left out");
-  notes.push_back(fluid_note());
-  if (!parameters.viscous) notes.push_back("no viscosity: its terms are left out");
-  for (const std::string& note : systems.scheme().notes()) notes.push_back(note);
-  if (description.loads.empty()) notes.push_back("no loads but gravity");
-  add_contact_notes();
-  for (const std::string& note : step_notes(model, options, parameters)) notes.push_back(note);
-  notes.push_back("kernels: " + std::string(name_of(instruction_set())) +
-                  (instruction_set() == InstructionSet::baseline ? ", 2 numbers at once" : ", 4 numbers at once"));
 }
 
 }  // namespace withe

@@ -3,21 +3,15 @@
 #include "common/check.hpp"
 #include "common/text.hpp"
 #include "common/timer.hpp"
-#include "geometry/rotation.hpp"
 #include "integrators/arc_length.hpp"
 #include "integrators/stiffness_signs.hpp"
 #include "run/drive.hpp"
-#include "run/hold.hpp"
+#include "run/rest.hpp"
 #include "run/transfer.hpp"
 #include "world/implementation.hpp"
 
 namespace withe {
 namespace {
-
-// Times that an equilibrium is sought anew as contact becomes stiffer.
-constexpr int kMostStiffenings = 8;
-// Over what forces wanted of stiffness, what they may want where stiffer contact relieves surfaces.
-constexpr double kRelieved = 0.9;
 
 constexpr const char* kSideways =
     "the equilibrium is not stable against motions out of its plane: in space the "
@@ -32,64 +26,6 @@ constexpr const char* kNotInSpace =
 
 }  // namespace
 
-namespace {
-
-// A frame may turn by so much from the present state to the next on a path [rad]: rotations do not tell more than half
-// a turn from less.
-constexpr double kMostTurn = 2.5;
-
-/// Rotation vector of the turn of a support from one place to another that is left beside its roll.
-Vector3 swing_between(const SupportMotion& from, const SupportMotion& to) {
-  return rotation_log(to.rotation * rotation_exp(-to.roll) * from.rotation.transpose());
-}
-
-/// Places between two of each support, or beyond. A rotation is exp(s swing) R exp(s roll).
-void find_poses_between(const std::vector<SupportMotion>& from, const std::vector<SupportMotion>& to, double fraction,
-                        std::vector<SupportPose>& out) {
-  out.resize(to.size());
-  for (std::size_t s = 0; s < to.size(); ++s) {
-    out[s].position = from[s].position + fraction * (to[s].position - from[s].position);
-    out[s].fed = from[s].fed + fraction * (to[s].fed - from[s].fed);
-    out[s].rotation =
-        rotation_exp(fraction * swing_between(from[s], to[s])) * from[s].rotation * rotation_exp(fraction * to[s].roll);
-  }
-}
-
-/// True if a hand that yields moves.
-bool hands_move(const Model& model, const std::vector<SupportMotion>& from, const std::vector<SupportMotion>& to) {
-  for (std::size_t s = 0; s < to.size(); ++s)
-    if (model.supports[s].active && model.supports[s].yields() &&
-        (from[s].position != to[s].position || from[s].rotation != to[s].rotation || to[s].roll != Vector3::Zero() ||
-         from[s].fed != to[s].fed))
-      return true;
-  return false;
-}
-
-void put(const std::vector<SupportPose>& poses, std::vector<SupportMotion>& motions) {
-  for (std::size_t s = 0; s < motions.size(); ++s) motions[s].put(poses[s]);
-}
-
-}  // namespace
-
-Boundary World::Implementation::boundary_between(Equations& system, const std::vector<SupportMotion>& from,
-                                                 const std::vector<SupportMotion>& to, Prescribed& out) const {
-  Boundary boundary{.prescribed = out};
-  boundary.hold = [this, &system, &from, &to, poses = std::vector<SupportPose>{}, there = HeldTarget{}](
-                      double present, double factor, VectorX& q) mutable {
-    find_poses_between(from, to, factor, poses);
-    hold(model, *this, poses, there);
-    for (std::size_t s = 0; s < to.size(); ++s) {
-      const double turn = to[s].roll.norm() + swing_between(from[s], to[s]).norm();
-      if (to[s].roll != Vector3::Zero() && std::abs(factor - present) * turn > kMostTurn) there.reachable = false;
-    }
-    system.assembler().add_held_change(q, there.q, 1.0, q);
-    return there.reachable;
-  };
-  if (hands_move(model, from, to))
-    boundary.move = [&from, &to, &out](double factor) { find_poses_between(from, to, factor, out.supports); };
-  return boundary;
-}
-
 /// Forgets that anything moved.
 void World::Implementation::rest() {
   state.v.setZero();
@@ -99,74 +35,6 @@ void World::Implementation::rest() {
   predictor.clear();
   systems.forget_matrix();
   systems.work.newton.finest = INFINITY;
-}
-
-/// True if nothing resists a translation along which forces do not sum to zero: no way off leads to equilibrium then.
-/// Surfaces, and custom forces with a Jacobian, may resist elsewhere.
-bool World::Implementation::drifts(Equations& system, const Prescribed& given) {
-  if (system.contact() || description.custom_implicit) return false;
-  for (const Support& s : model.supports)
-    if (s.active) return false;
-  system.begin(state, parameters, StepRule::statics, 0.0, given);
-  StepData& e = systems.work.newton.data;
-  system.evaluate(state.q, true, nullptr, e);
-  if (!e.residual.allFinite()) return false;
-  constexpr double kBalanced = 1e-6, kNeutral = 1e-12;  // over all forces there are; over the greatest stiffness
-  VectorX along(model.dof_count), pull(model.dof_count);
-  for (int axis = 0; axis < model.dimension; ++axis) {
-    along.setZero();
-    for (int dof : model.node_dof) along[dof + axis] = 1.0;
-    const double force = along.dot(e.residual), scale = along.dot(e.magnitude);
-    if (std::abs(force) <= kBalanced * scale) continue;
-    const auto size = static_cast<std::size_t>(model.dof_count);
-    system.assembler().solver().multiply({along.data(), size}, {pull.data(), size});
-    if (pull.cwiseAbs().maxCoeff() <= kNeutral * system.assembler().greatest_diagonal()) return true;
-  }
-  return false;
-}
-
-/// Has what touches press as what is yet to touch will, and, once arrived at an equilibrium, as hard as it has to
-/// without being deep; see `ContactStiffness`. Whether that is as it did.
-bool World::Implementation::even_contact(Equations& system, const Prescribed& given, bool arrived) {
-  if (!system.contact()) return true;
-  system.begin(state, parameters, StepRule::statics, 0.0, given);
-  system.contact()->update(state.q);
-  system.contact()->accept_at_rest(state, arrived);
-  return system.contact()->presses_alike();
-}
-
-/// Where contact turns out too soft in an equilibrium, and is made stiffer, balance is sought anew from where the scene
-/// has settled; and where contact is far too stiff for its forces, or surfaces are deeper in each other than forces
-/// want them, if it makes them less so: not where what presses them does not yield.
-void World::Implementation::settle_contact(Equations& system, const Boundary& boundary, Saddles saddles,
-                                           StaticResult& r) {
-  Contact& contact = *system.contact();
-  const auto again = [&] {
-    const StaticResult before = r;
-    r = find_equilibrium(system, systems.newton(), options, parameters, nullptr, boundary, saddles, state,
-                         systems.work.newton);
-    r.branch_changed = r.branch_changed || before.branch_changed;
-    r.newton.iterations += before.newton.iterations;
-  };
-  int tries = 0;
-  for (; r.converged && tries < kMostStiffenings; ++tries) {
-    if (contact.contacts().depth() > kMaxDepth)
-      contact.stiffen(state, true);
-    else if (contact.presses_alike())
-      break;
-    again();
-  }
-  for (; r.converged && tries < kMostStiffenings; ++tries) {
-    const State reached = state;
-    const StaticResult found = r;
-    const double wanted = contact.wanted_ratio();
-    if (even_contact(system, boundary.prescribed, true)) return;
-    again();
-    if (r.converged && (wanted == 1.0 || contact.wanted_ratio() < kRelieved * wanted)) continue;
-    state = reached;
-    r = found;
-    return;
-  }
 }
 
 /// Equilibrium after `dt` (0: at the present time, with supports and actuation as they are).
@@ -198,25 +66,28 @@ EquilibriumResult World::Implementation::equilibrium(double dt, Saddles saddles)
   std::vector<SupportMotion> from = motions;
   std::vector<SupportMotion> target = motions;
   put(prescribed.supports, target);
-  const Boundary boundary = boundary_between(system, from, target, prescribed);
+  const Boundary boundary = boundary_between(model, *this, system, from, target, prescribed);
+  const auto find = [&](const Actuation* before_change) {
+    return find_equilibrium(system, systems.newton(), options, parameters, before_change, boundary, saddles, state,
+                            systems.work.newton);
+  };
   rest();
   StaticResult r;
   try {
-    even_contact(system, Prescribed::nothing(), false);
+    even_contact(parameters, system, Prescribed::nothing(), false, state);
     prescribe_custom_at_rest(time, prescribed);
     VectorX reached = state.q;
     if (boundary.hold(0.0, 1.0, reached)) check_squeezed(system, prescribed, reached, dt);
-    if (drifts(system, prescribed)) {
+    if (drifts(model, parameters, state, system, prescribed, systems.work.newton.data)) {
       systems.newton().balance(systems.work.newton.data, r.newton);
       r.newton.worst_row = systems.newton().worst_row(systems.work.newton.data.residual);
     } else {
-      r = find_equilibrium(system, systems.newton(), options, parameters,
-                           actuation_changed ? &actuation_before : nullptr, boundary, saddles, state,
-                           systems.work.newton);
+      r = find(actuation_changed ? &actuation_before : nullptr);
     }
     for (SupportMotion& m : target) m.roll.setZero();
     from = target;
-    if (r.converged && system.contact()) settle_contact(system, boundary, saddles, r);
+    if (r.converged && system.contact())
+      settle_contact(system, parameters, prescribed, [&] { return find(nullptr); }, state, r);
   } catch (...) {
     undo();
     throw;
@@ -226,7 +97,8 @@ EquilibriumResult World::Implementation::equilibrium(double dt, Saddles saddles)
     hands->accept(prescribed.supports, configuration(), state);
   if (!r.converged) {
     undo();
-    fail_equilibrium(r, dt);
+    const char* softly = "Try smaller changes of loads and supports, one after the other, or time steps with viscosity";
+    fail(r.newton, dt, no_equilibrium(model, r), dt > 0.0 ? "" : softly);
   }
   EquilibriumResult found = settle(system, r, time);
   if (!release_left_rings()) {
@@ -280,26 +152,6 @@ void World::Implementation::static_step(double end, double dt) {
                                        "limit points");
 }
 
-/// Says that none was found.
-void World::Implementation::fail_equilibrium(const StaticResult& result, double dt) const {
-  const bool held =
-      std::any_of(model.supports.begin(), model.supports.end(), [](const Support& s) { return s.active; });
-  const bool lies = !description.contact.obstacles.empty(), pulled = description.custom_implicit;
-  fail(result.newton, dt,
-       std::string("no static equilibrium was found") +
-           (!held && lies     ? ", and only contact holds the scene, with friction that may be too low: clamp "
-                                "or pin a node"
-            : !held && pulled ? ", and only custom forces hold the scene: clamp or pin a node, unless the "
-                                "custom forces are meant to hold the scene"
-            : !held           ? ", and no support holds the scene: clamp or pin a node"
-            : result.restless ? ": the scene does not come to rest; loads without a potential, such as moments "
-                                "and follower forces, may drive the scene for ever"
-                              : ""),
-       dt > 0.0 ? ""
-                : "Try smaller changes of loads and supports, one after the other, or time steps "
-                  "with viscosity");
-}
-
 /// The scene is in the equilibrium that was found, at a time.
 EquilibriumResult World::Implementation::settle(Equations& system, StaticResult& r, double time) {
   state.time = time;
@@ -350,16 +202,6 @@ PathPoint path_point(const World& world, const Model& model, const ArcPoint& poi
   return {point.factor, point.stable, point.limit, world.positions(), forces, moments};
 }
 
-/// A support stays where it is.
-void stop(SupportMotion& motion, double time) {
-  motion.from_position = motion.to_position = motion.position;
-  motion.from_rotation = motion.to_rotation = motion.rotation;
-  motion.roll.setZero();
-  motion.shift = motion.turn = {time, time};
-  motion.fed_before = motion.fed;
-  motion.feeds_since = time;
-}
-
 }  // namespace
 
 EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
@@ -389,8 +231,8 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
     Prescribed& prescribed = self.prescribed;
     prescribed = {};
     self.prescribe_custom_at_rest(self.state.time, prescribed);
-    self.even_contact(system, Prescribed::nothing(), false);
-    const Boundary boundary = self.boundary_between(system, from, target, prescribed);
+    even_contact(self.parameters, system, Prescribed::nothing(), false, self.state);
+    const Boundary boundary = boundary_between(self.model, self, system, from, target, prescribed);
     self.rest();
     const ActingPath acting =
         by_loads ? scaled : growing(system, self.parameters, prescribed, self.state, self.systems.work.newton, nullptr);

@@ -8,6 +8,8 @@
 #include "gradients/state_vector.hpp"
 #include "integrators/stiffness_signs.hpp"
 #include "model/edge_vectors.hpp"
+#include "run/checks.hpp"
+#include "run/journal.hpp"
 #include "world/implementation.hpp"
 
 namespace withe {
@@ -21,29 +23,10 @@ constexpr const char* kAtLimit =
     "no gradient is available for an equilibrium in which a hand is at its "
     "force_limit, because the equilibrium depends on the path: give a greater "
     "force_limit, or run with differentiable=True";
-constexpr const char* kFriction =
-    "anchored or semi-explicit friction acts; use friction_model='implicit' or "
-    "'lagged', or friction=0";
 constexpr const char* kHeldByFriction =
     "no gradient is available for an equilibrium with friction, because the "
     "equilibrium depends on the path: use friction=0, or run with "
     "differentiable=True";
-constexpr const char* kStiffness =
-    "the contact stiffness was chosen automatically; use "
-    "enable_contact(stiffness=) with a value that is high enough";
-constexpr const char* kFrictionChanged =
-    "friction, or a coefficient of a pair of bodies, was added or removed during "
-    "the run; begin a new run at the change";
-constexpr const char* kRing = "a rod slides through a ring; use a hand without slides=True";
-constexpr const char* kRestitution = "impacts lose energy by their restitution; use restitution=1";
-
-bool known_friction(FrictionLaw law) { return law == FrictionLaw::implicit || law == FrictionLaw::lagged; }
-
-bool loses_in_impacts(const ContactDescription& contact) {
-  const auto loses = [](double restitution) { return restitution >= 0.0 && restitution < 1.0; };
-  return loses(contact.restitution) || (contact.obstacle_restitution.array() < 1.0).any() ||
-         std::any_of(contact.pairs.begin(), contact.pairs.end(), [&](const auto& p) { return loses(p.restitution); });
-}
 
 /// At random, of length 1, of what is free.
 VectorX any_motion(const Model& model, const Assembler& assembler) {
@@ -58,10 +41,10 @@ VectorX any_motion(const Model& model, const Assembler& assembler) {
 }  // namespace
 
 StepGradient& World::Implementation::begin_gradient(AtEquilibrium& at) const {
-  require(!has_rings(), std::string("no gradient of this equilibrium is available: ") + kRing);
+  require(!has_rings(model), std::string("no gradient of this equilibrium is available: ") + kRingHasNoGradient);
   StepGradient& gradient = systems.gradient();
   at.frames = state;
-  at.prescribed.supports = support_poses();
+  at.prescribed.supports = poses_of(motions);
   State& frames = at.frames;
   if (!model.planar()) {
     // Directors are measured from where they are, and so turn with their edges without a change of their angles.
@@ -75,7 +58,7 @@ StepGradient& World::Implementation::begin_gradient(AtEquilibrium& at) const {
   if (contact && contact->count() > 0) {
     require(!contact->frictional(), kHeldByFriction);
     require(contact->has_given_stiffness(state),
-            std::string("no gradient of this equilibrium is available: ") + kStiffness);
+            std::string("no gradient of this equilibrium is available: ") + kStiffnessHasNoGradient);
   }
   return gradient;
 }
@@ -140,7 +123,7 @@ MatrixX World::support_directions(int support) const {
   const Model& model = self.model;
   require(support >= 0 && at(support) < model.supports.size() && !model.supports[at(support)].yields(),
           "forward derivatives are not available with respect to the pose of a hand that yields");
-  const std::vector<SupportPose> hands = self.support_poses();
+  const std::vector<SupportPose> hands = poses_of(self.motions);
   MatrixX out = MatrixX::Zero(model.dof_count, 6);
   VectorX held = VectorX::Zero(model.dof_count);
   for (const Constraint& c : model.constraints)
@@ -187,7 +170,7 @@ VectorX World::Implementation::neutral_motion() const {
 
 EquilibriumGradient World::Implementation::equilibrium_gradient(const CoefficientAdjoint& coefficients,
                                                                 const HeldAdjoint& held) const {
-  const std::vector<SupportPose> hands = support_poses();
+  const std::vector<SupportPose> hands = poses_of(motions);
   PoseAdjoint poses = by_poses(model, state.q, held.pose, held.hands, {hands, state.hands});
   poses.obstacles = by_places(model, held.obstacles);
   return {parameter_gradient(model, parameters, coefficients), std::move(poses), by_drawing(model, state.q, held.pose)};
@@ -195,20 +178,7 @@ EquilibriumGradient World::Implementation::equilibrium_gradient(const Coefficien
 
 std::shared_ptr<Tape> World::start_tape() {
   Implementation& self = *implementation_;
-  const Contact* contact = self.systems.scheme().contact();
-  self.tape = std::make_shared<Tape>(self.model, equation_options(self.options), self.state, self.parameters,
-                                     contact && contact->frictional(), self.support_poses());
-  if (self.options.integrator == Integrator::verlet || self.options.integrator == Integrator::statics)
-    self.tape->refuse("integrator '" +
-                      std::string(self.options.integrator == Integrator::verlet ? "verlet" : "static") +
-                      "' has no gradients; use another integrator");
-  if (self.has_rings()) self.tape->refuse(kRing);
-  if (contact) {
-    if (contact->frictional() && !known_friction(self.description.contact.friction_law))
-      self.tape->refuse(kFriction);
-    else if (loses_in_impacts(self.description.contact))
-      self.tape->refuse(kRestitution);
-  }
+  self.tape = withe::start_tape(self.model, self.options, self.contact(), self, self);
   return self.tape;
 }
 
@@ -235,51 +205,10 @@ void World::displace_state(const VectorX& by) {
   fresh->callbacks = implementation_->callbacks;
   withe::displace_state(fresh->model, by, fresh->state);
   fresh->systems.forget_contacts();
-  fresh->check_overlap();
+  check_overlap(fresh->model, fresh->parameters, fresh->state, fresh->contact());
   fresh->forget_motion();
   fresh->systems.forget_matrix();
   implementation_ = std::move(fresh);
-}
-
-/// Before a step.
-void World::Implementation::check_tape() {
-  if (!tape->continues(state)) tape->refuse("the state was changed during the run; begin a new run at the change");
-  if (!tape->has_loads(parameters))
-    tape->refuse("loads were added or removed during the run; begin a new run at the change");
-}
-
-void World::Implementation::record_step(StepRule rule, double dt, bool begins) {
-  const char* unknown = nullptr;
-  if (const Contact* contact = systems.scheme().contact()) {
-    if (contact->frictional() && !known_friction(description.contact.friction_law))
-      unknown = kFriction;
-    else if (loses_in_impacts(description.contact))
-      unknown = kRestitution;
-    else if (!tape->has_friction(description.contact, contact->frictional()))
-      unknown = kFrictionChanged;
-    else if (!contact->has_given_stiffness(state))
-      unknown = kStiffness;
-  }
-  tape->record({rule, dt, systems.work.move, state, parameters, reached(), support_poses(), begins, unknown,
-                tensions_in_middle()});
-}
-
-Reached World::Implementation::reached() const {
-  Reached out;
-  const auto moves = [&](const auto& m) { return state.time < std::max(m.shift.end, m.turn.end); };
-  if (std::any_of(motions.begin(), motions.end(), moves)) {
-    out.supports.resize(static_cast<Eigen::Index>(motions.size()), 2);
-    for (Eigen::Index s = 0; s < out.supports.rows(); ++s) {
-      const SupportMotion& m = motions[static_cast<std::size_t>(s)];
-      out.supports.row(s) << m.shift.fraction(state.time), m.turn.fraction(state.time);
-    }
-  }
-  if (std::any_of(obstacle_motions.begin(), obstacle_motions.end(), moves)) {
-    out.obstacles.resize(static_cast<Eigen::Index>(obstacle_motions.size()));
-    for (Eigen::Index o = 0; o < out.obstacles.size(); ++o)
-      out.obstacles(o) = obstacle_motions[static_cast<std::size_t>(o)].shift.fraction(state.time);
-  }
-  return out;
 }
 
 }  // namespace withe

@@ -9,17 +9,6 @@
 #include "world/implementation.hpp"
 
 namespace withe {
-bool World::Implementation::has_rings() const {
-  return std::any_of(model.supports.begin(), model.supports.end(),
-                     [](const Support& s) { return s.active && s.slides(); });
-}
-
-std::vector<SupportPose> World::Implementation::support_poses() const {
-  std::vector<SupportPose> poses;
-  for (const SupportMotion& m : motions) poses.push_back(m.pose());
-  return poses;
-}
-
 double World::Implementation::hand_energy_of(int hand) const {
   return hand_energy(model, parameters.measure, state, configuration(), hand);
 }

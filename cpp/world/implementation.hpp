@@ -58,14 +58,13 @@ struct World::Implementation : Running {
   Statistics statistics;
   Callbacks callbacks;
   std::atomic<bool> interrupted{false};
-  double separated = 0;  ///< how far overlapping rods were moved before the start [m]
-  bool spatial = false;  ///< left its plane while running
+  double separated = 0;             ///< how far overlapping rods were moved before the start [m]
+  double stable_explicit_step = 0;  ///< [s]; 0 when not computed
+  bool spatial = false;             ///< left its plane while running
   Warnings warnings;
   std::unique_ptr<CrossingWatch> crossing_watch;  ///< made when first needed
   std::vector<LeftRing> left_rings;               ///< not heard of yet
   NewtonResult last_newton;
-
-  void check_shares(const ContactPairDescription& pair) const;
 
   // building.cpp
   /// Lets interruptions reach the solver.
@@ -76,23 +75,13 @@ struct World::Implementation : Running {
   void begin_as_drawn();
   void note_drawn_actuation();
   void carry_over(const Model& old, Rebuild why);
-  void make_plan();
   /// Equations for other loads than before.
   void remake_equations();
-  void add_contact_notes();
-  void add_coarse_notes();
-  std::string fluid_note() const;
   /// Drops the plane; throws when the user asked for it. `why` names the argument that leaves the plane.
   void leave_plane(const std::string& why);
 
   // set_state.cpp
-  bool leaves_plane(const RodState& rod) const;
-  bool arrives(int support, const std::vector<bool>& told, const VectorX& q, HeldTarget& there);
-  VectorX placed(const std::vector<RodState>& rods);
-  void place_rods(const std::vector<RodState>& rods);
-  void place_directors(const RodState& rod, const VectorX& q, const Configuration& before);
-  void set_rates(const std::vector<RodState>& rods);
-  std::vector<bool> moved_rods(const VectorX& before, const VectorX& now) const;
+  void place(const std::vector<RodState>& rods);
   void meet_anew(const std::vector<bool>& moved);
   /// What came before no longer tells what comes next.
   void forget_motion();
@@ -130,10 +119,7 @@ struct World::Implementation : Running {
   void put_custom_force(Prescribed& out) const;
 
   // hands.cpp
-  bool has_rings() const;
   bool release_left_rings();
-  /// Present poses of supports.
-  std::vector<SupportPose> support_poses() const;
   VectorX neutral_motion() const;
   /// Prepares `static_gradient` for the equilibrium that the scene is in; what it refers to is in `at`. Throws
   /// std::invalid_argument where no derivative is known.
@@ -178,8 +164,6 @@ struct World::Implementation : Running {
   bool inner_step(double dt, int slot, PartResult& part);
   StepRule rule_of_step() const;
   StepResult step_by_rule(double dt, int slot);
-  void check_impacts(const ContactDescription& contact) const;
-  void check_reversible(const Parameters& p) const;
 
   // watches.cpp
   void check_resolution();
@@ -191,17 +175,10 @@ struct World::Implementation : Running {
   [[noreturn]] void fail(const NewtonResult& newton, double dt, const std::string& what,
                          const std::string& hint = "") const;
 
-  // gradients.cpp
-  void check_tape();
-  void record_step(StepRule rule, double dt, bool begins);
-  Reached reached() const;
-
   // supports.cpp
-  void check_pose(int support, const std::optional<Vector3>& position, const std::optional<Matrix3>& rotation);
   void lump_held();
   void note_reactions();
   void note_residual();
-  bool tensions_in_middle() const;
   void note_tensions();
   void keep_reactions(double dt, bool begins);
 
@@ -209,29 +186,12 @@ struct World::Implementation : Running {
   EquilibriumResult equilibrium(double dt, Saddles saddles = Saddles::leave);
   /// A step of the static integrator, of dt and to `end`.
   void static_step(double end, double dt);
-  /// Supports between two places. `from`, `to` and `out`, whose poses follow where a hand that yields moves, must
-  /// outlive it.
-  Boundary boundary_between(Equations& system, const std::vector<SupportMotion>& from,
-                            const std::vector<SupportMotion>& to, Prescribed& out) const;
-  [[noreturn]] void fail_equilibrium(const StaticResult& result, double dt) const;
   EquilibriumResult settle(Equations& system, StaticResult& result, double time);
   /// Whether a motion out of the plane lowers the potential of an equilibrium in it. Not asked where the scene is to
   /// stay in its plane, nor where what acts has no potential.
   bool buckles_out_of_plane();
-  bool drifts(Equations& system, const Prescribed& given);
-  bool even_contact(Equations& system, const Prescribed& given, bool arrived);
-  void settle_contact(Equations& system, const Boundary& boundary, Saddles saddles, StaticResult& r);
   void rest();
   void refresh_reactions();
-
-  // contacts.cpp
-  void check_overlap() const;
-
-  // obstacles.cpp
-  void check_turn(int obstacle, const Vector3& turn) const;
-
-  // separation.cpp
-  void separate();
 
   std::pair<Eigen::Index, Eigen::Index> load_rows(int load) const;  ///< the first, and how many
 

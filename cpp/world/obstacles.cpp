@@ -6,20 +6,11 @@
 #include <Eigen/Geometry>
 
 #include "common/check.hpp"
+#include "run/checks.hpp"
 #include "run/drive.hpp"
 #include "world/implementation.hpp"
 
 namespace withe {
-
-/// Only what leaves the shape where it is can be told by the motion of the surface alone.
-void World::Implementation::check_turn(int obstacle, const Vector3& turn) const {
-  const ObstacleDescription& drawn = description.contact.obstacles[at(obstacle)];
-  const bool plane = drawn.kind == ObstacleKind::plane;
-  const Vector3 axis = plane ? drawn.other : Vector3(drawn.other - drawn.point);
-  require(turn.allFinite(), "turn of an obstacle must be finite");
-  require(axis.cross(turn).norm() <= 1e-9 * axis.norm() * turn.norm(),
-          "obstacle '" + drawn.name + "' can turn about " + (plane ? "its normal" : "its axis") + " only");
-}
 
 void World::move_obstacle(int obstacle, const std::optional<Vector3>& position, const std::optional<Vector3>& turn,
                           double over) {
@@ -45,7 +36,7 @@ void World::prescribe_obstacle(int obstacle, const std::optional<Vector3>& posit
   Implementation& self = *implementation_;
   const Vector3 way = position.value_or(obstacle_position(obstacle)) - obstacle_position(obstacle);
   require(way.allFinite(), "position must be finite");
-  if (turn) self.check_turn(obstacle, *turn);
+  if (turn) check_turn(self.model, obstacle, *turn);
   const ObstacleDescription& drawn = self.description.contact.obstacles[at(obstacle)];
   // What a plane moves along itself out of the rods' plane, no rod sees without friction; with it, it pulls them out.
   if (self.model.planar()) {

@@ -1,138 +1,41 @@
-/// What a scene answers: copies, in world coordinates.
-
-#include <Eigen/Geometry>
-#include <algorithm>
+/// Read-outs of a running scene.
 
 #include "common/check.hpp"
-#include "elasticity/stretch.hpp"
-#include "forces/tendon.hpp"
-#include "model/edge_vectors.hpp"
-#include "run/frames.hpp"
+#include "run/read.hpp"
 #include "steps/joint_forces.hpp"
 #include "steps/spring_forces.hpp"
 #include "world/implementation.hpp"
 
 namespace withe {
-MatrixX3 World::positions() const {
-  const Implementation& self = *implementation_;
-  MatrixX3 out(self.model.node_count, 3);
-  for (int i = 0; i < self.model.node_count; ++i) out.row(i) = node_position(self.model, self.state.q, i);
-  return out;
-}
 
-MatrixX3 World::velocities() const {
-  const Implementation& self = *implementation_;
-  MatrixX3 out(self.model.node_count, 3);
-  for (int i = 0; i < self.model.node_count; ++i) out.row(i) = node_vector(self.model, self.state.v, i);
-  return out;
-}
-
+MatrixX3 World::positions() const { return withe::positions(implementation_->model, implementation_->state); }
+MatrixX3 World::velocities() const { return withe::velocities(implementation_->model, implementation_->state); }
 MatrixX9 World::directors(int rod) const {
-  const Implementation& self = *implementation_;
-  Configuration c;
-  compute_configuration(self.model, self.state, self.state.q, c);
-  const int first = self.model.rod_first_edge.at(at(rod)), count = self.model.rod_first_edge.at(at(rod) + 1) - first;
-  MatrixX9 out(count, 9);
-  for (int e = 0; e < count; ++e) {
-    const Matrix3 d = edge_directors(self.model, c, first + e);
-    out.row(e) << d.col(0).transpose(), d.col(1).transpose(), d.col(2).transpose();
-  }
-  return out;
+  return withe::directors(implementation_->model, implementation_->configuration(), rod);
 }
-
 MatrixX2 World::curvatures(int rod) const {
   const Implementation& self = *implementation_;
-  Configuration c;
-  compute_configuration(self.model, self.state, self.state.q, c);
-  const auto& places = self.model.place.at(at(rod));
-  MatrixX2 out = MatrixX2::Zero(static_cast<Eigen::Index>(places.size()), 2);
-  // What bends beyond the natural curvature is spread over as much of the rod as the stencil carries.
-  const MatrixX2& natural = self.parameters.natural_curvature[at(rod)];
-  const auto smooth = [&](const MatrixX3& strain, int i, double voronoi, double carried, Eigen::Index row) -> Vector2 {
-    Vector2 d = strain.row(i).head<2>();
-    if (self.model.planar()) d = strain(i, 0) * self.model.planar_components[at(rod)];
-    const Vector2 rest = natural.row(row);
-    return rest + (voronoi / carried) * (smooth_curvature(d, voronoi) - rest);
-  };
-  for (std::size_t s = 0; s < places.size(); ++s) {
-    const auto row = static_cast<Eigen::Index>(s);
-    if (places[s].bend >= 0) {
-      const int b = places[s].bend;
-      const auto& edge = self.model.bend[at(b)].edge;
-      const double carried = self.model.bend_share(b, 0) * self.model.edge_arc(edge[0]) +
-                             self.model.bend_share(b, 1) * self.model.edge_arc(edge[1]);
-      out.row(row) = smooth(c.bend_strain, b, self.model.bend_voronoi(b), carried, row);
-      continue;
-    }
-    double length = 0.0;
-    for (int h : places[s].half)
-      if (h >= 0) {
-        const double v = self.model.half_voronoi(h);
-        const double carried = self.model.half_share(h) * self.model.edge_arc(self.model.half[at(h)].edge);
-        out.row(row) += v * smooth(c.half_strain, h, v, carried, row);
-        length += v;
-      }
-    if (length > 0.0) out.row(row) /= length;
-  }
-  return out;
+  return withe::curvatures(self.model, self.parameters, self.configuration(), rod);
 }
-
 VectorX World::twists(int rod) const {
-  const Implementation& self = *implementation_;
-  const auto& places = self.model.place.at(at(rod));
-  VectorX out = VectorX::Zero(static_cast<Eigen::Index>(places.size()));
-  if (self.model.planar()) return out;
-  Configuration c;
-  compute_configuration(self.model, self.state, self.state.q, c);
-  for (std::size_t s = 0; s < places.size(); ++s) {
-    double turn = 0.0, length = 0.0;
-    if (places[s].bend >= 0) {
-      turn = c.bend_strain(places[s].bend, 2);
-      length = self.model.bend_voronoi(places[s].bend);
-    }
-    for (int h : places[s].half)
-      if (h >= 0) {
-        turn += c.half_strain(h, 2);
-        length += self.model.half_voronoi(h);
-      }
-    out(static_cast<Eigen::Index>(s)) = length > 0.0 ? turn / length : 0.0;
-  }
-  return out;
+  return withe::twists(implementation_->model, implementation_->configuration(), rod);
 }
 
-namespace {
-
-const JointAngle& checked_joint(const Model& model, int joint) {
-  require(joint >= 0 && joint < static_cast<int>(model.joint_angles.size()), "no such revolute joint: ", joint);
-  return model.joint_angles[at(joint)];
-}
-
-double tension(const Model& model, const Parameters& parameters, const Configuration& c, int edge) {
-  return axial_force(c.length(edge), model.edge_length(edge), parameters.edge_stretch(edge),
-                     parameters.edge_natural_stretch(edge) - 1.0);
-}
-
-}  // namespace
-
-/// Whether axial forces are read out in the middle of the step, where those of a midpoint step are in balance: at its
-/// end an edge that has turned by w within it is longer by w^2 / 8 of its length, which its stiffness makes a force
-/// that has not acted.
-bool World::Implementation::tensions_in_middle() const { return rule_of_step() == StepRule::midpoint; }
-
+/// Forces of a midpoint step are in balance at its middle. At its end an edge that has turned by w within the step is
+/// longer by w^2 / 8 of its length; its stiffness makes that a force that has not acted.
 void World::Implementation::note_tensions() {
-  tensions.resize(tensions_in_middle() ? model.edge_count : 0);
+  tensions.resize(rule_of_step() == StepRule::midpoint ? model.edge_count : 0);
   for (int e = 0; e < static_cast<int>(tensions.size()); ++e)
-    tensions(e) = tension(model, parameters, systems.work.newton.data.configuration, e);
+    tensions(e) = edge_tension(model, parameters, systems.work.newton.data.configuration, e);
 }
 
 VectorX World::tensions(int rod) const {
   const Implementation& self = *implementation_;
   const int first = self.model.rod_first_edge.at(at(rod)), count = self.model.rod_first_edge.at(at(rod) + 1) - first;
   if (self.reaction_current && self.tensions.size() != 0) return self.tensions.segment(first, count);
-  Configuration c;
-  compute_configuration(self.model, self.state, self.state.q, c);
+  const Configuration& c = self.configuration();
   VectorX out(count);
-  for (int e = 0; e < count; ++e) out(e) = tension(self.model, self.parameters, c, first + e);
+  for (int e = 0; e < count; ++e) out(e) = edge_tension(self.model, self.parameters, c, first + e);
   return out;
 }
 
@@ -142,61 +45,26 @@ double World::spring_tension(int spring) const {
   return withe::spring_tension(self.model, self.parameters, self.state.q, self.state.v, spring);
 }
 
-namespace {
-
-int checked_tendon(const Model& model, int tendon) {
-  require(tendon >= 0 && tendon < static_cast<int>(model.description.tendons.size()), "no such tendon: ", tendon);
-  return tendon;
-}
-
-}  // namespace
-
 double World::tendon_length(int tendon) const {
   const Implementation& self = *implementation_;
-  const int wanted = checked_tendon(self.model, tendon);
-  double length = 0.0;
-  for (const TendonSegment& segment : tendon_segments(self.model))
-    if (segment.tendon == wanted)
-      length += segment_length(self.model, segment, self.state.q, self.configuration()) -
-                self.parameters.tendon_tension(wanted) * free_end_compliance(self.model, self.parameters, segment);
-  return length;
+  return withe::tendon_length(self.model, self.parameters, self.state, self.configuration(), tendon);
 }
-
 MatrixX3 World::tendon_points(int tendon) const {
   const Implementation& self = *implementation_;
-  return guide_points(self.model, checked_tendon(self.model, tendon), self.state.q, self.configuration());
+  return withe::tendon_points(self.model, self.state, self.configuration(), tendon);
 }
 
 double World::joint_angle(int joint) const {
-  const Implementation& self = *implementation_;
-  return checked_joint(self.model, joint).angle(self.state.q);
+  return withe::joint_angle(implementation_->model, implementation_->state, joint);
 }
 
-/// The mean of the last step: what steps do not resolve, as of frames with little inertia of their own, changes the
-/// sign of its velocity from step to step. Where there was none, by the edges at either side.
+/// The mean rate of the last step: motion that steps do not resolve, such as that of frames with little inertia of
+/// their own, changes the sign of its velocity from step to step.
 double World::joint_rate(int joint) const {
   const Implementation& self = *implementation_;
-  const Model& model = self.model;
-  const JointAngle& turning = checked_joint(model, joint);
+  const JointAngle& turning = checked_joint(self.model, joint);
   if (!self.predictor.empty()) return turning.angle(self.predictor.latest());
-  if (!turning.turns()) return 0.0;
-  const auto hinge =
-      std::find_if(model.hinges.begin(), model.hinges.end(), [&](const Hinge& h) { return h.dof == turning.turning; });
-  const auto belongs = [&](const FrameStencil& half, bool turns) {
-    if (model.planar()) return model.frame_dof[at(half.frame)] == (turns ? turning.turning : turning.against);
-    return half.frame == hinge->frame && (turns ? half.hinge == hinge - model.hinges.begin() : half.hinge < 0);
-  };
-  const Configuration& c = self.configuration();
-  const auto rate = [&](bool turns) -> Vector3 {
-    Vector3 sum = Vector3::Zero();
-    int count = 0;
-    for (const FrameStencil& half : model.half)
-      if (belongs(half, turns)) sum += angular_velocity(model, self.state, c, half.edge), ++count;
-    return sum / count;
-  };
-  const Vector3 axis =
-      model.planar() ? model.plane->normal : Vector3(frame_rotation(model, self.state, hinge->frame) * hinge->axis);
-  return turning.sign * axis.dot(rate(true) - rate(false));
+  return withe::joint_rate(self.model, self.state, self.configuration(), joint);
 }
 
 double World::joint_torque(int joint) const {
@@ -206,48 +74,15 @@ double World::joint_torque(int joint) const {
   return torque_of(withe::joint_torque(implementation_->parameters, elastic, joint), angle, joint_rate(joint));
 }
 
-VectorX World::spins(int rod) const {
-  const Implementation& self = *implementation_;
-  const int first = self.model.rod_first_edge.at(at(rod)), count = self.model.rod_first_edge.at(at(rod) + 1) - first;
-  VectorX out = VectorX::Zero(count);
-  if (!self.model.planar())
-    for (int e = 0; e < count; ++e) out(e) = self.state.v(self.model.edge_dof[at(first + e)]);
-  return out;
-}
-
+VectorX World::spins(int rod) const { return withe::spins(implementation_->model, implementation_->state, rod); }
 Energy World::energy() const { return implementation_->energy(); }
 Energy World::rod_energy(int rod) const {
   const Implementation& self = *implementation_;
   return withe::rod_energy(self.model, self.parameters, self.state, rod, self.energy_scratch);
 }
-
-/// What the kinetic energy changes by with a velocity common to all, and with an angular velocity about the origin:
-///   P = sum of (M v) over nodes,  J = sum of x x (M v) + sum of I omega t over edges + sum of I w over joints' frames.
-/// In a plane edges do not spin, and frames turn about its normal. A hinge's angle is relative: it adds nothing.
 Momentum World::momentum() const {
   const Implementation& self = *implementation_;
-  const Model& model = self.model;
-  MassMatrix mass;
-  set_mass(model, self.parameters, mass);
-  VectorX carried;
-  multiply(model, mass, self.state.v, carried);
-  Momentum out;
-  for (int i = 0; i < model.node_count; ++i) {
-    const Vector3 p = node_vector(model, carried, i);
-    out.linear += p;
-    out.angular += node_position(model, self.state.q, i).cross(p);
-  }
-  for (int f = 0; f < model.frame_count; ++f) {
-    const int dof = model.frame_dof[at(f)];
-    out.angular += model.planar() ? Vector3(carried(dof) * model.plane->normal) : Vector3(carried.segment<3>(dof));
-  }
-  if (model.planar()) return out;
-  for (int e = 0; e < model.edge_count; ++e) {
-    const Vector3 tail = node_position(model, self.state.q, model.edge_tail[at(e)]);
-    const Vector3 head = node_position(model, self.state.q, model.edge_head[at(e)]);
-    out.angular += carried(model.edge_dof[at(e)]) * (head - tail).normalized();
-  }
-  return out;
+  return withe::momentum(self.model, self.parameters, self.state);
 }
 
 }  // namespace withe

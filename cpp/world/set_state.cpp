@@ -1,56 +1,12 @@
-/// Rods put elsewhere while the scene runs: positions, frames and rates from outside.
-
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "common/check.hpp"
-#include "common/text.hpp"
-#include "geometry/rotation.hpp"
-#include "model/edge_vectors.hpp"
-#include "run/frames.hpp"
-#include "run/hold.hpp"
-#include "run/places.hpp"
-#include "steps/ring_forces.hpp"
+#include "run/checks.hpp"
+#include "run/placing.hpp"
 #include "world/implementation.hpp"
 
 namespace withe {
-namespace {
-
-constexpr double kHeld = 1e-9;     // of the scene's length, or rad: what rounding may have moved
-constexpr double kAligned = 1e-6;  // rad: directors from outside are no better
-
-void check_shapes(const Model& model, const RodState& rod) {
-  const int rods = static_cast<int>(model.description.rods.size());
-  require(rod.rod >= 0 && rod.rod < rods, "no such rod: ", rod.rod);
-  const Eigen::Index nodes = static_cast<Eigen::Index>(model.description.rods[at(rod.rod)].nodes.size()),
-                     edges = model.rod_first_edge[at(rod.rod) + 1] - model.rod_first_edge[at(rod.rod)],
-                     stencils = static_cast<Eigen::Index>(model.place[at(rod.rod)].size());
-  const auto fits = [](const auto& values, Eigen::Index rows) {
-    return (values.rows() == 0 || values.rows() == rows) && values.allFinite();
-  };
-  require(fits(rod.positions, nodes) && fits(rod.velocities, nodes), "positions and velocities need a row a node");
-  require(fits(rod.directors, edges) && fits(rod.spins, edges), "directors and spins need a row an edge");
-  require(fits(rod.twists, stencils) && (rod.twists.size() > 0 || rod.directors.rows() == 0 || stencils == 0),
-          "twists need a number a stencil");
-  require(rod.directors.rows() > 0 || rod.positions.rows() == 0, "positions need directors");
-}
-
-/// Rings are where rods pass them now, and give way as far as they cannot hold these; one beyond an end of its rod
-/// has let it go.
-void pass_rings_anew(const Model& model, State& state) {
-  for (std::size_t s = 0; s < model.supports.size(); ++s) {
-    if (!model.supports[s].active || !model.supports[s].slides()) continue;
-    RingState& ring = state.hands[s].ring;
-    const Passage now = passage_of(model, state, static_cast<int>(s));
-    ring.place = now.place;
-    ring.slip += now.slipped;
-    ring.left = ring.left || now.place.beyond;
-  }
-}
-
-}  // namespace
 
 void World::set_state(const std::vector<RodState>& rods, std::optional<double> time) {
   for (const RodState& rod : rods) check_shapes(implementation_->model, rod);
@@ -60,190 +16,24 @@ void World::set_state(const std::vector<RodState>& rods, std::optional<double> t
   fresh->systems.recall(implementation_->systems.lagged());
   fresh->callbacks = implementation_->callbacks;
   for (const RodState& rod : rods)
-    if (fresh->model.planar() && fresh->leaves_plane(rod)) {
+    if (leaves_plane(fresh->model, fresh->state, rod)) {
       fresh->leave_plane("a state of rod '" + fresh->description.rods[at(rod.rod)].name + "'");
       break;
     }
   if (time) fresh->state.time = *time;
-  fresh->place_rods(rods);
-  fresh->set_rates(rods);
+  fresh->place(rods);
   implementation_ = std::move(fresh);
 }
 
-bool World::Implementation::leaves_plane(const RodState& rod) const {
-  const Plane& plane = *model.plane;
-  const auto off = [&](const MatrixX3& rows, const Vector3& origin, double scale) {
-    return rows.rows() > 0 && ((rows.rowwise() - origin.transpose()) * plane.normal).cwiseAbs().maxCoeff() > scale;
-  };
-  if (off(rod.positions, plane.origin, kHeld * model.length_scale)) return true;
-  if (rod.velocities.rows() > 0 && off(rod.velocities, Vector3::Zero(), kHeld * rod.velocities.cwiseAbs().maxCoeff()))
-    return true;
-  if ((rod.spins.array() != 0.0).any() || (rod.twists.array().abs() > kAligned / model.length_scale).any()) return true;
-  // In its plane an edge turns its drawn directors about the normal.
-  for (Eigen::Index e = 0; e < rod.directors.rows(); ++e) {
-    const int edge = model.rod_first_edge[at(rod.rod)] + static_cast<int>(e);
-    const auto& nodes = description.rods[at(rod.rod)].nodes;
-    const auto in_space = [&](Eigen::Index i) -> Vector3 {
-      if (rod.positions.rows() > 0) return rod.positions.row(i);
-      return node_position(model, state.q, nodes[static_cast<std::size_t>(i)]);
-    };
-    const Vector3 drawn = to_eigen(model.initial_tangent[at(edge)]), d1 = to_eigen(model.initial_director[at(edge)]),
-                  now = in_space((e + 1) % static_cast<Eigen::Index>(nodes.size())) - in_space(e);
-    const double angle = std::atan2(drawn.cross(now).dot(plane.normal), drawn.dot(now));
-    if ((rotation_exp(angle * plane.normal) * d1 - rod.directors.row(e).transpose()).norm() > kAligned) return true;
-  }
-  return false;
-}
-
-/// A support that was moved at once gets there now, instead of in the next step, where its nodes are placed there.
-/// Where it is then, of the held unknowns.
-bool World::Implementation::arrives(int support, const std::vector<bool>& told, const VectorX& q, HeldTarget& there) {
-  const Support& held = model.supports[at(support)];
-  SupportMotion& motion = motions[at(support)];
-  if (held.yields() || !motion.jumps()) return false;
-  const Vector3 before = motion.position;
-  motion.position = motion.to_position;
-  hold(model, *this, support_poses(), there);
-  for (const Constraint& c : model.constraints)
-    for (int node : held.nodes)
-      if (c.first == model.node_dof[at(node)] &&
-          !(told[at(node)] && c.held_change(there.q, q).norm() <= kHeld * model.length_scale)) {
-        motion.position = before;
-        return false;
-      }
-  return true;
-}
-
-/// Unknowns with nodes where they are told to be; refuses to move what is held.
-VectorX World::Implementation::placed(const std::vector<RodState>& rods) {
-  VectorX q = state.q;
-  std::vector<bool> told(at(model.node_count), false);
-  for (const RodState& rod : rods)
-    for (Eigen::Index i = 0; i < rod.positions.rows(); ++i) {
-      const int node = description.rods[at(rod.rod)].nodes[static_cast<std::size_t>(i)], dof = model.node_dof[at(node)];
-      const Vector3 x = rod.positions.row(i);
-      VectorX own = x;
-      if (model.planar()) {
-        const Vector3 from = x - model.plane->origin;
-        own = Vector2(from.dot(model.plane->first), from.dot(model.plane->second));
-      }
-      require(!told[at(node)] || (q.segment(dof, model.dimension) - own).norm() <= kHeld * model.length_scale,
-              "positions of rods that share a node must agree" + place_of_node(model, node).words);
-      told[at(node)] = true;
-      q.segment(dof, model.dimension) = own;
-    }
-  HeldTarget there;
-  for (int s = 0; s < static_cast<int>(model.supports.size()); ++s) {
-    const Support& support = model.supports[at(s)];
-    if (!support.active) continue;
-    const bool arrived = arrives(s, told, q, there), moves = state.time < motions[at(s)].shift.end;
-    for (int node : support.nodes) {
-      for (const Constraint& c : model.constraints) {
-        if (c.first != model.node_dof[at(node)]) continue;
-        const Vector3 moved = c.held_change(arrived ? there.q : state.q, q);
-        require(moved.norm() <= kHeld * model.length_scale,
-                "positions must not move a node that a support holds, but do by " + text(moved.norm()) + " m" +
-                    place_of_node(model, node).words +
-                    (moves ? ": the support is on a ramp (over=), so move the support without over=, or "
-                             "release it"
-                           : ": move the support there first, or release it"));
-        q.segment(c.first, c.size) -= moved.head(c.size);
-      }
-    }
-  }
-  for (int e = 0; e < model.edge_count; ++e) {
-    const double length =
-        (q.segment(model.head_dof[at(e)], model.dimension) - q.segment(model.tail_dof[at(e)], model.dimension)).norm();
-    require(length > 1e-6 * model.edge_length(e),
-            "positions must not give an edge zero length" + place_of_node(model, model.edge_tail[at(e)]).words);
-  }
-  return q;
-}
-
-/// Directors of a rod whose nodes are at q, which supports held as they were before; and the branches of its twists.
-void World::Implementation::place_directors(const RodState& rod, const VectorX& q, const Configuration& before) {
-  for (Eigen::Index e = 0; e < rod.directors.rows(); ++e) {
-    const int edge = model.rod_first_edge[at(rod.rod)] + static_cast<int>(e);
-    const std::string where = place_of_node(model, model.edge_tail[at(edge)]).words;
-    const Vector3 t = (q.segment<3>(model.head_dof[at(edge)]) - q.segment<3>(model.tail_dof[at(edge)])).normalized();
-    const Vector3 told = rod.directors.row(e);
-    require(std::abs(told.norm() - 1.0) < kAligned && std::abs(told.dot(t)) < kAligned,
-            "directors must be unit vectors normal to their edges" + where);
-    const Vector3 d1 = (told - t * t.dot(told)).normalized();
-    const Vector3 now = to_eigen(before.edge[at(edge)].d1);
-    for (std::size_t s = 0; s < model.supports.size(); ++s) {
-      const Support& support = model.supports[s];
-      const bool holds =
-          support.active && std::find(support.edges.begin(), support.edges.end(), edge) != support.edges.end();
-      const bool turns = state.time <= motions[s].turn.end && motions[s].rotation != motions[s].to_rotation;
-      require(!holds || (d1 - now).norm() < kAligned,
-              "directors must not turn an edge that a support holds" + place_of_node(model, support.node).words +
-                  (turns ? ": the support is on a ramp (over=), so call step() first, or release the "
-                           "support"
-                         : ": turn the support first, and call step(), or release the support"));
-    }
-    state.tangent[at(edge)] = to_vec3(t);
-    state.director[at(edge)] = to_vec3(d1);
-    state.q(model.edge_dof[at(edge)]) = 0.0;
-  }
-  const auto& places = model.place[at(rod.rod)];
-  for (Eigen::Index s = 0; s < rod.twists.size(); ++s) {
-    const StencilPlace& place = places[static_cast<std::size_t>(s)];
-    if (place.bend >= 0) state.bend_tau(place.bend) = rod.twists(s) * model.bend_voronoi(place.bend);
-    for (int h : place.half)
-      if (h >= 0) state.half_tau(h) = rod.twists(s) * model.half_voronoi(h);
-  }
-}
-
-/// Nodes, frames and the branches of twists.
-void World::Implementation::place_rods(const std::vector<RodState>& rods) {
-  std::vector<bool> is_told(at(model.edge_count), false);
-  for (const RodState& rod : rods)
-    for (Eigen::Index e = 0; e < rod.directors.rows(); ++e)
-      is_told[at(model.rod_first_edge[at(rod.rod)] + static_cast<int>(e))] = true;
-  if (std::find(is_told.begin(), is_told.end(), true) == is_told.end()) return;
-  const VectorX q = placed(rods), start = state.q;
-  Configuration c;
-  compute_configuration(model, state, state.q, c);
-  const Configuration before = c;
-  compute_configuration(model, state, q, c);
-  if (!model.planar()) {
-    for (int e = 0; e < model.edge_count; ++e)
-      require(is_told[at(e)] || dot(before.edge[at(e)].tangent, c.edge[at(e)].tangent) > -1.0 + 1e-6,
-              "positions must not turn an edge of another rod by half a turn" +
-                  place_of_node(model, model.edge_tail[at(e)]).words);
-    const VectorX bend_tau = state.bend_tau, half_tau = state.half_tau;
-    accept_configuration(model, q, c, state);
-    // Frames of edges that are told are theirs; which turn a twist is in follows from what is told too.
-    for (std::size_t b = 0; b < model.bend.size(); ++b) {
-      const auto i = static_cast<Eigen::Index>(b);
-      if (is_told[at(model.bend[b].edge[0])] || is_told[at(model.bend[b].edge[1])]) state.bend_tau(i) = 0.0;
-    }
-    for (std::size_t h = 0; h < model.half.size(); ++h)
-      if (is_told[at(model.half[h].edge)]) state.half_tau(static_cast<Eigen::Index>(h)) = 0.0;
-    for (const RodState& rod : rods) place_directors(rod, q, before);
-  } else {
-    state.q = q;
-  }
-  relax_joints(model, parameters, is_told, state);
-  compute_configuration(model, state, state.q, c);
-  require(c.bend_strain.allFinite() && c.half_strain.allFinite(), "positions must not fold an edge back onto the next");
-  accept_configuration(model, VectorX(state.q), c, state);
-  pass_rings_anew(model, state);
-  meet_anew(moved_rods(start, state.q));
-  forget_motion();
-  systems.forget_matrix();
-}
-
-/// Which rods have a node that is elsewhere.
-std::vector<bool> World::Implementation::moved_rods(const VectorX& before, const VectorX& now) const {
+void World::Implementation::place(const std::vector<RodState>& rods) {
   std::vector<bool> moved;
-  for (const RodDescription& rod : description.rods)
-    moved.push_back(std::any_of(rod.nodes.begin(), rod.nodes.end(), [&](int node) {
-      const int dof = model.node_dof[at(node)];
-      return before.segment(dof, model.dimension) != now.segment(dof, model.dimension);
-    }));
-  return moved;
+  if (place_rods(model, parameters, rods, *this, moved)) {
+    meet_anew(moved);
+    forget_motion();
+    systems.forget_matrix();
+  }
+  set_rates(model, rods, state);
+  forget_motion();
 }
 
 /// Contacts of rods that are where no step has led them to; all others go on.
@@ -254,29 +44,7 @@ void World::Implementation::meet_anew(const std::vector<bool>& moved) {
   std::erase_if(state.contacts, [&](const ContactRecord& r) { return is_moved(r.key.a) || is_moved(r.key.b); });
   systems.forget_contacts();
   contact->initialise(state, parameters);
-  check_overlap();
-}
-
-void World::Implementation::set_rates(const std::vector<RodState>& rods) {
-  std::vector<bool> is_told(at(model.edge_count), false);
-  for (const RodState& rod : rods) {
-    const int first = model.rod_first_edge[at(rod.rod)], end = model.rod_first_edge[at(rod.rod) + 1];
-    if (rod.velocities.rows() > 0 || rod.spins.size() > 0)
-      for (int e = first; e < end; ++e) is_told[at(e)] = true;
-    for (Eigen::Index i = 0; i < rod.velocities.rows(); ++i) {
-      const int dof = model.node_dof[at(description.rods[at(rod.rod)].nodes[static_cast<std::size_t>(i)])];
-      const Vector3 v = rod.velocities.row(i);
-      if (model.planar())
-        state.v.segment<2>(dof) << v.dot(model.plane->first), v.dot(model.plane->second);
-      else
-        state.v.segment<3>(dof) = v;
-    }
-    if (!model.planar())
-      for (Eigen::Index e = 0; e < rod.spins.size(); ++e)
-        state.v(model.edge_dof[at(first + static_cast<int>(e))]) = rod.spins(e);
-  }
-  turn_frames(model, is_told, state);
-  forget_motion();
+  check_overlap(model, parameters, state, contact);
 }
 
 void World::Implementation::forget_motion() {

@@ -2,6 +2,7 @@
 #include <string_view>
 
 #include "forces/stokeslets.hpp"
+#include "run/checks.hpp"
 #include "world/archive.hpp"
 #include "world/exchange.hpp"
 #include "world/implementation.hpp"
@@ -408,7 +409,7 @@ void World::restore(const std::string& bytes) {
   r.expect_end();
   check_running(*fresh);
   update_derived(fresh->model, fresh->parameters);
-  fresh->check_reversible(fresh->parameters);
+  check_reversible(fresh->model, fresh->options, fresh->parameters);
   check_lagged(lagged, fresh->model);
   fresh->systems.recall(lagged);
   implementation_ = std::move(fresh);

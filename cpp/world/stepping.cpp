@@ -6,6 +6,7 @@
 #include "common/text.hpp"
 #include "run/drive.hpp"
 #include "run/energy_watch.hpp"
+#include "run/journal.hpp"
 #include "run/squeeze.hpp"
 #include "run/step_watch.hpp"
 #include "world/implementation.hpp"
@@ -191,7 +192,7 @@ void World::Implementation::take_back() {
 
 void World::Implementation::return_to_start() {
   static_cast<Moving&>(*this) = kept;
-  if (tape) tape->cut(kept.taped, state, support_poses());
+  if (tape) tape->cut(kept.taped, state, poses_of(motions));
   apply_ramps(model, ramps, state.time, parameters);
 }
 
@@ -268,7 +269,7 @@ bool World::Implementation::inner_step(double dt, int slot, PartResult& part) {
   const auto undo = [&] {
     if (ramped) apply_ramps(model, ramps, start, parameters);
   };
-  if (tape) check_tape();
+  if (tape) check_tape(*tape, state, parameters);
   StepResult r;
   try {
     prescribe_custom(dt, prescribed);
@@ -290,7 +291,7 @@ bool World::Implementation::inner_step(double dt, int slot, PartResult& part) {
   }
   for (std::size_t s = 0; s < motions.size(); ++s) motions[s].put(prescribed.supports[s]);
   const bool begins = division.first() && slot == 0;
-  if (tape) record_step(rule_of_step(), dt, begins);
+  if (tape) record_step(*tape, model, contact(), *this, *this, {rule_of_step(), dt, systems.work.move, begins});
   part.error = r.error;
   part.turn = std::max(part.turn, r.largest_turn);
   part.held_turn = std::max(part.held_turn, prescribed.held.turn);
@@ -315,51 +316,6 @@ StepResult World::Implementation::step_by_rule(double dt, int slot) {
     return verlet_step(systems.scheme(), parameters, prescribed, dt, state, systems.work);
   return implicit_step(systems.scheme(), systems.newton(), options, parameters, prescribed, {rule_of_step(), dt, slot},
                        state, predictor, systems.work);
-}
-
-/// The explicit scheme loses nothing in impacts.
-void World::Implementation::check_impacts(const ContactDescription& contact) const {
-  const auto elastic = [](const ContactPairDescription& pair) {
-    return !(pair.restitution >= 0.0) || pair.restitution == 1.0;
-  };
-  require(options.integrator != Integrator::verlet ||
-              ((!contact.rods || contact.restitution == 1.0) && (contact.obstacle_restitution.array() == 1.0).all() &&
-               std::all_of(contact.pairs.begin(), contact.pairs.end(), elastic)),
-          "integrator 'verlet' supports elastic impacts only: use restitution=1, or an "
-          "implicit integrator");
-}
-
-/// A scheme that steps back in time asks for forces that can be run backwards.
-void World::Implementation::check_reversible(const Parameters& p) const {
-  check_impacts(description.contact);
-  require(
-      options.integrator != Integrator::verlet || std::none_of(model.supports.begin(), model.supports.end(),
-                                                               [](const Support& s) { return s.active && s.yields(); }),
-      "integrator 'verlet' supports rigid hands only: use an implicit integrator for "
-      "a hand that yields");
-  if (options.integrator != Integrator::fourth_order) return;
-  require(!description.contact.any(),
-          "integrator 'fourth_order' does not support contact, because its inner steps "
-          "go back in time: use integrator 'implicit_midpoint' or 'energy_momentum'");
-  const std::string instead =
-      ", because its inner steps go back in time: use integrator 'implicit_midpoint' "
-      "or 'energy_momentum'";
-  require(!p.viscous, "integrator 'fourth_order' does not support viscosity" + instead);
-  require(description.fluid.model == FluidModel::none, "integrator 'fourth_order' does not support a fluid" + instead);
-  for (const Support& s : model.supports)
-    require(!s.active || !s.yields() ||
-                (!std::isfinite(s.description.hand.force_limit) && s.description.hand.friction == 0.0),
-            "integrator 'fourth_order' does not support hands that slip" + instead);
-  require((p.spring_damping.array() == 0.0).all(),
-          "integrator 'fourth_order' does not support damping of springs" + instead);
-  require((p.joint_damping.array() == 0.0).all(),
-          "integrator 'fourth_order' does not support damping of joints" + instead);
-  if (!p.dragged) return;
-  for (int i = 0; i < model.node_count; ++i)
-    require(p.node_drag(i) * options.time_step <= p.node_mass(i),
-            "integrator 'fourth_order' supports drag for a time_step up to mass over drag "
-            "only, " +
-                std::to_string(p.node_mass(i) / p.node_drag(i)) + " s at node " + std::to_string(i) + instead);
 }
 
 }  // namespace withe

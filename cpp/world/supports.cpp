@@ -7,6 +7,7 @@
 
 #include "common/check.hpp"
 #include "model/edge_vectors.hpp"
+#include "run/checks.hpp"
 #include "run/frames.hpp"
 #include "run/grips.hpp"
 #include "run/reactions.hpp"
@@ -41,7 +42,7 @@ int World::add_support(const SupportDescription& support) {
       }
     }
     self.rebuild(Rebuild::running);
-    self.check_reversible(self.parameters);
+    check_reversible(self.model, self.options, self.parameters);
   } catch (...) {
     auto before = std::make_unique<Implementation>(backup);
     before->callbacks = self.callbacks;
@@ -96,27 +97,6 @@ void World::move_support(int support, const std::optional<Vector3>& position, co
   if (rolls && self.model.planar()) self.leave_plane("a support that rolls");
 }
 
-/// Refuses a pose that is none; one that leaves a plane makes the scene spatial.
-void World::Implementation::check_pose(int support, const std::optional<Vector3>& position,
-                                       const std::optional<Matrix3>& rotation) {
-  require(!position || position->allFinite(), "position must be finite");
-  require(
-      !rotation || (rotation->allFinite() && (rotation->transpose() * *rotation - Matrix3::Identity()).norm() < 1e-6 &&
-                    rotation->determinant() > 0.0),
-      "rotation must be a proper rotation matrix");
-  const Support& held = model.supports[at(support)];
-  const SupportMotion& now = motions[at(support)];
-  if (rotation && held.description.kind == SupportKind::spinning_clamp)
-    require((*rotation * held.tangent - now.rotation * held.tangent).norm() < 1e-9,
-            "a clamp that may spin keeps its tangent: use hold='edge' to turn the tangent");
-  if (!model.planar()) return;
-  const Plane& plane = *model.plane;
-  const Vector3& from = held.is_hand() ? now.position : plane.origin;  // which may be beside it
-  if ((position && std::abs((*position - from).dot(plane.normal)) > 1e-9 * model.length_scale) ||
-      (rotation && (*rotation * now.rotation.transpose() * plane.normal - plane.normal).norm() > 1e-9))
-    leave_plane("a moving support");
-}
-
 /// Under the fourth-order scheme velocities of supports are known to second order: see mass_matrix.hpp.
 void World::Implementation::lump_held() {
   account_for_settings();
@@ -136,7 +116,9 @@ void World::prescribe_support(int support, const std::optional<Vector3>& positio
   require(
       support >= 0 && support < static_cast<int>(self.model.supports.size()) && self.model.supports[at(support)].active,
       "no such support, or it is released: " + std::to_string(support));
-  self.check_pose(support, position, rotation);
+  check_pose(self.model, self.motions[at(support)], support, position, rotation);
+  if (leaves_plane(self.model, self.motions[at(support)], support, position, rotation))
+    self.leave_plane("a moving support");
   if (self.options.integrator == Integrator::fourth_order && !self.parameters.held_lumped) self.lump_held();
   SupportMotion& m = self.motions[at(support)];
   const Span now{self.state.time, self.state.time};

@@ -7,6 +7,7 @@
 #include "common/check.hpp"
 #include "common/timer.hpp"
 #include "forces/stokeslets.hpp"
+#include "run/checks.hpp"
 #include "run/drive.hpp"
 #include "run/frames.hpp"
 #include "steps/spring_forces.hpp"
@@ -14,15 +15,6 @@
 
 namespace withe {
 namespace {
-
-/// Whether a load points, or turns, out of the plane of a normal.
-bool off_plane(LoadKind kind, const Eigen::Ref<const MatrixX3>& values, const Vector3& normal) {
-  return std::any_of(values.rowwise().begin(), values.rowwise().end(), [&](const auto& row) {
-    const Vector3 value = row;
-    const double off = is_axial(kind) ? value.cross(normal).norm() : std::abs(value.dot(normal));
-    return off > 1e-8 * value.norm();
-  });
-}
 
 int checked_spring(const Parameters& parameters, int spring) {
   require(spring >= 0 && spring < parameters.spring_stiffness.size(), "no such spring: ", spring);
@@ -46,8 +38,12 @@ World::Implementation& World::accounted() const {
 const SceneDescription& World::description() const { return implementation_->description; }
 const Options& World::options() const { return implementation_->options; }
 const Plan& World::plan() const {
-  if (!implementation_->plan_current) implementation_->make_plan();
-  return implementation_->plan;
+  Implementation& self = *implementation_;
+  if (!self.plan_current)
+    self.plan = plan_of(self.model, self.options, self.parameters, self.systems.scheme(),
+                        {self.spatial, self.plane_left_by, self.separated, self.stable_explicit_step});
+  self.plan_current = true;
+  return self.plan;
 }
 bool World::frames_as_drawn() const {
   constexpr double kNear = 1e-9;
@@ -151,10 +147,7 @@ void World::set_load(int load, const Eigen::Ref<const MatrixX3>& values) {
   const auto [first, rows] = self.load_rows(load);
   require(values.rows() == rows, "load must have ", rows, " rows");
   require(values.allFinite(), "load must be finite");
-  if (self.model.planar()) {
-    const Vector3& n = self.model.plane->normal;
-    if (off_plane(self.description.loads[at(load)].kind, values, n)) self.leave_plane("a load");
-  }
+  if (leaves_plane(self.model, self.description.loads[at(load)].kind, values)) self.leave_plane("a load");
   self.parameters.loads.middleRows(first, rows) = values;
   self.reaction_current = false;
   self.state.acceleration_current = false;
@@ -163,7 +156,7 @@ int World::add_load(const LoadDescription& load) {
   Implementation& self = *implementation_;
   check_load(self.description, load);
   const Eigen::Index rows = load.values.rows(), before = self.parameters.loads.rows();
-  if (self.model.planar() && off_plane(load.kind, load.values, self.model.plane->normal)) self.leave_plane("a load");
+  if (leaves_plane(self.model, load.kind, load.values)) self.leave_plane("a load");
   self.description.loads.push_back(load);
   self.description.loads.back().added = true;
   self.parameters.loads.conservativeResize(before + rows, 3);
@@ -191,33 +184,11 @@ std::pair<Eigen::Index, Eigen::Index> World::Implementation::load_rows(int load)
   return {first_load_row(description, at(load)), description.loads[at(load)].values.rows()};
 }
 
-namespace {
-
-void check_contact(const ContactDescription& contact, const ContactDescription& own) {
-  const auto valid = [](const auto& v) { return v.size() == 0 || (v.allFinite() && v.minCoeff() >= 0.0); };
-  const auto share = [](double x) { return x >= 0.0 && x <= 1.0; };
-  require(contact.obstacle_friction.rows() == own.obstacle_friction.rows() &&
-              (contact.obstacle_rolling.size() == 0 || contact.obstacle_rolling.size() == own.obstacle_friction.rows()),
-          "friction needs three coefficients an obstacle, and rolling friction one");
-  require(std::isfinite(contact.friction) && contact.friction >= 0.0 && valid(contact.obstacle_friction) &&
-              valid(contact.obstacle_rolling),
-          "friction must not be negative");
-  require(std::isfinite(contact.slip_tolerance) && contact.slip_tolerance > 0.0, "slip_tolerance must be positive");
-  require(contact.obstacle_restitution.size() == own.obstacle_restitution.size(),
-          "restitution needs one coefficient an obstacle");
-  require(share(contact.restitution) &&
-              std::all_of(contact.obstacle_restitution.begin(), contact.obstacle_restitution.end(), share),
-          "restitution must be from 0 to 1");
-  require(std::isfinite(contact.stiffness) && contact.stiffness >= 0.0, "stiffness of contact must not be negative");
-}
-
-}  // namespace
-
 void World::set_contact(const ContactDescription& contact) {
   Implementation& self = *implementation_;
   ContactDescription& own = self.description.contact;
   check_contact(contact, own);
-  for (const ContactPairDescription& pair : contact.pairs) self.check_shares(pair);
+  for (const ContactPairDescription& pair : contact.pairs) check_shares(self.model, pair);
   ContactDescription wanted = own;
   wanted.friction = contact.friction;
   wanted.slip_tolerance = contact.slip_tolerance;
@@ -227,7 +198,7 @@ void World::set_contact(const ContactDescription& contact) {
   wanted.obstacle_restitution = contact.obstacle_restitution;
   wanted.stiffness = contact.stiffness;
   wanted.pairs = contact.pairs;
-  self.check_impacts(wanted);
+  check_impacts(self.options, wanted);
   const auto energy = [&] {
     const Contact* touching = self.systems.scheme().contact();
     return touching ? touching->energy_of(self.state, self.parameters, self.energy_scratch.contact) : 0.0;
@@ -252,16 +223,6 @@ void World::set_contact(const ContactDescription& contact) {
   self.ledger.actuation_work += energy() - before;
 }
 
-/// One share for each node and edge of the rod of a pair, not negative.
-void World::Implementation::check_shares(const ContactPairDescription& pair) const {
-  if (pair.shares.size() == 0) return;
-  require((pair.first < 0) != (pair.second < 0), "friction varies between a rod and an obstacle only");
-  const auto& rod = description.rods[at(std::max(pair.first, pair.second))];
-  const auto size = static_cast<Eigen::Index>(rod.nodes.size()) + rod.rest_lengths.size();
-  require(pair.shares.size() == size, "friction of rod '" + rod.name + "' needs one number a node and an edge, ", size);
-  require(pair.shares.allFinite() && pair.shares.minCoeff() >= 0.0, "friction must be finite and not negative");
-}
-
 void World::set_friction_shares(int pair, const VectorX& shares) {
   Implementation& self = *implementation_;
   auto& pairs = self.description.contact.pairs;
@@ -270,7 +231,7 @@ void World::set_friction_shares(int pair, const VectorX& shares) {
   if (own.shares.size() == shares.size() && own.shares == shares) return;
   ContactPairDescription wanted = own;
   wanted.shares = shares;
-  self.check_shares(wanted);
+  check_shares(self.model, wanted);
   const Contact* contact = self.systems.scheme().contact();
   // What anchors hold changes with the coefficients that they are made of.
   const bool stores = contact && contact->anchored();
@@ -321,28 +282,8 @@ void World::Implementation::begin_ramp(Ramp<Value>& ramp, const Value& now, cons
 }
 
 void World::Implementation::leave_plane_for(const ParameterSetting& setting) {
-  if (!model.planar()) return;
-  const auto& [kind, rod, values] = setting;
-  const auto name = [&, r = rod] { return " of rod '" + description.rods[at(r)].name + "'"; };
-  if (kind == ParameterKind::natural_curvature) {
-    const Vector2 p = model.planar_components[at(rod)];
-    for (Eigen::Index i = 0; i < values.rows(); ++i)
-      if (std::abs(values(i, 0) * p(1) - values(i, 1) * p(0)) > 1e-8 * values.row(i).norm())
-        return leave_plane("natural curvature" + name());
-  } else if (kind == ParameterKind::natural_twist) {
-    if ((values.array() != 0.0).any()) leave_plane("natural twist" + name());
-  } else if (kind == ParameterKind::bend_stiffness) {
-    const Vector2 p = model.planar_components[at(rod)];
-    const bool isotropic = (values.col(0).array() == values.col(1).array()).all();
-    if (!isotropic && p.cwiseAbs().minCoeff() > 1e-9) leave_plane("the section" + name() + ", at an angle to it,");
-  } else if (kind == ParameterKind::joint_moment || kind == ParameterKind::joint_rest_angle) {
-    for (std::size_t j = 0; j < model.joint_angles.size(); ++j)
-      if (!model.joint_angles[j].turns() && values(values.rows() == 1 ? 0 : static_cast<Eigen::Index>(j), 0) != 0.0)
-        return leave_plane("a revolute joint");
-  } else if (kind == ParameterKind::gravity) {
-    const Vector3 gravity = values.row(0);
-    if (std::abs(gravity.dot(model.plane->normal)) > 1e-8 * gravity.norm()) leave_plane("gravity");
-  }
+  const std::string why = leaving_plane(model, setting);
+  if (!why.empty()) leave_plane(why);
 }
 
 /// All of them or, where one is refused, none.
@@ -359,7 +300,7 @@ void World::Implementation::set(std::span<const ParameterSetting> settings) {
   if (options.integrator == Integrator::fourth_order) {
     Parameters wanted = parameters;
     set_parameters(model, settings, wanted);
-    check_reversible(wanted);
+    check_reversible(model, options, wanted);
   }
   for (const ParameterSetting& setting : settings) leave_plane_for(setting);
   for (const ParameterSetting& setting : settings) {

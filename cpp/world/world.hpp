@@ -18,6 +18,9 @@
 #include "model/parameter_index.hpp"
 #include "run/energy.hpp"
 #include "run/failure.hpp"
+#include "run/placing.hpp"
+#include "run/plan.hpp"
+#include "run/read.hpp"
 #include "run/warnings.hpp"
 
 namespace withe {
@@ -60,11 +63,6 @@ struct LeftRing {
   double time = 0;  ///< [s]
 };
 
-struct Momentum {
-  Vector3 linear = Vector3::Zero();   ///< [kg m/s]
-  Vector3 angular = Vector3::Zero();  ///< about the origin [kg m^2/s]
-};
-
 struct EquilibriumResult {
   bool stable = false;
   /// Whether the stiffness says so by itself; else loads that turn with the rod make it unsymmetric, and where it
@@ -105,16 +103,6 @@ struct ContactTable {
   Eigen::Matrix<double, Eigen::Dynamic, 14, Eigen::RowMajor> numbers;
 };
 
-/// What `build` decided.
-struct Plan {
-  bool planar = false;
-  Vector3 plane_normal = Vector3::Zero();  ///< of a planar scene
-  int unknowns = 0;
-  std::string solver;              ///< LinearSolver::name()
-  double stable_step = 0;          ///< of the explicit scheme [s]; 0 when not computed
-  std::vector<std::string> notes;  ///< one line per thing that was skipped or decided, and why
-};
-
 /// Equations linearised about the present configuration, without what supports hold: mass x'' + stiffness x = 0. The
 /// stiffness is geometric + gradients^T diag(stiffnesses) gradients, kept apart since the sum rounds away slow motions:
 /// they bend N edges by 1 / N^2 of what a single node's motion would, so that its energy is some 1 / N^4 of the sum's
@@ -141,16 +129,6 @@ struct EquilibriumGradients {
   /// Where a motion costs nothing, as of a rod that is free to spin: of the work of what is out of balance over that
   /// motion, and over another at random. What the former depends on drives it, and has no derivative.
   std::vector<EquilibriumGradient> works;
-};
-
-/// What a rod is to be like; what is empty stays as it is.
-struct RodState {
-  int rod = 0;
-  MatrixX3 positions;   ///< per node [m]
-  MatrixX3 directors;   ///< first ones, per edge; given where positions are
-  VectorX twists;       ///< per stencil [rad/m]: which of the angles that fit the directors; given where they are
-  MatrixX3 velocities;  ///< per node [m/s]
-  VectorX spins;        ///< per edge, angular velocity about the tangent [rad/s]
 };
 
 class World {

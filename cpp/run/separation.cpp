@@ -1,9 +1,9 @@
-/// Rods that are drawn inside each other, or inside an obstacle, are moved apart before a simulation starts.
+#include "run/separation.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-#include "world/implementation.hpp"
+#include "integrators/dynamics.hpp"
 
 namespace withe {
 namespace {
@@ -161,13 +161,10 @@ class Separation {
 
 }  // namespace
 
-void World::Implementation::separate() {
-  if (systems.scheme().contact() == nullptr) return;
+double separate(const Model& model, const Parameters& parameters, const Options& options, State& state) {
   const VectorX drawn = state.q;
   Separation separation(model, parameters, options, state);
-  if (!separation.run(state)) return;
-  separated = systems.newton().norms().displacement(state.q - drawn);
-  make_plan();
+  return separation.run(state) ? StepNorms(model).displacement(state.q - drawn) : 0.0;
 }
 
 }  // namespace withe

@@ -1,0 +1,207 @@
+#include "run/checks.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Geometry>
+
+#include "common/check.hpp"
+#include "common/text.hpp"
+#include "model/edge_vectors.hpp"
+
+namespace withe {
+namespace {
+
+/// True if a node of one edge is where a node of the other is, to rounding.
+bool nodes_meet(const Model& model, const VectorX& q, int a, int b) {
+  const int first[2] = {model.edge_tail[at(a)], model.edge_head[at(a)]},
+            second[2] = {model.edge_tail[at(b)], model.edge_head[at(b)]};
+  for (int i : first)
+    for (int j : second)
+      if ((node_position(model, q, i) - node_position(model, q, j)).norm() <= 1e-9 * model.length_scale) return true;
+  return false;
+}
+
+}  // namespace
+
+void check_impacts(const Options& options, const ContactDescription& contact) {
+  const auto elastic = [](const ContactPairDescription& pair) {
+    return !(pair.restitution >= 0.0) || pair.restitution == 1.0;
+  };
+  require(options.integrator != Integrator::verlet ||
+              ((!contact.rods || contact.restitution == 1.0) && (contact.obstacle_restitution.array() == 1.0).all() &&
+               std::all_of(contact.pairs.begin(), contact.pairs.end(), elastic)),
+          "integrator 'verlet' supports elastic impacts only: use restitution=1, or an "
+          "implicit integrator");
+}
+
+void check_reversible(const Model& model, const Options& options, const Parameters& p) {
+  check_impacts(options, model.description.contact);
+  require(
+      options.integrator != Integrator::verlet || std::none_of(model.supports.begin(), model.supports.end(),
+                                                               [](const Support& s) { return s.active && s.yields(); }),
+      "integrator 'verlet' supports rigid hands only: use an implicit integrator for "
+      "a hand that yields");
+  if (options.integrator != Integrator::fourth_order) return;
+  require(!model.description.contact.any(),
+          "integrator 'fourth_order' does not support contact, because its inner steps "
+          "go back in time: use integrator 'implicit_midpoint' or 'energy_momentum'");
+  const std::string instead =
+      ", because its inner steps go back in time: use integrator 'implicit_midpoint' "
+      "or 'energy_momentum'";
+  require(!p.viscous, "integrator 'fourth_order' does not support viscosity" + instead);
+  require(model.description.fluid.model == FluidModel::none,
+          "integrator 'fourth_order' does not support a fluid" + instead);
+  for (const Support& s : model.supports)
+    require(!s.active || !s.yields() ||
+                (!std::isfinite(s.description.hand.force_limit) && s.description.hand.friction == 0.0),
+            "integrator 'fourth_order' does not support hands that slip" + instead);
+  require((p.spring_damping.array() == 0.0).all(),
+          "integrator 'fourth_order' does not support damping of springs" + instead);
+  require((p.joint_damping.array() == 0.0).all(),
+          "integrator 'fourth_order' does not support damping of joints" + instead);
+  if (!p.dragged) return;
+  for (int i = 0; i < model.node_count; ++i)
+    require(p.node_drag(i) * options.time_step <= p.node_mass(i),
+            "integrator 'fourth_order' supports drag for a time_step up to mass over drag "
+            "only, " +
+                std::to_string(p.node_mass(i) / p.node_drag(i)) + " s at node " + std::to_string(i) + instead);
+}
+
+void check_contact(const ContactDescription& contact, const ContactDescription& own) {
+  const auto valid = [](const auto& v) { return v.size() == 0 || (v.allFinite() && v.minCoeff() >= 0.0); };
+  const auto share = [](double x) { return x >= 0.0 && x <= 1.0; };
+  require(contact.obstacle_friction.rows() == own.obstacle_friction.rows() &&
+              (contact.obstacle_rolling.size() == 0 || contact.obstacle_rolling.size() == own.obstacle_friction.rows()),
+          "friction needs three coefficients an obstacle, and rolling friction one");
+  require(std::isfinite(contact.friction) && contact.friction >= 0.0 && valid(contact.obstacle_friction) &&
+              valid(contact.obstacle_rolling),
+          "friction must not be negative");
+  require(std::isfinite(contact.slip_tolerance) && contact.slip_tolerance > 0.0, "slip_tolerance must be positive");
+  require(contact.obstacle_restitution.size() == own.obstacle_restitution.size(),
+          "restitution needs one coefficient an obstacle");
+  require(share(contact.restitution) &&
+              std::all_of(contact.obstacle_restitution.begin(), contact.obstacle_restitution.end(), share),
+          "restitution must be from 0 to 1");
+  require(std::isfinite(contact.stiffness) && contact.stiffness >= 0.0, "stiffness of contact must not be negative");
+}
+
+void check_shares(const Model& model, const ContactPairDescription& pair) {
+  if (pair.shares.size() == 0) return;
+  require((pair.first < 0) != (pair.second < 0), "friction varies between a rod and an obstacle only");
+  const auto& rod = model.description.rods[at(std::max(pair.first, pair.second))];
+  const auto size = static_cast<Eigen::Index>(rod.nodes.size()) + rod.rest_lengths.size();
+  require(pair.shares.size() == size, "friction of rod '" + rod.name + "' needs one number a node and an edge, ", size);
+  require(pair.shares.allFinite() && pair.shares.minCoeff() >= 0.0, "friction must be finite and not negative");
+}
+
+void check_turn(const Model& model, int obstacle, const Vector3& turn) {
+  const ObstacleDescription& drawn = model.description.contact.obstacles[at(obstacle)];
+  const bool plane = drawn.kind == ObstacleKind::plane;
+  const Vector3 axis = plane ? drawn.other : Vector3(drawn.other - drawn.point);
+  require(turn.allFinite(), "turn of an obstacle must be finite");
+  require(axis.cross(turn).norm() <= 1e-9 * axis.norm() * turn.norm(),
+          "obstacle '" + drawn.name + "' can turn about " + (plane ? "its normal" : "its axis") + " only");
+}
+
+void check_pose(const Model& model, const SupportMotion& now, int support, const std::optional<Vector3>& position,
+                const std::optional<Matrix3>& rotation) {
+  require(!position || position->allFinite(), "position must be finite");
+  require(
+      !rotation || (rotation->allFinite() && (rotation->transpose() * *rotation - Matrix3::Identity()).norm() < 1e-6 &&
+                    rotation->determinant() > 0.0),
+      "rotation must be a proper rotation matrix");
+  const Support& held = model.supports[at(support)];
+  if (rotation && held.description.kind == SupportKind::spinning_clamp)
+    require((*rotation * held.tangent - now.rotation * held.tangent).norm() < 1e-9,
+            "a clamp that may spin keeps its tangent: use hold='edge' to turn the tangent");
+}
+
+void check_overlap(const Model& model, const Parameters& parameters, const State& state, const Contact* contact) {
+  const SceneDescription& description = model.description;
+  if (contact == nullptr) return;
+  const ContactReport* deepest = nullptr;
+  const std::vector<ContactReport> reports = contact->report(state, parameters);
+  const bool bars = description.contact.law == ContactLaw::barrier;  // which is infinite where surfaces touch
+  double depth = bars ? 0.0 : kMaxDepth, overlap = 0.0;
+  const auto bodies = [&](const ContactKey& key) {
+    return std::pair(model.edge_rod[at(key.a)], key.b < 0 ? key.b : model.edge_rod[at(key.b)]);
+  };
+  for (const ContactReport& r : reports) {
+    const auto goes_on = [&](const ContactRecord& record) { return bodies(record.key) == bodies(r.key); };
+    if (std::any_of(state.contacts.begin(), state.contacts.end(), goes_on)) continue;
+    const double radius = r.key.b < 0
+                              ? contact->surfaces().radius(r.key.a)
+                              : std::min(contact->surfaces().radius(r.key.a), contact->surfaces().radius(r.key.b));
+    const double drawn = bars ? -r.gap : r.drawn_depth();
+    if (drawn <= depth * radius && !(bars && r.gap <= 0.0)) continue;
+    depth = drawn / radius;
+    overlap = drawn;
+    deepest = &r;
+  }
+  if (deepest == nullptr) return;
+  const auto name = [&](int edge) {
+    const int rod = model.edge_rod[at(edge)];
+    return "edge " + std::to_string(edge - model.rod_first_edge[at(rod)]) + " of rod '" +
+           description.rods[at(rod)].name + "'";
+  };
+  const std::string other = deepest->key.b < 0 ? "'" + description.contact.obstacles[at(-1 - deepest->key.b)].name + "'"
+                                               : name(deepest->key.b);
+  const bool meet = deepest->key.b >= 0 && nodes_meet(model, state.q, deepest->key.a, deepest->key.b);
+  const std::string advice =
+      description.contact.overlap == Overlap::separate
+          ? std::string(" m at the start and cannot be moved apart") +
+                (model.planar() && deepest->key.b >= 0 ? " within their plane: build with planar=False, " : ": ") +
+                "draw them apart, or leave the pair out with ignore_contact"
+          : std::string(" m at the start: ") + (meet ? "join the nodes that meet there, " : "") +
+                "draw them apart, leave the pair out with ignore_contact, or use "
+                "enable_contact(overlap='separate')";
+  require(false, name(deepest->key.a) + " and " + other + " overlap by " + text(0.0 + overlap) + advice);
+}
+
+bool leaves_plane(const Model& model, const SupportMotion& now, int support, const std::optional<Vector3>& position,
+                  const std::optional<Matrix3>& rotation) {
+  if (!model.planar()) return false;
+  const Plane& plane = *model.plane;
+  const Vector3& from = model.supports[at(support)].is_hand() ? now.position : plane.origin;  // a hand may be beside it
+  return (position && std::abs((*position - from).dot(plane.normal)) > 1e-9 * model.length_scale) ||
+         (rotation && (*rotation * now.rotation.transpose() * plane.normal - plane.normal).norm() > 1e-9);
+}
+
+bool leaves_plane(const Model& model, LoadKind kind, const Eigen::Ref<const MatrixX3>& values) {
+  if (!model.planar()) return false;
+  const Vector3& normal = model.plane->normal;
+  return std::any_of(values.rowwise().begin(), values.rowwise().end(), [&](const auto& row) {
+    const Vector3 value = row;
+    const double off = is_axial(kind) ? value.cross(normal).norm() : std::abs(value.dot(normal));
+    return off > 1e-8 * value.norm();
+  });
+}
+
+std::string leaving_plane(const Model& model, const ParameterSetting& setting) {
+  if (!model.planar()) return "";
+  const auto& [kind, rod, values] = setting;
+  const auto name = [&, r = rod] { return " of rod '" + model.description.rods[at(r)].name + "'"; };
+  if (kind == ParameterKind::natural_curvature) {
+    const Vector2 p = model.planar_components[at(rod)];
+    for (Eigen::Index i = 0; i < values.rows(); ++i)
+      if (std::abs(values(i, 0) * p(1) - values(i, 1) * p(0)) > 1e-8 * values.row(i).norm())
+        return "natural curvature" + name();
+  } else if (kind == ParameterKind::natural_twist) {
+    if ((values.array() != 0.0).any()) return "natural twist" + name();
+  } else if (kind == ParameterKind::bend_stiffness) {
+    const Vector2 p = model.planar_components[at(rod)];
+    const bool isotropic = (values.col(0).array() == values.col(1).array()).all();
+    if (!isotropic && p.cwiseAbs().minCoeff() > 1e-9) return "the section" + name() + ", at an angle to it,";
+  } else if (kind == ParameterKind::joint_moment || kind == ParameterKind::joint_rest_angle) {
+    for (std::size_t j = 0; j < model.joint_angles.size(); ++j)
+      if (!model.joint_angles[j].turns() && values(values.rows() == 1 ? 0 : static_cast<Eigen::Index>(j), 0) != 0.0)
+        return "a revolute joint";
+  } else if (kind == ParameterKind::gravity) {
+    const Vector3 gravity = values.row(0);
+    if (std::abs(gravity.dot(model.plane->normal)) > 1e-8 * gravity.norm()) return "gravity";
+  }
+  return "";
+}
+
+}  // namespace withe
