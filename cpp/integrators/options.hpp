@@ -30,6 +30,17 @@ struct Options {
   Without heuristics;             ///< all are used but for measurements
 };
 
+/// True for rules that conserve energy or gain it as the midpoint rule does, with forces in the middle of each step.
+inline bool acts_in_middle(Integrator integrator) {
+  return integrator == Integrator::implicit_midpoint || integrator == Integrator::energy_momentum ||
+         integrator == Integrator::fourth_order;
+}
+
+/// Time at which loads and actuation act in a step of dt from `start` [s]: its middle, or its end.
+inline double force_time(const Options& options, double start, double dt) {
+  return start + (acts_in_middle(options.integrator) ? 0.5 : 1.0) * dt;
+}
+
 /// The form of the equations that an integrator solves.
 EquationOptions equation_options(const Options& options);
 

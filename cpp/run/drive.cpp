@@ -2,9 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string>
 
-#include "common/check.hpp"
 #include "run/hold.hpp"
 
 namespace withe {
@@ -96,29 +94,6 @@ void prescribe(const Model& model, const Settings& settings, const Moving& now, 
       out.obstacles.push_back(obstacle_place(model, drawn, settings.obstacle_motions[out.obstacles.size()].at(time)));
   out.custom = {};
   out.respond = nullptr;
-}
-
-void check_custom_forces(const Model& model, const CustomForces& now) {
-  const SceneDescription& description = model.description;
-  const auto check = [&](const MatrixX3& table, const std::string& what) {
-    require(table.rows() == model.node_count, what + " must have one row a node, " + std::to_string(model.node_count) +
-                                                  ", got " + std::to_string(table.rows()));
-    require(table.allFinite(), what + " must be finite");
-  };
-  check(now.forces, "custom force");
-  if (description.custom_moments) check(now.moments, "custom moment");
-  if (model.planar()) {
-    const Vector3& n = model.plane->normal;
-    const double off = description.custom_moments ? (now.moments - now.moments * n * n.transpose()).norm() : 0.0;
-    require((now.forces * n).norm() <= 1e-8 * now.forces.norm() && off <= 1e-8 * now.moments.norm(),
-            "a custom force leaves the plane of the scene: build the scene with "
-            "planar=False");
-  }
-  const Eigen::Index columns = 3 * model.node_count, rows = (description.custom_moments ? 2 : 1) * columns;
-  for (const SparseMatrix* m : {&now.by_position, &now.by_velocity})
-    require(m->size() == 0 || (m->rows() == rows && m->cols() == columns), "derivatives of a custom force must have " +
-                                                                               std::to_string(rows) + " rows and " +
-                                                                               std::to_string(columns) + " columns");
 }
 
 }  // namespace withe

@@ -1,10 +1,9 @@
 #pragma once
-/// Quantities that are prescribed to a scene at a time: natural shapes, poses of supports, places of obstacles and
-/// custom forces.
+/// Quantities that are prescribed to a scene at a time: natural shapes, poses of supports and places of
+/// obstacles.
 
 #include <vector>
 
-#include "forces/custom_forces.hpp"
 #include "run/running.hpp"
 
 namespace withe {
@@ -31,9 +30,5 @@ void prescribe(const Model& model, const Settings& settings, const Moving& now, 
 ObstacleWay obstacle_way(const Model& model, const State& state, int obstacle);
 /// Longest way of an obstacle between two states [m].
 double farthest_obstacle(const State& from, const State& to);
-
-/// Throws std::invalid_argument unless tables and derivatives have the shapes of the scene, and forces stay in its
-/// plane.
-void check_custom_forces(const Model& model, const CustomForces& now);
 
 }  // namespace withe

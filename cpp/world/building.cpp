@@ -1,12 +1,9 @@
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include "common/check.hpp"
 #include "common/text.hpp"
-#include "forces/tendon.hpp"
-#include "geometry/rotation.hpp"
 #include "model/edge_vectors.hpp"
 #include "run/checks.hpp"
 #include "run/end_corrections.hpp"
@@ -17,18 +14,8 @@
 #include "world/implementation.hpp"
 
 namespace withe {
-namespace {
-
-/// Explicit steps would have to be shorter for the narrow contact of light loads.
-SceneDescription described_for(SceneDescription scene, const Options& options) {
-  if (options.integrator == Integrator::verlet) scene.contact.light = 1.0;
-  return scene;
-}
-
-}  // namespace
-
 World::Implementation::Implementation(SceneDescription scene, Options choice)
-    : description(described_for(std::move(scene), choice)), drawn_contact(description.contact), options(choice) {
+    : Built(built_of(std::move(scene), choice)) {
   require(options.time_step > 0.0 && std::isfinite(options.time_step), "time_step must be positive and finite");
   rebuild(Rebuild::first);
   check_reversible(model, options, parameters);
@@ -36,7 +23,7 @@ World::Implementation::Implementation(SceneDescription scene, Options choice)
     separated = separate(model, parameters, options, state);
   check_overlap(model, parameters, state, contact());
   if (options.integrator == Integrator::verlet) {
-    stable_explicit_step = stable_step(systems.scheme(), parameters, at_rest(), state, systems.work);
+    stable_explicit_step = stable_step(systems.scheme(), parameters, custom().at_rest(), state, systems.work);
     require(options.time_step <= stable_explicit_step,
             "time_step must not exceed the stable step of the explicit scheme, " + text(stable_explicit_step) +
                 " s, got " + text(options.time_step) + " s");
@@ -48,17 +35,7 @@ World::Implementation::Implementation(const Implementation& other) : Implementat
 }
 
 World::Implementation::Implementation(const Implementation& other, Unbuilt /*unused*/)
-    : Running(other),
-      description(other.description),
-      drawn_contact(other.drawn_contact),
-      options(other.options),
-      model(other.model),
-      plane_left_by(other.plane_left_by),
-      statistics(other.statistics),
-      separated(other.separated),
-      stable_explicit_step(other.stable_explicit_step),
-      spatial(other.spatial),
-      warnings(other.warnings) {
+    : Built(other), Running(other), statistics(other.statistics), warnings(other.warnings) {
   systems.work.newton.counters = other.systems.work.newton.counters;
   listen();
 }
@@ -68,71 +45,6 @@ void World::Implementation::listen() {
     if (interrupted.exchange(false)) throw Interrupted();
     if (callbacks.poll) callbacks.poll();
   };
-}
-
-/// The model for the supports that are active. Released ones keep their row until another takes it, but hold nothing.
-Model World::Implementation::model_of_active(Rebuild why) {
-  SceneDescription active = description;
-  active.supports.clear();
-  std::vector<std::size_t> index;
-  for (std::size_t s = 0; s < description.supports.size(); ++s) {
-    if (s < model.supports.size() && !model.supports[s].active) continue;
-    active.supports.push_back(description.supports[s]);
-    index.push_back(s);
-  }
-  Model fresh = build_model(active, spatial ? std::optional<bool>(false) : options.planar);
-  if (why == Rebuild::running && !model.planar() && fresh.planar()) {
-    spatial = true;  // what kept the drawing from being planar is gone, but the state need not be in the plane
-    fresh = build_model(active, false);
-  }
-  std::vector<Support> all(description.supports.size());
-  for (std::size_t s = 0; s < all.size(); ++s) all[s].description = description.supports[s];
-  for (std::size_t k = 0; k < index.size(); ++k) all[index[k]] = fresh.supports[k];
-  fresh.supports = all;
-  return fresh;
-}
-
-/// Drops what has the sizes of the old model.
-void World::Implementation::drop_scratch() {
-  systems.drop_scratch();
-  spatial_twin.reset();
-  listen();
-  energy_scratch = EnergyScratch{};
-  predictor.clear();
-}
-
-/// The state as it is drawn.
-void World::Implementation::begin_as_drawn() {
-  parameters = initial_parameters(model);
-  parameters.lumped = options.integrator == Integrator::verlet;
-  state = initial_state(model);
-  ramps.assign(description.rods.size(), NaturalRamp{});
-  motions.assign(description.supports.size(), SupportMotion{});
-  custom_force = MatrixX3::Zero(model.node_count, 3);
-  custom_moments = MatrixX3::Zero(description.custom_moments ? model.node_count : 0, 3);
-  for (std::size_t s = 0; s < motions.size(); ++s) {
-    motions[s].position = motions[s].from_position = motions[s].to_position =
-        node_position(model, state.q, model.supports[s].node);
-    if (model.supports[s].is_hand()) grasp(model, configuration(), static_cast<int>(s), state, motions);
-  }
-  note_drawn_actuation();
-}
-
-/// Notes where rods are not drawn as they are free of stress, or tendons pull from the start.
-void World::Implementation::note_drawn_actuation() {
-  constexpr double kRounded = 1e-9;  // [rad] of a stencil
-  const Actuation now = actuation_of(parameters);
-  actuation_before = relaxed_actuation(model, parameters, configuration());
-  double apart = 0.0;
-  for (std::size_t r = 0; r < now.curvature.size(); ++r) {
-    if (now.twist[r].size() == 0) continue;
-    const VectorX& voronoi = model.rod_voronoi[r];
-    const MatrixX2 bent = now.curvature[r] - actuation_before.curvature[r];
-    const VectorX twisted = now.twist[r] - actuation_before.twist[r];
-    apart = std::max({apart, (voronoi.asDiagonal() * bent).cwiseAbs().maxCoeff(),
-                      voronoi.cwiseProduct(twisted).cwiseAbs().maxCoeff()});
-  }
-  actuation_changed = apart > kRounded || !now.tension.isZero(0.0);
 }
 
 /// The running state, of another model.
@@ -171,12 +83,16 @@ void World::Implementation::rebuild(Rebuild why) {
   account_for_settings();
   if (tape) tape->refuse("supports were added or removed during the run, or the scene left its plane");
   const double stored = why == Rebuild::running ? elastic_energy(model, parameters, state, energy_scratch) : 0.0;
-  Model fresh = model_of_active(why);
-  drop_scratch();
+  Model fresh = model_of_active(*this, why == Rebuild::running);
+  systems.drop_scratch();
+  spatial_twin.reset();
+  listen();
+  energy_scratch = EnergyScratch{};
+  predictor.clear();
   const Model old = std::exchange(model, std::move(fresh));
   systems.build(model, options);
   if (why == Rebuild::first)
-    begin_as_drawn();
+    begin_as_drawn(*this, *this);
   else
     carry_over(old, why);
   description.uncorrected_ends = model.description.uncorrected_ends;

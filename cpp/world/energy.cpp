@@ -55,7 +55,7 @@ void World::Implementation::check_energy() {
 
 /// What to say where the time step is above the stable one at the present state; else nothing.
 std::string World::Implementation::longest_explicit_step() {
-  const double stable = stable_step(systems.scheme(), parameters, at_rest(), state, systems.work);
+  const double stable = stable_step(systems.scheme(), parameters, custom().at_rest(), state, systems.work);
   if (!(options.time_step > stable)) return "";
   const bool slips = systems.scheme().contact() && systems.scheme().contact()->regularises();
   return ": take a time_step below " + text(stable) + " s" +

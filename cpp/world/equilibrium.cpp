@@ -75,7 +75,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt, Saddles saddles)
   StaticResult r;
   try {
     even_contact(parameters, system, Prescribed::nothing(), false, state);
-    prescribe_custom_at_rest(time, prescribed);
+    custom().put_response_at_rest(time, prescribed);
     VectorX reached = state.q;
     if (boundary.hold(0.0, 1.0, reached)) check_squeezed(system, prescribed, reached, dt);
     if (drifts(model, parameters, state, system, prescribed, systems.work.newton.data)) {
@@ -158,7 +158,7 @@ EquilibriumResult World::Implementation::settle(Equations& system, StaticResult&
   retire_ramps();
   statistics.steps += 1;
   steps_taken += 1;
-  const Prescribed still = at_rest();
+  const Prescribed still = custom().at_rest();
   system.begin(state, parameters, StepRule::statics, 0.0, still);
   system.evaluate(state.q, false, nullptr, systems.work.newton.data);
   note_reactions();
@@ -230,7 +230,7 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
     Equations& system = self.systems.statics();
     Prescribed& prescribed = self.prescribed;
     prescribed = {};
-    self.prescribe_custom_at_rest(self.state.time, prescribed);
+    self.custom().put_response_at_rest(self.state.time, prescribed);
     even_contact(self.parameters, system, Prescribed::nothing(), false, self.state);
     const Boundary boundary = boundary_between(self.model, self, system, from, target, prescribed);
     self.rest();
@@ -275,7 +275,7 @@ EquilibriumPath World::equilibrium_path(const PathOptions& wanted) {
 void World::Implementation::refresh_reactions() {
   if (reaction_current) return;
   Equations& system = systems.statics();
-  const Prescribed still = at_rest();
+  const Prescribed still = custom().at_rest();
   system.begin(state, parameters, StepRule::statics, 0.0, still);
   system.evaluate(state.q, false, nullptr, systems.work.newton.data);
   note_reactions();

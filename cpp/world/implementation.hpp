@@ -5,7 +5,9 @@
 
 #include "integrators/statics.hpp"
 #include "model/edge_vectors.hpp"
+#include "run/built.hpp"
 #include "run/crossings.hpp"
+#include "run/custom_drive.hpp"
 #include "run/running.hpp"
 #include "run/systems.hpp"
 #include "run/warnings.hpp"
@@ -24,7 +26,7 @@ struct Callbacks {
 /// Why a model is built: at first, because supports changed or the plane was left, or to take a snapshot's state.
 enum class Rebuild { first, running, restored };
 
-struct World::Implementation : Running {
+struct World::Implementation : Built, Running {
   Implementation(SceneDescription description, Options options);
   /// The same scene at the same point, without what `lagged` knows: see `recall`.
   Implementation(const Implementation& other);
@@ -32,10 +34,6 @@ struct World::Implementation : Running {
   struct Unbuilt {};
   Implementation(const Implementation& other, Unbuilt);
 
-  SceneDescription description;
-  ContactDescription drawn_contact;  ///< which holds until it is set
-  Options options;
-  Model model;
   Systems systems;
   std::unique_ptr<Implementation> spatial_twin;  ///< of a planar scene: see `buckles_out_of_plane`
   std::shared_ptr<Tape> tape;                    ///< of a run that is kept for gradients
@@ -54,13 +52,9 @@ struct World::Implementation : Running {
   } mark;  ///< at the start of a time step
   Plan plan;
   bool plan_current = false;  ///< made when it is asked for
-  std::string plane_left_by;  ///< what left the plane, where something did
   Statistics statistics;
   Callbacks callbacks;
   std::atomic<bool> interrupted{false};
-  double separated = 0;             ///< how far overlapping rods were moved before the start [m]
-  double stable_explicit_step = 0;  ///< [s]; 0 when not computed
-  bool spatial = false;             ///< left its plane while running
   Warnings warnings;
   std::unique_ptr<CrossingWatch> crossing_watch;  ///< made when first needed
   std::vector<LeftRing> left_rings;               ///< not heard of yet
@@ -70,10 +64,6 @@ struct World::Implementation : Running {
   /// Lets interruptions reach the solver.
   void listen();
   void rebuild(Rebuild why);
-  Model model_of_active(Rebuild why);
-  void drop_scratch();
-  void begin_as_drawn();
-  void note_drawn_actuation();
   void carry_over(const Model& old, Rebuild why);
   /// Equations for other loads than before.
   void remake_equations();
@@ -100,23 +90,11 @@ struct World::Implementation : Running {
   Contact* contact() const { return systems.scheme().contact(); }
   void retire_ramps();
   void note_actuation();
-  /// The present custom forces, and nothing else.
-  Prescribed at_rest() const;
-  CustomForces custom_forces(double time, const VectorX& q, const VectorX& v, bool derivatives) const;
-  /// Keeps custom forces as the present ones.
-  void note(const CustomForces& now);
-  /// Custom forces at a time, without velocities; empty where there are none.
-  CustomResponse custom_response_at_rest(double time) const;
+  CustomDrive custom() { return {model, callbacks.force, *this}; }
   /// Prescribes the custom forces of a step of dt, whose held unknowns are prescribed already.
   void prescribe_custom(double dt, Prescribed& out);
-  /// Prescribes custom forces at rest at a time, which are solved for.
-  void prescribe_custom_at_rest(double time, Prescribed& out);
-  /// Evaluates custom forces at a time and a state, which become the present ones.
-  void find_custom_force(double time, const VectorX& q, const VectorX& v);
   /// Evaluates custom forces where the explicit rules of a step of dt have them act.
   void find_custom_force_of_step(double dt, Prescribed& out);
-  /// The present custom forces act throughout a step.
-  void put_custom_force(Prescribed& out) const;
 
   // hands.cpp
   bool release_left_rings();
@@ -159,8 +137,6 @@ struct World::Implementation : Running {
   void call_before_step(double force_time, double end_time);
   bool scheme_step(double dt, PartResult& part);
   bool composed_step(double dt, PartResult& part);
-  bool conserving() const;
-  double force_time(double start, double dt) const;
   bool inner_step(double dt, int slot, PartResult& part);
   StepRule rule_of_step() const;
   StepResult step_by_rule(double dt, int slot);

@@ -51,8 +51,8 @@ Linearisation World::linearise() const {
   const Model& model = self.model;
   // Equations of its own: what is read out changes no matrix that is yet to serve.
   Equations system(model, self.systems.static_options());
-  Prescribed prescribed = self.at_rest();
-  prescribed.respond = self.custom_response_at_rest(self.state.time);
+  Prescribed prescribed = self.custom().at_rest();
+  prescribed.respond = self.custom().response_at_rest(self.state.time);
   system.begin(self.state, self.parameters, StepRule::statics, 0.0, prescribed);
   StepData evaluation;
   const SparseMatrix basis = free_basis(model), back = basis.transpose();

@@ -1,25 +1,9 @@
-#include <algorithm>
-#include <cmath>
 #include <utility>
 
-#include "common/check.hpp"
-#include "model/edge_vectors.hpp"
-#include "run/drive.hpp"
+#include "run/custom_drive.hpp"
 #include "world/implementation.hpp"
 
 namespace withe {
-
-CustomForces World::Implementation::custom_forces(double time, const VectorX& q, const VectorX& v,
-                                                  bool derivatives) const {
-  MatrixX3 positions(model.node_count, 3), velocities(model.node_count, 3);
-  for (int i = 0; i < model.node_count; ++i) {
-    positions.row(i) = node_position(model, q, i);
-    velocities.row(i) = node_vector(model, v, i);
-  }
-  CustomForces now = callbacks.force(time, positions, velocities, derivatives);
-  check_custom_forces(model, now);
-  return now;
-}
 
 /// Notes the actuation that the state came with, before it changes.
 void World::Implementation::note_actuation() {
@@ -37,54 +21,15 @@ void World::Implementation::retire_ramps() {
   }
 }
 
-Prescribed World::Implementation::at_rest() const {
-  Prescribed out;
-  put_custom_force(out);
-  return out;
-}
-
-void World::Implementation::note(const CustomForces& now) {
-  custom_force = now.forces;
-  if (description.custom_moments) custom_moments = now.moments;
-}
-
-void World::Implementation::find_custom_force(double time, const VectorX& q, const VectorX& v) {
-  note(custom_forces(time, q, v, false));
-}
-
 /// Custom forces of a step of dt are those where the scheme's own forces act.
 void World::Implementation::prescribe_custom(double dt, Prescribed& out) {
   if (!description.has_custom_force) return;
   if (callbacks.force && description.custom_implicit && options.integrator != Integrator::verlet) {
-    out.respond = [this, time = force_time(state.time, dt)](const VectorX& q, const VectorX& v, bool derivatives) {
-      CustomForces now = custom_forces(time, q, v, derivatives);
-      note(now);
-      return now;
-    };
+    custom().put_response(force_time(options, state.time, dt), out);
     return;
   }
   if (callbacks.force) find_custom_force_of_step(dt, out);
-  put_custom_force(out);
-}
-
-CustomResponse World::Implementation::custom_response_at_rest(double time) const {
-  if (!callbacks.force) return nullptr;
-  return [this, time](const VectorX& q, const VectorX& v, bool derivatives) {
-    CustomForces now = custom_forces(time, q, VectorX::Zero(v.size()), derivatives);
-    now.by_velocity.resize(0, 0);
-    return now;
-  };
-}
-
-void World::Implementation::prescribe_custom_at_rest(double time, Prescribed& out) {
-  put_custom_force(out);
-  CustomResponse at_rest = custom_response_at_rest(time);
-  if (!at_rest) return;
-  out.respond = [this, at_rest = std::move(at_rest)](const VectorX& q, const VectorX& v, bool derivatives) {
-    CustomForces now = at_rest(q, v, derivatives);
-    note(now);
-    return now;
-  };
+  custom().put(out);
 }
 
 /// Forces at the start of a step would feed a spring's oscillation, by 1 + (w dt)^2 / 2 a step. At q0 + (dt / 2) v0,
@@ -95,14 +40,14 @@ void World::Implementation::prescribe_custom_at_rest(double time, Prescribed& ou
 void World::Implementation::find_custom_force_of_step(double dt, Prescribed& out) {
   VectorX &q = systems.work.z, &v = systems.work.velocity;
   if (options.integrator == Integrator::verlet) {
-    if (!state.acceleration_current) find_custom_force(state.time, state.q, state.v);
-    put_custom_force(out);
+    if (!state.acceleration_current) custom().find(state.time, state.q, state.v);
+    custom().put(out);
     begin_verlet(systems.scheme(), parameters, out, dt, state, systems.work);
-    find_custom_force(state.time + dt, q, v);
+    custom().find(state.time + dt, q, v);
     return;
   }
   const Assembler& assembler = systems.scheme().assembler();
-  const double time = force_time(state.time, dt);
+  const double time = force_time(options, state.time, dt);
   const auto hold = [&] {
     assembler.project(v);
     assembler.add_held_change(state.q, out.held.q, 1.0 / dt, v);
@@ -110,15 +55,11 @@ void World::Implementation::find_custom_force_of_step(double dt, Prescribed& out
   v = state.v;
   hold();
   q = state.q + (time - state.time) * v;
-  if (conserving()) {
+  if (acts_in_middle(options.integrator)) {
     extrapolate_velocity(state, time, v);
     hold();
   }
-  find_custom_force(time, q, v);
-}
-
-void World::Implementation::put_custom_force(Prescribed& out) const {
-  if (description.has_custom_force) out.custom = applied_forces(model, custom_force, custom_moments);
+  custom().find(time, q, v);
 }
 
 }  // namespace withe

@@ -156,7 +156,7 @@ Contact* World::Implementation::watched_contact() const {
 
 /// Turn of what is held in a part, over the greatest that is accurate.
 double World::Implementation::held_turn_of(const PartResult& part) const {
-  if (!options.adaptive || !conserving()) return 0.0;
+  if (!options.adaptive || !acts_in_middle(options.integrator)) return 0.0;
   return part.held_turn / (options.integrator == Integrator::fourth_order ? kMostHeldTurnOfPart : kMostHeldTurn);
 }
 
@@ -205,17 +205,6 @@ void World::Implementation::commit_step(const PartResult& part) {
   retire_ramps();
 }
 
-/// Whether each implicit step conserves or pumps like the midpoint rule, with forces at its middle.
-bool World::Implementation::conserving() const {
-  return options.integrator == Integrator::implicit_midpoint || options.integrator == Integrator::energy_momentum ||
-         options.integrator == Integrator::fourth_order;
-}
-
-/// When loads and actuation act in a step: at its middle under the midpoint rules, else at its end.
-double World::Implementation::force_time(double start, double dt) const {
-  return start + (conserving() ? 0.5 : 1.0) * dt;
-}
-
 /// One step of the scheme; changes nothing where it does not converge.
 bool World::Implementation::scheme_step(double dt, PartResult& part) {
   return options.integrator == Integrator::fourth_order ? composed_step(dt, part) : inner_step(dt, 0, part);
@@ -249,8 +238,8 @@ void World::Implementation::call_before_step(double force_time, double end_time)
     return;
   }
   if (!state.acceleration_current) {
-    if (callbacks.force) find_custom_force(state.time, state.q, state.v);
-    find_acceleration(systems.scheme(), parameters, at_rest(), end_time - state.time, state, systems.work);
+    if (callbacks.force) custom().find(state.time, state.q, state.v);
+    find_acceleration(systems.scheme(), parameters, custom().at_rest(), end_time - state.time, state, systems.work);
   }
   const bool planar = model.planar();
   callbacks.before_step(force_time, end_time);
@@ -259,7 +248,7 @@ void World::Implementation::call_before_step(double force_time, double end_time)
 
 /// Asks for what is prescribed, and steps by dt; changes nothing where the step does not converge.
 bool World::Implementation::inner_step(double dt, int slot, PartResult& part) {
-  const double start = state.time, end = start + dt, middle = force_time(start, dt);
+  const double start = state.time, end = start + dt, middle = force_time(options, start, dt);
   call_before_step(middle, end);
   const bool ramped = are_active(ramps);
   double actuation = 0.0;

@@ -159,7 +159,7 @@ void World::Implementation::keep_reactions(double dt, bool begins) {
   note_residual();
   note_tensions();
   if (!model.planar() && rule_of_step() != StepRule::energy_momentum)
-    make_frame_moments(model, prescribed.held.q, conserving() ? 0.5 : 1.0, *this);
+    make_frame_moments(model, prescribed.held.q, acts_in_middle(options.integrator) ? 0.5 : 1.0, *this);
   if (begins) {
     impulses.clear();
     impulse_time = 0.0;
