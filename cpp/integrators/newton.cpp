@@ -141,9 +141,8 @@ class Newton::Solve {
     return (balance_.either && reuse_.at_end()) || (balance_.floor && stagnation_.reached());
   }
 
-  /// Takes a step; false where there is none, or none that may lead to the solution.
-  bool iterate() {
-    ++work_.counters.iterations;
+  /// Finds a step; false where the matrix has no factorisation, or the step is not finite.
+  bool find_step() {
     if (reuse_.fresh() || reuse_.pending()) {
       if (!system_.factorize()) return false;
       reuse_.fresh() ? reuse_.note_matrix() : reuse_.note_factorized();
@@ -154,7 +153,13 @@ class Newton::Solve {
     else
       system_.solve_for(work_.step);
     search_.forget();
-    if (!is_finite(work_.step)) return false;
+    return is_finite(work_.step);
+  }
+
+  /// Takes a step; false where there is none, or none that may lead to the solution.
+  bool iterate() {
+    ++work_.counters.iterations;
+    if (!find_step()) return false;
     double shorten = search_.shortened(z_, work_.step);
     if (uses(Heuristic::predict_friction)) system_.equations.predict_friction(work_.step, shorten, work_.contact);
     if (mixed_) predict_axial_force(system_.equations.problem(), work_.data, work_.step, work_.axial_force);

@@ -107,60 +107,80 @@ class Statics {
     last.worst_row = newton_.worst_row(work_.data.residual);
   }
 
+  /// Progress along the path.
+  struct Walk {
+    double reached = 0.0, longest = 1.0;  ///< factors: of the last point, of an increment
+    int cuts = 0, jumps = 0, points = 0;
+    bool was_stable = false;
+  };
+  enum class Point {
+    on_path,
+    left,  ///< the scene has settled elsewhere
+    lost,
+  };
+
   /// Follows the path from the present state to its end. False where not even a jump leads on.
   bool follow(StaticResult& result) {
     path_.start_out_of_balance();
     evaluate(0.0);
     neutral_ = signs_.neutral(state_, work_.data);
     if (neutral_) path_.hold_neutral();
-    NewtonResult& last = result.newton;
-    double reached = 0.0, longest = 1.0;
-    bool was_stable = false;
-    for (int cuts = 0, jumps = 0, points = 0; reached < 1.0;) {
-      if (cuts == 0) {
-        if (++points > kMaxPoints) return false;
-        path_.go_to(reached);
-        path_.find_tangent(tangent_);
-        ++last.iterations;
-        if (points == 1 && leaves_saddles_ && falls()) {
-          if (!let_fall(reached, result)) return false;
-          continue;
-        }
-        if (leaves_saddles_ && reached > 0.0 && !firm()) {
-          // A branch that was stable and is so no more is left where that happens.
-          if (was_stable && equations_.has_potential() && !stable(reached)) {
-            result.branch_changed = true;
-            leave_saddle(reached, 0);
-            if (!settle(reached, result)) return false;
-            was_stable = false;
-            continue;
-          }
-        }
-        was_stable = firm();
+    Walk walk;
+    while (walk.reached < 1.0) {
+      if (walk.cuts == 0) {
+        const Point point = begin_point(walk, result);
+        if (point == Point::lost) return false;
+        if (point == Point::left) continue;
       }
-      // The tangent of an unsupported mechanism is rounding: its path ends where it begins.
-      const bool singular = tangent_.found && tangent_.turn > kMinSingularTurn;
-      tangent_.found = tangent_.found && !singular;
-      const double by_turn = tangent_.found ? kMaxPointTurn / tangent_.turn : 1.0;
-      const double increment = std::min({1.0 - reached, longest, by_turn});
-      const double next = increment == 1.0 - reached ? 1.0 : reached + increment;
-      if (!singular && reach(next, next - reached, last)) {
-        reached = next;
-        longest = cuts == 0 ? std::max(2.0 * longest, 2.0 * increment) : increment;
-        cuts = 0;
-        continue;
-      }
-      longest = increment * (cuts == 0 ? 0.25 : 0.5);
-      ++cuts;
-      if (!singular && increment > kMinIncrement * std::min(by_turn, 1.0)) continue;
-      if (++jumps > kMaxJumps) return false;
-      const double beyond = beyond_jump(reached, increment);
-      if (!jump(beyond, beyond - reached, result)) return false;
-      reached = beyond;
-      longest = kJumpIncrements * increment;
-      cuts = 0;
+      if (!walk_on(walk, result)) return false;
     }
-    last.converged = true;
+    result.newton.converged = true;
+    return true;
+  }
+
+  /// Finds the tangent at a point, and leaves the path where the scene falls or is stable no more.
+  Point begin_point(Walk& walk, StaticResult& result) {
+    if (++walk.points > kMaxPoints) return Point::lost;
+    path_.go_to(walk.reached);
+    path_.find_tangent(tangent_);
+    ++result.newton.iterations;
+    if (walk.points == 1 && leaves_saddles_ && falls())
+      return let_fall(walk.reached, result) ? Point::left : Point::lost;
+    // A branch that was stable and is so no more is left where that happens.
+    if (leaves_saddles_ && walk.was_stable && !firm() && equations_.has_potential() && !stable(walk.reached)) {
+      result.branch_changed = true;
+      leave_saddle(walk.reached, 0);
+      if (!settle(walk.reached, result)) return Point::lost;
+      walk.was_stable = false;
+      return Point::left;
+    }
+    walk.was_stable = firm();
+    return Point::on_path;
+  }
+
+  /// Goes to the next point, tries a smaller increment, or jumps. False where there are too many jumps, or one fails.
+  bool walk_on(Walk& walk, StaticResult& result) {
+    // The tangent of an unsupported mechanism is rounding: its path ends where it begins.
+    const bool singular = tangent_.found && tangent_.turn > kMinSingularTurn;
+    tangent_.found = tangent_.found && !singular;
+    const double by_turn = tangent_.found ? kMaxPointTurn / tangent_.turn : 1.0;
+    const double increment = std::min({1.0 - walk.reached, walk.longest, by_turn});
+    const double next = increment == 1.0 - walk.reached ? 1.0 : walk.reached + increment;
+    if (!singular && reach(next, next - walk.reached, result.newton)) {
+      walk.reached = next;
+      walk.longest = walk.cuts == 0 ? std::max(2.0 * walk.longest, 2.0 * increment) : increment;
+      walk.cuts = 0;
+      return true;
+    }
+    walk.longest = increment * (walk.cuts == 0 ? 0.25 : 0.5);
+    ++walk.cuts;
+    if (!singular && increment > kMinIncrement * std::min(by_turn, 1.0)) return true;
+    if (++walk.jumps > kMaxJumps) return false;
+    const double beyond = beyond_jump(walk.reached, increment);
+    if (!jump(beyond, beyond - walk.reached, result)) return false;
+    walk.reached = beyond;
+    walk.longest = kJumpIncrements * increment;
+    walk.cuts = 0;
     return true;
   }
 
@@ -297,17 +317,13 @@ class Statics {
       const int border = border_iterations();
       const NewtonResult r = solve_interval(at_rest ? 0.0 : h, border, result.newton);
       const double found = work_.data.potential - path_.target().dot(z_);
-      const double sum = std::abs(potential) + std::abs(found), rise = found - potential - least_energy();
       const double way = newton_.norms().displacement(z_ - state_.q);
-      // A motion that goes farther is neutral, or was at a saddle, which lies higher now that waves have run out.
-      const bool leads_away = at_rest && way > slow && rise > 1e-14 * sum;
-      const bool downhill = rise <= 1e-10 * sum && !leads_away;
-      if (r.converged && (!conservative || downhill)) {
+      if (r.converged && (!conservative || leads_down(potential, found, at_rest && way > slow))) {
         path_.accept(z_);
         if (at_rest) return true;
         moved = way;
         potential = found;
-        h = std::min(longest, h * (r.iterations <= 4 + border ? 10.0 : r.iterations <= 8 + border ? 3.0 : 1.0));
+        h = std::min(longest, h * growth(r.iterations - border));
       } else if (at_rest) {
         near = kMaxRetryMove * moved;
         h = std::min(h, 0.25 * longest);
@@ -318,6 +334,16 @@ class Statics {
     result.restless = !conservative && h > shortest;
     return false;
   }
+
+  /// True if an interval lowers the potential, within rounding. A motion that goes `far` in an interval without inertia
+  /// is neutral, or was at a saddle, which lies higher now that waves have run out: it must not lead up at all.
+  bool leads_down(double before, double after, bool far) const {
+    const double sum = std::abs(before) + std::abs(after), rise = after - before - least_energy();
+    return rise <= 1e-10 * sum && !(far && rise > 1e-14 * sum);
+  }
+
+  /// Next interval over the last one, by the iterations that it took.
+  static double growth(int iterations) { return iterations <= 4 ? 10.0 : iterations <= 8 ? 3.0 : 1.0; }
 
   /// An interval of backward Euler from rest, which ends in z; of no length: equilibrium.
   NewtonResult solve_interval(double h, int border, NewtonResult& last) {

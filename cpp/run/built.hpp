@@ -1,5 +1,5 @@
 #pragma once
-/// What a running scene is made of, and what it is like as drawn.
+/// Description, choices and model of a running scene, and its state as drawn.
 
 #include <string>
 

@@ -23,6 +23,28 @@ Vector3 in_space(const Model& model, int edge, const Vector3& strain) {
   return {bent(0), bent(1), 0.0};
 }
 
+/// True if a scene has given up the correction of an end already.
+bool is_uncorrected(const SceneDescription& scene, const UncorrectedEnd& end) {
+  return std::any_of(scene.uncorrected_ends.begin(), scene.uncorrected_ends.end(),
+                     [&](const UncorrectedEnd& e) { return e.is_of(end.edge, end.frame_first); });
+}
+
+/// Twice the energy of a component of the strain, from its moment.
+double energy(const Vector3& moment, const Vector3& stiffness, int k) {
+  return stiffness(k) > 0.0 ? moment(k) * moment(k) / stiffness(k) : 0.0;
+}
+
+/// Change of the rest strain that keeps the moment, for energies `stored` before and `kept` with the same moments.
+Vector3 shift_of(const Changed& stencil, const Vector3& stored, const Vector3& kept) {
+  Vector3 shift = Vector3::Zero();
+  for (int k = 0; k < 3; ++k) {
+    if (!(stencil.stiffness(k) > 0.0 && kept(k) > 0.0)) continue;
+    const double moment = std::sqrt(stored(k) / kept(k)) * stencil.moment_before(k);
+    shift(k) = stencil.strain(k) - stencil.natural(k) - moment / stencil.stiffness(k);
+  }
+  return shift;
+}
+
 }  // namespace
 
 void keep_moments(const Model& old, const ElasticCoefficients& before, const Configuration& c, Model& model,
@@ -37,14 +59,9 @@ void keep_moments(const Model& old, const ElasticCoefficients& before, const Con
                        (at_frame ? parameters.half_natural : parameters.bend_natural).row(row), k.cwiseProduct(s - n),
                        k});
   };
-  const auto known = [&](const UncorrectedEnd& end) {
-    const auto& ends_before = old.description.uncorrected_ends;
-    return std::any_of(ends_before.begin(), ends_before.end(),
-                       [&](const UncorrectedEnd& e) { return e.is_of(end.edge, end.frame_first); });
-  };
   std::vector<int> bends;  // of which one may lie between two ends
   for (std::size_t i = 0; i < ends.size(); ++i) {
-    if (known(ends[i])) continue;
+    if (is_uncorrected(old.description, ends[i])) continue;
     const auto [half, bend] = model.uncorrected_ends[i];
     const Eigen::Index half_before = same_stencil(old, model.half[at(half)]),
                        bend_before = same_stencil(old, model.bend[at(bend)]);
@@ -55,23 +72,14 @@ void keep_moments(const Model& old, const ElasticCoefficients& before, const Con
     add(i, false, bend, bend_before);
   }
   Vector3 stored = Vector3::Zero(), kept = stored;
-  const auto energy = [](const Vector3& moment, const Vector3& stiffness, int k) {
-    return stiffness(k) > 0.0 ? moment(k) * moment(k) / stiffness(k) : 0.0;
-  };
   for (const Changed& stencil : changed)
     for (int k = 0; k < 3; ++k) {
       stored(k) += energy(stencil.moment_before, stencil.stiffness_before, k);
       kept(k) += energy(stencil.moment_before, stencil.stiffness, k);
     }
   for (const Changed& stencil : changed) {
-    Vector3 shift = Vector3::Zero();
-    for (int k = 0; k < 3; ++k) {
-      if (!(stencil.stiffness(k) > 0.0 && kept(k) > 0.0)) continue;
-      const double moment = std::sqrt(stored(k) / kept(k)) * stencil.moment_before(k);
-      shift(k) = stencil.strain(k) - stencil.natural(k) - moment / stencil.stiffness(k);
-    }
     UncorrectedEnd& end = ends[stencil.end];
-    shift = in_space(model, end.edge, shift);
+    const Vector3 shift = in_space(model, end.edge, shift_of(stencil, stored, kept));
     (stencil.at_frame ? end.at_frame : end.at_next) += shift;
     const Vector3 none = Vector3::Zero();
     add_offsets(model, stencil.end, stencil.at_frame ? shift : none, stencil.at_frame ? none : shift);

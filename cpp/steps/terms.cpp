@@ -43,23 +43,36 @@ Terms make_terms(const Model& model, const Loads& loads, StepRule rule, bool exa
   return terms;
 }
 
+namespace {
+
+void add_asymmetries(const ContactForces* term, StepRule rule, std::vector<std::string>& found) {
+  if (!term) return;
+  const Contact& contact = term->contact();
+  if (rule == StepRule::midpoint && !contact.surfaces().edges().empty() && !contact.frictional())
+    found.emplace_back("contact of rods in midpoint steps");
+  if (contact.unsymmetric()) found.emplace_back("implicit friction");
+}
+
+void add_asymmetries(const HandForces* hands, bool exact, std::vector<std::string>& found) {
+  if (!hands) return;
+  if (exact && hands->slips()) found.emplace_back("hands that slip");
+  if (!exact && hands->rings().slips()) found.emplace_back("rings that rub or slip");
+}
+
+}  // namespace
+
 std::vector<std::string> asymmetries_of(const Model& model, const Loads& loads, const Terms& terms, StepRule rule,
                                         bool exact) {
   const SceneDescription& scene = model.description;
-  const Contact* contact = terms.contact ? &terms.contact->contact() : nullptr;
   std::vector<std::string> found;
   if (scene.custom_implicit || (scene.has_custom_force && rule == StepRule::statics))
     found.emplace_back("custom forces that are solved for");
   if (loads.unsymmetric) found.emplace_back("follower loads or moments in 3D");
   if (rule == StepRule::energy_momentum) found.emplace_back("energy-momentum steps");
-  const bool rods_touch = contact && !contact->surfaces().edges().empty();
-  if (rule == StepRule::midpoint && rods_touch && !contact->frictional())
-    found.emplace_back("contact of rods in midpoint steps");
-  if (contact && contact->unsymmetric()) found.emplace_back("implicit friction");
+  add_asymmetries(terms.contact, rule, found);
   if (scene.fluid.model == FluidModel::resistive && rule != StepRule::statics)
     found.emplace_back("resistive-force theory");
-  if (exact && terms.hands && terms.hands->slips()) found.emplace_back("hands that slip");
-  if (!exact && terms.hands && terms.hands->rings().slips()) found.emplace_back("rings that rub or slip");
+  add_asymmetries(terms.hands, exact, found);
   if (exact && rule != StepRule::statics && (!model.planar() || rule != StepRule::backward_euler))
     found.emplace_back("every derivative of inertia and viscosity");
   return found;
