@@ -89,7 +89,7 @@ struct ContactGuard {
 };
 
 /// Sums over a few steps in a row, of squares of velocities weighed by mass, per connected component; see
-/// step_length.cpp.
+/// step_watch.hpp.
 struct StepWatch {
   VectorX change;    ///< by how much they change within a step [J]
   VectorX motion;    ///< what that is compared with [J]
