@@ -10,10 +10,10 @@
 namespace withe {
 namespace {
 
-constexpr double kCrossed = 0.5;   // nearness at which surfaces count as passed through, over the sum of radii
-constexpr double kOverlaps = 1.0;  // the same of rods that are drawn in each other
-constexpr double kStride = 0.25;   // way of edges past each other between two looks, over the sum of radii
-constexpr int kMostLooks = 64;
+constexpr double kCrossed = 0.5;         // nearness at which surfaces count as passed through, over the sum of radii
+constexpr double kOverlaps = 1.0;        // the same of rods that are drawn in each other
+constexpr double kSampleSpacing = 0.25;  // way of edges past each other between two looks, over the sum of radii
+constexpr int kMaxSamples = 64;
 constexpr double kStrictlyConvex = 1e-9;  // weights of closest_points, over the square of the sum of radii
 
 double contact_radius(const Model& model, int edge) {
@@ -115,7 +115,7 @@ bool CrossingWatch::come_near(const Model& model, int a, int b, double share) co
   const double end = distance(1.0), wanted = share * radii;
   if (end < wanted) return true;
   if (end - farthest >= wanted) return false;
-  const int looks = std::clamp(static_cast<int>(std::ceil(farthest / (kStride * radii))), 1, kMostLooks);
+  const int looks = std::clamp(static_cast<int>(std::ceil(farthest / (kSampleSpacing * radii))), 1, kMaxSamples);
   for (int k = 1; k < looks; ++k)
     if (distance(static_cast<double>(k) / looks) < wanted) return true;
   return false;

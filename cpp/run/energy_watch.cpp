@@ -9,9 +9,9 @@ namespace withe {
 namespace {
 
 /// Share of the greatest kinetic energy by which the energy of midpoint steps may drift before a warning.
-constexpr double kMostDrift = 1e-2;
+constexpr double kMaxDrift = 1e-2;
 /// Share of a component's kinetic and elastic energy that a backward Euler step may add.
-constexpr double kMostPressureGain = 1e-4;
+constexpr double kMaxPressureGain = 1e-4;
 
 }  // namespace
 
@@ -20,18 +20,19 @@ bool gains_under_pressure(const Model& model, const Parameters& parameters, cons
   if ((gains.array() <= 0.0).all()) return false;
   find_component_energies(model, parameters, state, scratch);
   const ComponentEnergies& now = scratch.components;
-  return (gains.array() > kMostPressureGain * (now.kinetic + now.elastic).array()).any();
+  return (gains.array() > kMaxPressureGain * (now.kinetic + now.elastic).array()).any();
 }
 
 bool contact_pumps(const Model& model, const Parameters& parameters, const Contact& contact, const Moving& start,
                    const Moving& end, double dt, double time_step, ContactGuard& guard, EnergyScratch& scratch) {
-  constexpr double kMost = 3e-3, kRoom = 2e-5;  // of the greatest energy of what touches; that a time step makes
-  constexpr double kShare = 0.01;               // of what is lost within a step
+  constexpr double kMaxExcess = 3e-3,
+                   kRoomPerStep = 2e-5;   // of the greatest energy of what touches; that a time step makes
+  constexpr double kRoomOfLosses = 0.01;  // of what is lost within a step
   auto& [scale, excess, put_in] = guard;
   double gain = put_in;
   const double lost = std::max(end.ledger.dissipated - start.ledger.dissipated, 0.0);
-  const auto room = [&] { return kRoom * scale * dt / time_step + kShare * lost; };
-  const auto too_much = [&] { return gain > room() + 0.5 * std::max(kMost * scale - excess, 0.0); };
+  const auto room = [&] { return kRoomPerStep * scale * dt / time_step + kRoomOfLosses * lost; };
+  const auto too_much = [&] { return gain > room() + 0.5 * std::max(kMaxExcess * scale - excess, 0.0); };
   if (too_much()) {
     // Losses of other parts make up for the gain. Losses by drag, viscosity and friction do not.
     const Energy now = energy_of(model, parameters, &contact, end.state, end.ledger, scratch);
@@ -58,7 +59,7 @@ bool gains_energy(const Energy& first, const Energy& now, int unknowns) {
 std::string energy_drift(const Energy& first, const Energy& now, double greatest_kinetic, int unknowns, double time,
                          double time_step) {
   const double drift = balance_of(now) - balance_of(first);
-  if (std::abs(drift) <= kMostDrift * greatest_kinetic + rounding_of(now, unknowns)) return "";
+  if (std::abs(drift) <= kMaxDrift * greatest_kinetic + rounding_of(now, unknowns)) return "";
   return "integrator='implicit_midpoint' has " + std::string(drift > 0.0 ? "added " : "lost ") +
          text(std::abs(drift), 2) + " J, " + text(100.0 * std::abs(drift) / greatest_kinetic, 2) +
          " % of the greatest kinetic energy (time " + text(time, 6) + " s, time_step " + text(time_step) +

@@ -14,14 +14,14 @@ namespace withe {
 namespace {
 
 /// An edge as short as this, over its length at rest, is one that the motion crushes.
-constexpr double kCrushed = 0.5;
+constexpr double kMinLength = 0.5;
 /// An edge that turns by more than 120 degrees against the next, or is twisted so far from its natural twist, is too
 /// long for the motion.
-constexpr double kSharp = 2.0 / 3.0 * std::numbers::pi;
+constexpr double kMaxTurn = 2.0 / 3.0 * std::numbers::pi;
 /// Natural turns between edges [rad], and differences of the two stiffnesses over the greater one, that count.
-constexpr double kBent = 0.02, kUneven = 0.01;
+constexpr double kMinNaturalTurn = 0.02, kMinAnisotropy = 0.01;
 /// Stiffnesses of rods that differ by more leave few digits to the soft ones.
-constexpr double kMismatch = 1e6;
+constexpr double kMaxStiffnessRatio = 1e6;
 
 }  // namespace
 
@@ -54,7 +54,7 @@ Place place_of_node(const Model& model, int node) {
 
 std::string crushed_edge(const Model& model, const State& state) {
   int shortest = -1;
-  double least = kCrushed;
+  double least = kMinLength;
   for (int e = 0; e < model.edge_count; ++e) {
     const int a = model.node_dof[at(model.edge_tail[at(e)])], b = model.node_dof[at(model.edge_head[at(e)])];
     const double length = (state.q.segment(b, model.dimension) - state.q.segment(a, model.dimension)).norm();
@@ -72,7 +72,7 @@ std::string crushed_edge(const Model& model, const State& state) {
 std::string unresolved_mesh(const Model& model, const Parameters& parameters, const State& state,
                             const Configuration& c) {
   int node = -1;
-  double greatest = kSharp;
+  double greatest = kMaxTurn;
   const char* how = "";
   const auto see = [&](double angle, int where, const char* does) {
     if (!(std::abs(angle) > greatest)) return;
@@ -87,14 +87,14 @@ std::string unresolved_mesh(const Model& model, const Parameters& parameters, co
   const auto angle = [](const Vec3d& a, const Vec3d& b) {
     return std::atan2(to_eigen(a).cross(to_eigen(b)).norm(), dot(a, b));
   };
-  // Where natural curvature, or a section that bends more easily one way, turns with the natural twist; a single
+  // True if natural curvature, or a section that bends more easily one way, turns with the natural twist. A single
   // stencil may be a motor.
   const auto winds = [&](std::size_t b) {
     const auto row = static_cast<Eigen::Index>(b);
-    if (!(std::abs(parameters.bend_natural(row, 2)) > kSharp)) return false;
+    if (!(std::abs(parameters.bend_natural(row, 2)) > kMaxTurn)) return false;
     const auto stiffness = parameters.edge_bend.row(model.bend[b].edge[0]);
-    return parameters.bend_natural.row(row).head<2>().norm() > kBent ||
-           std::abs(stiffness(0) - stiffness(1)) > kUneven * stiffness.maxCoeff();
+    return parameters.bend_natural.row(row).head<2>().norm() > kMinNaturalTurn ||
+           std::abs(stiffness(0) - stiffness(1)) > kMinAnisotropy * stiffness.maxCoeff();
   };
   for (std::size_t b = 0; b < model.bend.size(); ++b) {
     const BendStencil& s = model.bend[b];
@@ -130,7 +130,7 @@ std::string what_to_try(const Model& model, const Options& options, const Parame
   const VectorX& stretch = parameters.edge_stretch;
   Eigen::Index soft = 0, stiff = 0;
   const double least = stretch.minCoeff(&soft), greatest = stretch.maxCoeff(&stiff);
-  if (greatest > kMismatch * least)
+  if (greatest > kMaxStiffnessRatio * least)
     return "Try more similar stiffnesses: the stretching stiffnesses of rods '" +
            model.description.rods[at(model.edge_rod[at(static_cast<int>(soft))])].name + "' and '" +
            model.description.rods[at(model.edge_rod[at(static_cast<int>(stiff))])].name + "' differ by " +

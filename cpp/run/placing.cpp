@@ -18,8 +18,8 @@
 namespace withe {
 namespace {
 
-constexpr double kHeld = 1e-9;     // of the scene's length, or rad: what rounding may have moved
-constexpr double kAligned = 1e-6;  // rad: directors from outside are no better
+constexpr double kMaxHeldMove = 1e-9;      // of the scene's length, or rad: what rounding may have moved
+constexpr double kMaxMisalignment = 1e-6;  // rad: directors from outside are no better
 
 /// Rings are where rods pass them now, and give way as far as they cannot hold these; one beyond an end of its rod
 /// has let it go.
@@ -36,7 +36,7 @@ void pass_rings_anew(const Model& model, State& state) {
 
 /// A support that was moved at once gets there now, instead of in the next step, where its nodes are placed there.
 /// Where it is then, of the held unknowns.
-bool arrives(const Model& model, int support, const std::vector<bool>& told, const VectorX& q, Moving& now,
+bool arrives(const Model& model, int support, const std::vector<bool>& given, const VectorX& q, Moving& now,
              HeldTarget& there) {
   const Support& held = model.supports[at(support)];
   SupportMotion& motion = now.motions[at(support)];
@@ -47,18 +47,18 @@ bool arrives(const Model& model, int support, const std::vector<bool>& told, con
   for (const Constraint& c : model.constraints)
     for (int node : held.nodes)
       if (c.first == model.node_dof[at(node)] &&
-          !(told[at(node)] && c.held_change(there.q, q).norm() <= kHeld * model.length_scale)) {
+          !(given[at(node)] && c.held_change(there.q, q).norm() <= kMaxHeldMove * model.length_scale)) {
         motion.position = before;
         return false;
       }
   return true;
 }
 
-/// Unknowns with nodes where they are told to be; refuses to move what is held.
+/// Unknowns with nodes where they are given to be; refuses to move what is held.
 VectorX placed(const Model& model, const std::vector<RodState>& rods, Moving& now) {
   const State& state = now.state;
   VectorX q = state.q;
-  std::vector<bool> told(at(model.node_count), false);
+  std::vector<bool> given(at(model.node_count), false);
   for (const RodState& rod : rods)
     for (Eigen::Index i = 0; i < rod.positions.rows(); ++i) {
       const int node = model.description.rods[at(rod.rod)].nodes[static_cast<std::size_t>(i)],
@@ -69,21 +69,21 @@ VectorX placed(const Model& model, const std::vector<RodState>& rods, Moving& no
         const Vector3 from = x - model.plane->origin;
         own = Vector2(from.dot(model.plane->first), from.dot(model.plane->second));
       }
-      require(!told[at(node)] || (q.segment(dof, model.dimension) - own).norm() <= kHeld * model.length_scale,
+      require(!given[at(node)] || (q.segment(dof, model.dimension) - own).norm() <= kMaxHeldMove * model.length_scale,
               "positions of rods that share a node must agree" + place_of_node(model, node).words);
-      told[at(node)] = true;
+      given[at(node)] = true;
       q.segment(dof, model.dimension) = own;
     }
   HeldTarget there;
   for (int s = 0; s < static_cast<int>(model.supports.size()); ++s) {
     const Support& support = model.supports[at(s)];
     if (!support.active) continue;
-    const bool arrived = arrives(model, s, told, q, now, there), moves = state.time < now.motions[at(s)].shift.end;
+    const bool arrived = arrives(model, s, given, q, now, there), moves = state.time < now.motions[at(s)].shift.end;
     for (int node : support.nodes) {
       for (const Constraint& c : model.constraints) {
         if (c.first != model.node_dof[at(node)]) continue;
         const Vector3 moved = c.held_change(arrived ? there.q : state.q, q);
-        require(moved.norm() <= kHeld * model.length_scale,
+        require(moved.norm() <= kMaxHeldMove * model.length_scale,
                 "positions must not move a node that a support holds, but do by " + text(moved.norm()) + " m" +
                     place_of_node(model, node).words +
                     (moves ? ": the support is on a ramp (over=), so move the support without over=, or "
@@ -109,17 +109,17 @@ void place_directors(const Model& model, const RodState& rod, const VectorX& q, 
     const int edge = model.rod_first_edge[at(rod.rod)] + static_cast<int>(e);
     const std::string where = place_of_node(model, model.edge_tail[at(edge)]).words;
     const Vector3 t = (q.segment<3>(model.head_dof[at(edge)]) - q.segment<3>(model.tail_dof[at(edge)])).normalized();
-    const Vector3 told = rod.directors.row(e);
-    require(std::abs(told.norm() - 1.0) < kAligned && std::abs(told.dot(t)) < kAligned,
+    const Vector3 given = rod.directors.row(e);
+    require(std::abs(given.norm() - 1.0) < kMaxMisalignment && std::abs(given.dot(t)) < kMaxMisalignment,
             "directors must be unit vectors normal to their edges" + where);
-    const Vector3 d1 = (told - t * t.dot(told)).normalized();
+    const Vector3 d1 = (given - t * t.dot(given)).normalized();
     const Vector3 now = to_eigen(before.edge[at(edge)].d1);
     for (std::size_t s = 0; s < model.supports.size(); ++s) {
       const Support& support = model.supports[s];
       const bool holds =
           support.active && std::find(support.edges.begin(), support.edges.end(), edge) != support.edges.end();
       const bool turns = state.time <= motions[s].turn.end && motions[s].rotation != motions[s].to_rotation;
-      require(!holds || (d1 - now).norm() < kAligned,
+      require(!holds || (d1 - now).norm() < kMaxMisalignment,
               "directors must not turn an edge that a support holds" + place_of_node(model, support.node).words +
                   (turns ? ": the support is on a ramp (over=), so call step() first, or release the "
                            "support"
@@ -173,10 +173,12 @@ bool leaves_plane(const Model& model, const State& state, const RodState& rod) {
   const auto off = [&](const MatrixX3& rows, const Vector3& origin, double scale) {
     return rows.rows() > 0 && ((rows.rowwise() - origin.transpose()) * plane.normal).cwiseAbs().maxCoeff() > scale;
   };
-  if (off(rod.positions, plane.origin, kHeld * model.length_scale)) return true;
-  if (rod.velocities.rows() > 0 && off(rod.velocities, Vector3::Zero(), kHeld * rod.velocities.cwiseAbs().maxCoeff()))
+  if (off(rod.positions, plane.origin, kMaxHeldMove * model.length_scale)) return true;
+  if (rod.velocities.rows() > 0 &&
+      off(rod.velocities, Vector3::Zero(), kMaxHeldMove * rod.velocities.cwiseAbs().maxCoeff()))
     return true;
-  if ((rod.spins.array() != 0.0).any() || (rod.twists.array().abs() > kAligned / model.length_scale).any()) return true;
+  if ((rod.spins.array() != 0.0).any() || (rod.twists.array().abs() > kMaxMisalignment / model.length_scale).any())
+    return true;
   // In its plane an edge turns its drawn directors about the normal.
   for (Eigen::Index e = 0; e < rod.directors.rows(); ++e) {
     const int edge = model.rod_first_edge[at(rod.rod)] + static_cast<int>(e);
@@ -188,18 +190,19 @@ bool leaves_plane(const Model& model, const State& state, const RodState& rod) {
     const Vector3 drawn = to_eigen(model.initial_tangent[at(edge)]), d1 = to_eigen(model.initial_director[at(edge)]),
                   now = in_space((e + 1) % static_cast<Eigen::Index>(nodes.size())) - in_space(e);
     const double angle = std::atan2(drawn.cross(now).dot(plane.normal), drawn.dot(now));
-    if ((rotation_exp(angle * plane.normal) * d1 - rod.directors.row(e).transpose()).norm() > kAligned) return true;
+    if ((rotation_exp(angle * plane.normal) * d1 - rod.directors.row(e).transpose()).norm() > kMaxMisalignment)
+      return true;
   }
   return false;
 }
 
 bool place_rods(const Model& model, const Parameters& parameters, const std::vector<RodState>& rods, Moving& now,
                 std::vector<bool>& moved) {
-  std::vector<bool> is_told(at(model.edge_count), false);
+  std::vector<bool> is_set(at(model.edge_count), false);
   for (const RodState& rod : rods)
     for (Eigen::Index e = 0; e < rod.directors.rows(); ++e)
-      is_told[at(model.rod_first_edge[at(rod.rod)] + static_cast<int>(e))] = true;
-  if (std::find(is_told.begin(), is_told.end(), true) == is_told.end()) return false;
+      is_set[at(model.rod_first_edge[at(rod.rod)] + static_cast<int>(e))] = true;
+  if (std::find(is_set.begin(), is_set.end(), true) == is_set.end()) return false;
   State& state = now.state;
   const VectorX q = placed(model, rods, now), start = state.q;
   Configuration c;
@@ -208,23 +211,23 @@ bool place_rods(const Model& model, const Parameters& parameters, const std::vec
   compute_configuration(model, state, q, c);
   if (!model.planar()) {
     for (int e = 0; e < model.edge_count; ++e)
-      require(is_told[at(e)] || dot(before.edge[at(e)].tangent, c.edge[at(e)].tangent) > -1.0 + 1e-6,
+      require(is_set[at(e)] || dot(before.edge[at(e)].tangent, c.edge[at(e)].tangent) > -1.0 + 1e-6,
               "positions must not turn an edge of another rod by half a turn" +
                   place_of_node(model, model.edge_tail[at(e)]).words);
     const VectorX bend_tau = state.bend_tau, half_tau = state.half_tau;
     accept_configuration(model, q, c, state);
-    // Frames of edges that are told are theirs; which turn a twist is in follows from what is told too.
+    // Frames of edges that are given are theirs; which turn a twist is in follows from what is given too.
     for (std::size_t b = 0; b < model.bend.size(); ++b) {
       const auto i = static_cast<Eigen::Index>(b);
-      if (is_told[at(model.bend[b].edge[0])] || is_told[at(model.bend[b].edge[1])]) state.bend_tau(i) = 0.0;
+      if (is_set[at(model.bend[b].edge[0])] || is_set[at(model.bend[b].edge[1])]) state.bend_tau(i) = 0.0;
     }
     for (std::size_t h = 0; h < model.half.size(); ++h)
-      if (is_told[at(model.half[h].edge)]) state.half_tau(static_cast<Eigen::Index>(h)) = 0.0;
+      if (is_set[at(model.half[h].edge)]) state.half_tau(static_cast<Eigen::Index>(h)) = 0.0;
     for (const RodState& rod : rods) place_directors(model, rod, q, before, now.motions, state);
   } else {
     state.q = q;
   }
-  relax_joints(model, parameters, is_told, state);
+  relax_joints(model, parameters, is_set, state);
   compute_configuration(model, state, state.q, c);
   require(c.bend_strain.allFinite() && c.half_strain.allFinite(), "positions must not fold an edge back onto the next");
   accept_configuration(model, VectorX(state.q), c, state);
@@ -234,11 +237,11 @@ bool place_rods(const Model& model, const Parameters& parameters, const std::vec
 }
 
 void set_rates(const Model& model, const std::vector<RodState>& rods, State& state) {
-  std::vector<bool> is_told(at(model.edge_count), false);
+  std::vector<bool> is_set(at(model.edge_count), false);
   for (const RodState& rod : rods) {
     const int first = model.rod_first_edge[at(rod.rod)], end = model.rod_first_edge[at(rod.rod) + 1];
     if (rod.velocities.rows() > 0 || rod.spins.size() > 0)
-      for (int e = first; e < end; ++e) is_told[at(e)] = true;
+      for (int e = first; e < end; ++e) is_set[at(e)] = true;
     for (Eigen::Index i = 0; i < rod.velocities.rows(); ++i) {
       const int dof = model.node_dof[at(model.description.rods[at(rod.rod)].nodes[static_cast<std::size_t>(i)])];
       const Vector3 v = rod.velocities.row(i);
@@ -251,7 +254,7 @@ void set_rates(const Model& model, const std::vector<RodState>& rods, State& sta
       for (Eigen::Index e = 0; e < rod.spins.size(); ++e)
         state.v(model.edge_dof[at(first + static_cast<int>(e))]) = rod.spins(e);
   }
-  turn_frames(model, is_told, state);
+  turn_frames(model, is_set, state);
 }
 
 }  // namespace withe

@@ -12,12 +12,12 @@ namespace withe {
 namespace {
 
 // Times that an equilibrium is sought anew as contact becomes stiffer.
-constexpr int kMostStiffenings = 8;
+constexpr int kMaxStiffenings = 8;
 // Over what forces wanted of stiffness, what they may want where stiffer contact relieves surfaces.
-constexpr double kRelieved = 0.9;
+constexpr double kMaxRelievedRatio = 0.9;
 // A frame may turn by so much from the present state to the next on a path [rad]: rotations do not tell more than half
 // a turn from less.
-constexpr double kMostTurn = 2.5;
+constexpr double kMaxTurn = 2.5;
 
 /// Rotation vector of the turn of a support from one place to another that is left beside its roll.
 Vector3 swing_between(const SupportMotion& from, const SupportMotion& to) {
@@ -70,7 +70,7 @@ Boundary boundary_between(const Model& model, const Moving& now, Equations& syst
     hold(model, now, poses, there);
     for (std::size_t s = 0; s < to.size(); ++s) {
       const double turn = to[s].roll.norm() + swing_between(from[s], to[s]).norm();
-      if (to[s].roll != Vector3::Zero() && std::abs(factor - present) * turn > kMostTurn) there.reachable = false;
+      if (to[s].roll != Vector3::Zero() && std::abs(factor - present) * turn > kMaxTurn) there.reachable = false;
     }
     system.assembler().add_held_change(q, there.q, 1.0, q);
     return there.reachable;
@@ -88,16 +88,17 @@ bool drifts(const Model& model, const Parameters& parameters, const State& state
   system.begin(state, parameters, StepRule::statics, 0.0, given);
   system.evaluate(state.q, true, nullptr, e);
   if (!e.residual.allFinite()) return false;
-  constexpr double kBalanced = 1e-6, kNeutral = 1e-12;  // over all forces there are; over the greatest stiffness
+  constexpr double kMaxImbalance = 1e-6,
+                   kMaxNeutralStiffness = 1e-12;  // over all forces there are; over the greatest stiffness
   VectorX along(model.dof_count), pull(model.dof_count);
   for (int axis = 0; axis < model.dimension; ++axis) {
     along.setZero();
     for (int dof : model.node_dof) along[dof + axis] = 1.0;
     const double force = along.dot(e.residual), scale = along.dot(e.magnitude);
-    if (std::abs(force) <= kBalanced * scale) continue;
+    if (std::abs(force) <= kMaxImbalance * scale) continue;
     const auto size = static_cast<std::size_t>(model.dof_count);
     system.assembler().solver().multiply({along.data(), size}, {pull.data(), size});
-    if (pull.cwiseAbs().maxCoeff() <= kNeutral * system.assembler().greatest_diagonal()) return true;
+    if (pull.cwiseAbs().maxCoeff() <= kMaxNeutralStiffness * system.assembler().greatest_diagonal()) return true;
   }
   return false;
 }
@@ -121,20 +122,20 @@ void settle_contact(Equations& system, const Parameters& parameters, const Presc
     r.newton.iterations += before.newton.iterations;
   };
   int tries = 0;
-  for (; r.converged && tries < kMostStiffenings; ++tries) {
+  for (; r.converged && tries < kMaxStiffenings; ++tries) {
     if (contact.contacts().depth() > kMaxDepth)
       contact.stiffen(state, true);
     else if (contact.presses_alike())
       break;
     again();
   }
-  for (; r.converged && tries < kMostStiffenings; ++tries) {
+  for (; r.converged && tries < kMaxStiffenings; ++tries) {
     const State reached = state;
     const StaticResult found = r;
     const double wanted = contact.wanted_ratio();
     if (even_contact(parameters, system, given, true, state)) return;
     again();
-    if (r.converged && (wanted == 1.0 || contact.wanted_ratio() < kRelieved * wanted)) continue;
+    if (r.converged && (wanted == 1.0 || contact.wanted_ratio() < kMaxRelievedRatio * wanted)) continue;
     state = reached;
     r = found;
     return;

@@ -1,5 +1,5 @@
 #pragma once
-/// What a scene is while it runs, as values: everything that acts on what follows, copied by default.
+/// Values of a scene while it runs: everything that acts on later steps. Copies copy all of it.
 
 #include <array>
 #include <cstdint>
@@ -14,17 +14,17 @@
 
 namespace withe {
 
-/// How far something has come that goes evenly from a start to an end, at a time; from 0 to 1.
+/// Share of the time from a start to an end that has passed at a time, from 0 to 1.
 double ramp_fraction(double time, double start, double end);
 
-/// When something sets out, and when it is there [s].
+/// Start and end of a motion [s].
 struct Span {
   double start = 0, end = 0;
 
   double fraction(double time) const { return ramp_fraction(time, start, end); }
 };
 
-/// Where a support is, and where it is going: its position and its rotation each on a way of its own.
+/// Pose of a support and its motion. Position and rotation move independently.
 struct SupportMotion {
   Vector3 position = Vector3::Zero();      ///< now [m]
   Matrix3 rotation = Matrix3::Identity();  ///< now, from the drawn orientation
@@ -34,18 +34,18 @@ struct SupportMotion {
       Vector3::Zero();  ///< of a static change, full turns counted [rad], about a drawn axis; see `swing_between`
   Span shift, turn;     ///< when each of them goes
   double stretch = 1;   ///< of a held edge: its length when it was gripped, over the drawn one
-  // Of the drive of a ring: what it has fed, now and at a time from which it feeds evenly.
+  // The drive of a ring: length that it has fed, now and at a time from which it feeds evenly.
   double fed = 0, fed_before = 0;         ///< [m]
   double feed_rate = 0, feeds_since = 0;  ///< [m/s], [s]
 
-  /// Whether it is to be elsewhere at once, and no step has led it there yet.
+  /// True if the support was moved at once, and no step has led it there yet.
   bool jumps() const { return shift.start == shift.end && position != to_position; }
   SupportPose pose() const { return {position, rotation, fed}; }
   SupportPose pose_at(double time) const;
   void put(const SupportPose& pose);
 };
 
-/// Where an obstacle goes, and how it turns.
+/// Motion of an obstacle.
 struct ObstacleMotion {
   ObstacleWay from, to;
   Span shift, turn;
@@ -53,7 +53,7 @@ struct ObstacleMotion {
   ObstacleWay at(double time) const;
 };
 
-/// What goes evenly from one value to another.
+/// A change from one value to another, linear in time.
 template <class Value>
 struct Ramp {
   Value from, to;
@@ -99,7 +99,7 @@ struct StepWatch {
   VectorX acceleration;  ///< in the step before
 };
 
-/// What only the user changes, and what is on its way to where the user wants it.
+/// Values that a user sets, and the ramps that lead to them.
 struct Settings {
   Parameters parameters;
   std::vector<NaturalRamp> ramps;
@@ -108,14 +108,14 @@ struct Settings {
   bool actuation_changed = false;                ///< since then, or since the scene was drawn, which is free of stress
 };
 
-/// What a step changes, and returns to where it is taken back.
+/// Values that a step changes. They are put back where a step is rejected.
 struct Moving {
   State state;
   Predictor predictor;
   std::vector<SupportMotion> motions;
   Ledger ledger;
-  /// Of supports, in the parts of a time step so far, [N s] and [N m s], and how long those are [s]: per support, as
-  /// `reaction_of` has them. None: the last time step had one part.
+  /// Impulses of supports in the parts of a time step so far, per support as in `reaction_of` [N s], [N m s]; and the
+  /// length of these parts [s]. Empty where the last time step had one part.
   std::vector<Wrench> impulses;
   double impulse_time = 0;
 };
@@ -133,13 +133,13 @@ struct StepHistory {
   double greatest_kinetic = 0;  ///< kinetic energy since then, at the steps that are looked at [J]
 };
 
-/// What was found last, for read-outs and for who does not ask again.
+/// Results of the last step or solve, for read-outs.
 struct Found {
   MatrixX3 custom_force;              ///< of the last step [N]
-  MatrixX3 custom_moments;            ///< likewise, where there are any [N m]
+  MatrixX3 custom_moments;            ///< of the last step, where there are any [N m]
   VectorX reaction_residual;          ///< full residual of the last solve
   VectorX reaction_place;             ///< the configuration in which its forces act, in the middle of midpoint steps
-  std::vector<Wrench> hand_wrenches;  ///< likewise, of hands that yield: per support, about the origin
+  std::vector<Wrench> hand_wrenches;  ///< of hands that yield, per support, about the origin
   VectorX tensions;                   ///< per edge, in the middle of a midpoint step [N]; none: those of the state
   bool reaction_current = false;
 };

@@ -9,12 +9,12 @@ namespace withe {
 namespace {
 
 // Steps of the descent, and how much stiffer contact is in each.
-constexpr int kMostSteps = 60;
-constexpr double kStiffer = 4.0;
+constexpr int kMaxSteps = 60;
+constexpr double kStiffening = 4.0;
 
-/// A quasi-static descent of elastic and contact energy, without friction, loads, tendons or weight: steps of backward
-/// Euler from rest, of a mass that makes them long against the rods' slowest modes, and contact that becomes stiffer
-/// until nothing overlaps. Supports hold.
+/// A quasi-static descent of elastic and contact energy, without friction, loads, tendons or weight. It takes steps of
+/// backward Euler from rest, with a mass that makes the steps long compared with the rods' slowest modes. Contact
+/// becomes stiffer until nothing overlaps. Supports hold.
 class Separation {
  public:
   Separation(const Model& model, const Parameters& parameters, const Options& options, const State& start)
@@ -31,12 +31,12 @@ class Separation {
     stiff_ = 100.0 * (parameters_.edge_stretch.array() / model_.edge_arc.array()).maxCoeff();
   }
 
-  /// Whether something overlapped; `state` is then where it does no more, or less.
+  /// True if something overlapped. In `state` it then overlaps no more, or less.
   bool run(State& state) {
     if (overlap() <= 0.0) return false;
     nudge();
     double stiffness = soft_, dt = 1.0;
-    for (int k = 0; k < kMostSteps && overlap() > 0.0; ++k) {
+    for (int k = 0; k < kMaxSteps && overlap() > 0.0; ++k) {
       state_.contacts.clear();
       state_.contact_stiffness.setConstant(state.contact_stiffness.size(), stiffness);
       state_.v.setZero();
@@ -48,7 +48,7 @@ class Separation {
                                       {StepRule::backward_euler, dt, 0}, state_, predictor_, work_)
                             .accepted;
       dt = done ? 1.0 : 0.25 * dt;
-      if (done) stiffness = std::min(kStiffer * stiffness, stiff_);
+      if (done) stiffness = std::min(kStiffening * stiffness, stiff_);
     }
     state_.v.setZero();
     state_.acceleration.setZero();

@@ -7,7 +7,7 @@ namespace withe {
 namespace {
 
 // Easy parts before longer ones are tried, at most.
-constexpr int kMostPatience = 64;
+constexpr int kMaxPatience = 64;
 // Halvings with which error control begins where there is nothing to estimate errors from.
 constexpr int kFirstHalvings = 8;
 // Share of the tolerance that is kept for events; share of the duration over which parts are averaged.
@@ -66,7 +66,7 @@ StepProgress StepControl::subdivide(StepProgress now, Verdict why) const {
   lengths.level = std::min(lengths.level + deeper, deepest_level());
   Division shorter = divided(now.division, lengths.level);
   while (shorter.parts <= left && may_subdivide(lengths)) shorter = divided(now.division, ++lengths.level);
-  if (why == Verdict::gained_energy && lengths.grown) lengths.patience = std::min(2 * lengths.patience, kMostPatience);
+  if (why == Verdict::gained_energy && lengths.grown) lengths.patience = std::min(2 * lengths.patience, kMaxPatience);
   lengths.grown = false;
   lengths.easy_steps = 0;
   return {lengths, shorter};
@@ -88,8 +88,8 @@ StepProgress StepControl::grown(StepProgress now, double dt) const {
   StepLengths& lengths = now.lengths;
   if (lengths.level == 0 && !lengths.grown) return now;
   ++lengths.easy_steps;
-  if (lengths.grown && lengths.easy_steps >= kLeastPatience) {
-    lengths.patience = std::max(lengths.patience / 2, kLeastPatience);
+  if (lengths.grown && lengths.easy_steps >= kMinPatience) {
+    lengths.patience = std::max(lengths.patience / 2, kMinPatience);
     lengths.grown = false;
   }
   if (lengths.level == 0 || lengths.easy_steps < lengths.patience) return now;

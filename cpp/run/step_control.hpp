@@ -28,17 +28,17 @@ enum class Verdict {
 constexpr bool accepts(Verdict verdict) { return verdict == Verdict::hard || verdict == Verdict::easy; }
 
 /// Easy parts before longer ones are tried, at least.
-inline constexpr int kLeastPatience = 4;
+inline constexpr int kMinPatience = 4;
 
 /// Memory from part to part.
 struct StepLengths {
-  int level = 0;                  ///< present halvings of the time step, in `StepControl::levels_per_halving` to each
-  int easy_steps = 0;             ///< since the level changed
-  int patience = kLeastPatience;  ///< easy parts before longer ones are tried
-  bool grown = false;             ///< fewer easy parts than the least patience ago
-  double error_rate = 0;          ///< C, greatest estimated error of the last parts over dt^p [m / s^p]
-  double mean_step = 0;           ///< under error control, over some of the last parts, weighed by their lengths [s]
-  double event_reserve = 1;       ///< share that is left of the error that events may make beyond their time [-]
+  int level = 0;                ///< present halvings of the time step, in `StepControl::levels_per_halving` to each
+  int easy_steps = 0;           ///< since the level changed
+  int patience = kMinPatience;  ///< easy parts before longer ones are tried
+  bool grown = false;           ///< fewer easy parts than the least patience ago
+  double error_rate = 0;        ///< C, greatest estimated error of the last parts over dt^p [m / s^p]
+  double mean_step = 0;         ///< under error control, over some of the last parts, weighed by their lengths [s]
+  double event_reserve = 1;     ///< share that is left of the error that events may make beyond their time [-]
 };
 
 /// Equal parts in which the rest of a time step is taken, from a fraction of it on.

@@ -10,21 +10,22 @@
 namespace withe {
 namespace {
 
-/// Steps of which the first ones are looked at, one after the other: where motion turns back it is slow for a few, and
-/// from rest the first is all change. A run of 40 is looked at twice: what falls from rest does not vibrate at first.
-constexpr int kPeriod = 24, kLooked = 16;
+/// Steps in a period, and steps at its start that are summed. A sum over several steps is needed because a motion that
+/// turns back is slow for a few steps, and the first step from rest is all change. A run of 40 steps is judged twice: a
+/// body that falls from rest does not vibrate at first.
+constexpr int kPeriod = 24, kWatchedSteps = 16;
 /// sin^2 p at w dt = 1.
-constexpr double kResolved = 0.2;
+constexpr double kMaxResolved = 0.2;
 /// |v1 - v0|^2 / |v1|^2 of backward Euler, see above.
-constexpr double kChanging = 0.5;
-/// Of a component's length, below which motion is a trembling that nobody sees.
-constexpr double kSeen = 1e-5;
-/// w dt of the step that would do; and the part of the time in which bending goes over an edge.
-constexpr double kEnough = 0.5;
-/// Over the step that an impact would bear, the one that is said: later ones may be faster.
-constexpr double kMargin = 0.8;
-/// Of a component's kinetic and elastic energy, what an impact turns round in a step so that its bounce is seen.
-constexpr double kMuch = 0.1;
+constexpr double kMinChange = 0.5;
+/// Amplitude below which motion is not visible, as a share of the component's length.
+constexpr double kMinVisibleMove = 1e-5;
+/// w dt of the step that is recommended, and its share of the time in which bending passes an edge.
+constexpr double kRecommendedTurn = 0.5;
+/// Recommended step over the longest step that resolves an impact: later impacts may be faster.
+constexpr double kImpactMargin = 0.8;
+/// Work of an impact in a step whose rebound is visible, over the component's kinetic and elastic energy.
+constexpr double kMinImpactShare = 0.1;
 
 /// Time in which bending spreads over the length h of an edge, h^2 sqrt(m / B) [s].
 double bending_time(const Model& model, const Parameters& parameters, int edge) {
@@ -77,7 +78,7 @@ std::string unresolved_in_time(const SolvedStep& step, double dt, int component,
   const double greatest = watch.greatest(component);
   // The greatest sum so far: little is left of a motion that is over.
   const double ratio = greatest > 0.0 ? change / greatest : 0.0;
-  if (!(ratio > (euler ? kChanging : kResolved))) return "";
+  if (!(ratio > (euler ? kMinChange : kMaxResolved))) return "";
   // (w dt)^2
   const double square =
       euler ? watch.pull(component) / watch.moved(component) : 4.0 * ratio / std::max(1.0 - ratio, 1e-12);
@@ -88,8 +89,8 @@ std::string unresolved_in_time(const SolvedStep& step, double dt, int component,
   for (int node = 0; node < model.node_count; ++node)
     if (model.component_of_node(node) == component) mass += parameters.node_mass(node);
   const double frequency = std::sqrt(square) / dt;
-  const double speed = std::sqrt((euler ? change + motion : 0.25 * motion) / (kLooked * mass));
-  if (speed / frequency < kSeen * length) return "";
+  const double speed = std::sqrt((euler ? change + motion : 0.25 * motion) / (kWatchedSteps * mass));
+  if (speed / frequency < kMinVisibleMove * length) return "";
   const std::string motion_words = "motion of about " + text(speed / frequency, 2) + " m at " +
                                    text(frequency / (2.0 * std::numbers::pi), 3) + " Hz (time " + text(state.time, 6) +
                                    " s)";
@@ -97,7 +98,7 @@ std::string unresolved_in_time(const SolvedStep& step, double dt, int component,
          (euler ? "backward Euler damps a " + motion_words + " to half within " +
                       text(dt * 2.0 * std::numbers::ln2 / std::log1p(square)) + " s"
                 : "frequency and phase of a " + motion_words + " are not accurate") +
-         ". Use time_step <= " + text(kEnough / frequency, 2) + " s";
+         ". Use time_step <= " + text(kRecommendedTurn / frequency, 2) + " s";
 }
 
 /// Warning of an impact that takes up much of a component's motion and is shorter than a step. Bending then needs less
@@ -115,7 +116,7 @@ std::string unresolved_impact(const SolvedStep& step, double dt, EnergyScratch& 
     if (!(t.approach > 0.0) || t.pair.restitution < 1.0) continue;
     const double bending = std::max(bending_time(model, parameters, t.pair.key.a),
                                     t.pair.key.b < 0 ? 0.0 : bending_time(model, parameters, t.pair.key.b));
-    const double most = std::max(kEnough * bending, t.pair.tolerance / t.approach);
+    const double most = std::max(kRecommendedTurn * bending, t.pair.tolerance / t.approach);
     if (dt <= most) continue;
     if (struck.size() == 0) struck.setZero(model.component_count);
     const double work = -0.5 * t.pressing.first * dt * t.approach;
@@ -132,7 +133,7 @@ std::string unresolved_impact(const SolvedStep& step, double dt, EnergyScratch& 
     kinetic(model.dof_component[at(static_cast<int>(i))]) += 0.5 * system.mass().rows(i) * start(i) * start(i);
   // A force that does more work than the motion has energy presses: it is no impact.
   const auto much = [&](const VectorX& energy) {
-    return (struck.array() > kMuch * energy.array() && struck.array() <= kinetic.sum()).any();
+    return (struck.array() > kMinImpactShare * energy.array() && struck.array() <= kinetic.sum()).any();
   };
   if (!much(kinetic)) return "";
   find_component_energies(model, parameters, state, scratch);
@@ -140,7 +141,7 @@ std::string unresolved_impact(const SolvedStep& step, double dt, EnergyScratch& 
   return "impact" + place_of_node(model, model.edge_tail[at(edge)]).words + " (time " + text(state.time, 6) +
          " s): the time_step of " + text(dt) +
          " s is longer than the impact, so the rebound height is not reliable. Use time_step <= " +
-         text(kMargin * longest, 2) + " s, set restitution=, or use integrator='backward_euler' to damp impacts";
+         text(kImpactMargin * longest, 2) + " s, set restitution=, or use integrator='backward_euler' to damp impacts";
 }
 
 }  // namespace
@@ -153,14 +154,14 @@ void watch_step(const SolvedStep& step, StepWatch& watch, Warnings& warnings, En
   if (!warnings.has_reported(Warning::impact) && integrator != Integrator::backward_euler)
     warnings.report(Warning::impact, unresolved_impact(step, dt, scratch));
   const std::int64_t place = step.number % kPeriod;
-  if (warnings.has_reported(Warning::steps) || place >= kLooked) return;
+  if (warnings.has_reported(Warning::steps) || place >= kWatchedSteps) return;
   sum_motion(step, dt, watch);
   if (const Contact* contact = step.system.contact())
     for (const Touching& t : contact->contacts()) {
       forget_component(model, model.component_of_edge(t.pair.key.a), watch);
       if (t.pair.key.b >= 0) forget_component(model, model.component_of_edge(t.pair.key.b), watch);
     }
-  if (place + 1 < kLooked) return;
+  if (place + 1 < kWatchedSteps) return;
   watch.greatest = watch.greatest.cwiseMax(watch.motion);
   for (int c = 0; c < model.component_count && !warnings.has_reported(Warning::steps); ++c)
     warnings.report(Warning::steps, unresolved_in_time(step, dt, c, watch));

@@ -16,7 +16,7 @@
 
 namespace withe {
 
-/// What is read out of every lane, one number after the other.
+/// Read-outs of every lane, one number after the other.
 enum class LaneReadout { time, positions, velocities, directors, curvatures, twists, tensions, spins };
 
 /// Worlds of one shape, which others own and may use between calls. A lane goes on exactly as it would alone, whatever
@@ -40,7 +40,7 @@ class Batch {
   void step(std::span<const int> lanes, int count, const std::function<void()>& check);
 
   const std::optional<ConvergenceFailure>& failure(int lane) const { return failures_.at(at(lane)); }
-  /// Whether each lane has failed.
+  /// True for each lane that has failed.
   void read_failed(bool* out) const;
   void forgive(int lane) { failures_.at(at(lane)).reset(); }
   /// Another world takes a lane's place.
@@ -48,7 +48,7 @@ class Batch {
 
   /// Numbers that a lane has of a read-out: of a rod, or, for positions and velocities, of every node (rod -1).
   std::size_t readout_size(LaneReadout what, int rod) const;
-  /// Of all lanes, one after the other.
+  /// Reads all lanes, one after the other.
   void read(LaneReadout what, int rod, double* out) const;
 
   /// Makes discrete curvatures 2 tan(phi / 2) of the lanes that are named smooth ones [1/m], with the Voronoi lengths
@@ -78,7 +78,7 @@ class Batch {
   std::vector<World*> lanes_;
   std::vector<std::optional<ConvergenceFailure>> failures_;
   WorkerPool pool_;
-  // Of a call that goes on:
+  // State of a call in progress:
   std::atomic<bool> stop_{false};
   std::vector<std::exception_ptr> thrown_;
   std::thread::id caller_;

@@ -53,7 +53,7 @@ void World::Implementation::check_energy() {
                   energy_drift(*first_energy, now, greatest_kinetic, model.dof_count, state.time, options.time_step));
 }
 
-/// What to say where the time step is above the stable one at the present state; else nothing.
+/// Advice where the time step is above the stable one at the present state; else empty.
 std::string World::Implementation::longest_explicit_step() {
   const double stable = stable_step(systems.scheme(), parameters, custom().at_rest(), state, systems.work);
   if (!(options.time_step > stable)) return "";

@@ -6,7 +6,7 @@
 namespace withe {
 namespace {
 
-/// How many there are.
+/// The number of items.
 template <class Archive, class Items>
 void exchange_size(Archive& io, Items& items, std::int64_t most, const char* impossible) {
   auto size = static_cast<std::int64_t>(items.size());
@@ -32,7 +32,7 @@ void exchange(Archive& io, Vec3d& v) {
   io(v.x), io(v.y), io(v.z);
 }
 
-/// Of any size, in an archive that ends soon enough to be read.
+/// A vector of any size; an archive that ends too early is refused.
 template <class Archive>
 void exchange(Archive& io, VectorX& v) {
   auto size = static_cast<std::int64_t>(v.size());
@@ -56,8 +56,8 @@ void exchange(Archive& io, std::optional<Energy>& energy) {
     io(*x);
 }
 
-/// What users may set; the rest follows from it. Contact is that of the drawing where it was not set: see
-/// `write_contact`.
+/// Parameters that users may set; all others follow from these. Contact is that of the drawing where it was not set:
+/// see `write_contact`.
 template <class Archive>
 void exchange(Archive& io, const Model& model, Parameters& p) {
   for (const ParameterInfo& info : parameter_index()) {
@@ -131,7 +131,7 @@ void exchange(Archive& io, State& state) {
   for (int i : {0, 1}) io(velocity[i]), io(times[i]);
 }
 
-/// Of supports.
+/// Wrenches of supports.
 template <class Archive>
 void exchange(Archive& io, std::vector<Wrench>& wrenches) {
   exchange_size(io, wrenches, 1 << 20, "snapshot is damaged: impossible number of supports");

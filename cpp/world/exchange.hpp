@@ -1,5 +1,5 @@
 #pragma once
-/// What running consists of, value by value, as an archive reads or writes it.
+/// The values of a running scene in the order in which an archive reads or writes them.
 
 namespace withe {
 
@@ -7,7 +7,8 @@ struct Model;
 struct Running;
 struct Lagged;
 
-/// From or to an archive, Reader or Writer; those of users' parameters from which the rest follows.
+/// Reads from a Reader or writes to a Writer. Of the parameters only those that users set are stored; the others
+/// follow.
 template <class Archive>
 void exchange(Archive& io, const Model& model, Running& running);
 

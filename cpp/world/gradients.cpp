@@ -16,9 +16,9 @@ namespace withe {
 namespace {
 
 /// An equilibrium leaves this much of the forces in it out of balance.
-constexpr double kBalanced = 1e-6;
+constexpr double kMaxImbalance = 1e-6;
 /// A rod that was drawn straight, but for rounding, hardly prefers a side: times what is rounded in its stiffness.
-constexpr double kAsDrawn = 1e4;
+constexpr double kDrawnRounding = 1e4;
 constexpr const char* kAtLimit =
     "no gradient is available for an equilibrium in which a hand is at its "
     "force_limit, because the equilibrium depends on the path: give a greater "
@@ -82,7 +82,7 @@ EquilibriumGradients World::equilibrium_gradients(const std::vector<ReadoutAdjoi
   }
   Implementation::AtEquilibrium at;
   StepGradient& gradient = self.begin_gradient(at);
-  require(gradient.imbalance() < kBalanced,
+  require(gradient.imbalance() < kMaxImbalance,
           "the simulation is not in equilibrium: call equilibrium() again before its "
           "gradient");
   EquilibriumGradients out;
@@ -155,7 +155,8 @@ MatrixX World::equilibrium_responses(const MatrixX& residual, const MatrixX& hel
   return out;
 }
 
-/// Of length 1; empty where none costs nothing, where loads turn with the rod, or with custom forces.
+/// A motion of length 1 that costs no energy; empty where there is none, where loads turn with the rod, or with custom
+/// forces.
 VectorX World::Implementation::neutral_motion() const {
   if (description.has_custom_force) return {};
   Equations& system = systems.readout();
@@ -165,7 +166,7 @@ VectorX World::Implementation::neutral_motion() const {
   system.evaluate(state.q, true, nullptr, evaluation);
   const StepNorms norms(model);
   Counters unused;
-  return StiffnessSigns(system, norms, unused).neutral_motion(state, evaluation, kAsDrawn);
+  return StiffnessSigns(system, norms, unused).neutral_motion(state, evaluation, kDrawnRounding);
 }
 
 EquilibriumGradient World::Implementation::equilibrium_gradient(const CoefficientAdjoint& coefficients,

@@ -66,7 +66,7 @@ RingPassage World::passage(int support) const {
 
 std::vector<LeftRing> World::take_left_rings() { return std::exchange(implementation_->left_rings, {}); }
 
-/// Whether there were any. To be called where a time step ends, so that what follows is the same whoever asks for it.
+/// True if there were any. Called at the end of each time step, so that the run does not depend on who asks.
 bool World::Implementation::release_left_rings() {
   const std::size_t before = left_rings.size();
   for (std::size_t s = 0; s < model.supports.size(); ++s)

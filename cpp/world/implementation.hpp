@@ -1,5 +1,5 @@
 #pragma once
-/// What World is made of; private to this room.
+/// Data and functions of World; private to this room.
 
 #include <atomic>
 
@@ -15,7 +15,7 @@
 
 namespace withe {
 
-/// Functions of who runs the scene, which copies do not take over.
+/// Functions of a user, which copies do not take over.
 struct Callbacks {
   CustomFunction force;
   std::function<void(double force_time, double end_time)> before_step;  ///< StepCallback, bound to its world
@@ -28,9 +28,9 @@ enum class Rebuild { first, running, restored };
 
 struct World::Implementation : Built, Running {
   Implementation(SceneDescription description, Options options);
-  /// The same scene at the same point, without what `lagged` knows: see `recall`.
+  /// A copy without the memory of solves: see `Systems::recall`.
   Implementation(const Implementation& other);
-  /// Likewise, but `rebuild` is to follow: there are no equations yet.
+  /// A copy without equations: `rebuild` must follow.
   struct Unbuilt {};
   Implementation(const Implementation& other, Unbuilt);
 
@@ -39,7 +39,7 @@ struct World::Implementation : Built, Running {
   std::shared_ptr<Tape> tape;                    ///< of a run that is kept for gradients
   Prescribed prescribed;                         ///< for the step or the equilibrium that was sought last
   mutable EnergyScratch energy_scratch;
-  /// Before what was set since the state last moved; the work of that is found when it is asked for.
+  /// Coefficients before parameters were set in the present state. The work of setting them is found on demand.
   EnergyCoefficients before_settings;
   bool newly_set = false;
   Division division;  ///< of the present time step
@@ -57,7 +57,7 @@ struct World::Implementation : Built, Running {
   std::atomic<bool> interrupted{false};
   Warnings warnings;
   std::unique_ptr<CrossingWatch> crossing_watch;  ///< made when first needed
-  std::vector<LeftRing> left_rings;               ///< not heard of yet
+  std::vector<LeftRing> left_rings;               ///< that the user has not asked for yet
   NewtonResult last_newton;
 
   // building.cpp
@@ -65,7 +65,7 @@ struct World::Implementation : Built, Running {
   void listen();
   void rebuild(Rebuild why);
   void carry_over(const Model& old, Rebuild why);
-  /// Equations for other loads than before.
+  /// Makes equations for other loads than before.
   void remake_equations();
   /// Drops the plane; throws when the user asked for it. `why` names the argument that leaves the plane.
   void leave_plane(const std::string& why);
@@ -73,7 +73,7 @@ struct World::Implementation : Built, Running {
   // set_state.cpp
   void place(const std::vector<RodState>& rods);
   void meet_anew(const std::vector<bool>& moved);
-  /// What came before no longer tells what comes next.
+  /// Forgets predictions from past motion.
   void forget_motion();
 
   // prescribed.cpp
@@ -163,8 +163,8 @@ struct World::Implementation : Built, Running {
   /// A step of the static integrator, of dt and to `end`.
   void static_step(double end, double dt);
   EquilibriumResult settle(Equations& system, StaticResult& result, double time);
-  /// Whether a motion out of the plane lowers the potential of an equilibrium in it. Not asked where the scene is to
-  /// stay in its plane, nor where what acts has no potential.
+  /// True if a motion out of the plane lowers the potential of an equilibrium in it. False where a user keeps the scene
+  /// in its plane, or where forces have no potential.
   bool buckles_out_of_plane();
   void rest();
   void refresh_reactions();
@@ -173,11 +173,10 @@ struct World::Implementation : Built, Running {
 
   // energy.cpp
   Energy energy() const;
-  /// To be called before parameters are set, and before the state moves or what is set is copied.
+  /// Called before parameters are set (`begin_setting`), and before the state moves or is copied.
   void begin_setting();
   void account_for_settings();
-  /// Energies as they are now become those that the energy of steps is compared with, where a scheme does not conserve
-  /// it by itself.
+  /// Keeps the present energies for comparison with later ones, under schemes that do not conserve energy.
   void begin_energy_watch();
   void check_energy();
   std::string longest_explicit_step();

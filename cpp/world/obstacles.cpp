@@ -38,7 +38,7 @@ void World::prescribe_obstacle(int obstacle, const std::optional<Vector3>& posit
   require(way.allFinite(), "position must be finite");
   if (turn) check_turn(self.model, obstacle, *turn);
   const ObstacleDescription& drawn = self.description.contact.obstacles[at(obstacle)];
-  // What a plane moves along itself out of the rods' plane, no rod sees without friction; with it, it pulls them out.
+  // An obstacle plane that moves along itself, out of the rods' plane, pulls the rods out of it by friction.
   if (self.model.planar()) {
     const Vector3& n = self.model.plane->normal;
     if (std::abs(way.dot(n)) > 1e-9 * self.model.length_scale || (turn && n.cross(*turn).norm() > 1e-9 * turn->norm()))

@@ -32,11 +32,11 @@ void World::Implementation::prescribe_custom(double dt, Prescribed& out) {
   custom().put(out);
 }
 
-/// Forces at the start of a step would feed a spring's oscillation, by 1 + (w dt)^2 / 2 a step. At q0 + (dt / 2) v0,
-/// which under the midpoint rule is q1 - (dt / 2) v1 as well, they leave the step symmetric in time, of second order,
-/// and stable for a spring of frequency w < 2 / dt, however stiff the rod that it pulls at: its matrix has the
-/// determinant 1 and the trace 2 - (w dt)^2. Backward Euler's at the predicted end damp, for w < sqrt(4/3) / dt.
-/// Verlet's end is known.
+/// Forces at the start of a step would feed a spring's oscillation, by 1 + (w dt)^2 / 2 a step. Therefore they are
+/// taken at q0 + (dt / 2) v0, which under the midpoint rule is q1 - (dt / 2) v1 as well. The step is then symmetric in
+/// time and of second order. It is stable for a spring of frequency w < 2 / dt, however stiff the rod is that the
+/// spring pulls: its matrix has the determinant 1 and the trace 2 - (w dt)^2. Under backward Euler, forces at the
+/// predicted end damp for w < sqrt(4/3) / dt. The end of a Verlet step is known.
 void World::Implementation::find_custom_force_of_step(double dt, Prescribed& out) {
   VectorX &q = systems.work.z, &v = systems.work.velocity;
   if (options.integrator == Integrator::verlet) {

@@ -96,7 +96,7 @@ void write_contact(Writer& w, const ContactDescription& contact) {
   }
 }
 
-/// What a snapshot knows of it, for the contact of a scene.
+/// Contact of a scene, with the values that a snapshot has of it.
 ContactDescription read_contact(Reader& r, ContactDescription contact) {
   for (double* x : {&contact.friction, &contact.slip_tolerance, &contact.restitution, &contact.stiffness}) r(*x);
   r(contact.obstacle_restitution);

@@ -15,18 +15,18 @@ namespace withe {
 namespace {
 
 // Times that contact may be made stiffer before a step counts as failed.
-constexpr int kMostStiffenings = 4;
+constexpr int kMaxStiffenings = 4;
 // Inner steps times nodes that error control may take in one time step by default: about half a minute on one core.
 constexpr double kMaxWork = 3e7;
-// Steps from one look at how well the mesh resolves the motion to the next, and at the energy, which costs a step.
+// Steps between two checks of the mesh, and between two checks of the energy, each of which costs as much as a step.
 constexpr int kResolutionPeriod = 64, kEnergyPeriod = 16;
-// What is held turns by no more than this in a step [rad]. Of a frame's turn by w the middle of its Cayley vector is
-// that by 2 atan(tan(w / 2) / 2), of an edge's angle that by w / 2: what is between twists by the difference, w^3 / 32.
-// In energy-momentum steps edges that turn by w have the rate 2 tan(w / 2) / dt. Parts of fourth-order steps twist
-// there and back, and so turn by less.
-constexpr double kMostHeldTurn = 0.25, kMostHeldTurnOfPart = 0.15;
-/// Whether cutting a step lessened something: not where a function of the user's jumps within it, by as much in a
-/// shorter one.
+// Greatest turn in a step of frames and edges that supports hold [rad]. In the middle of a step a frame that turns by w
+// has turned by 2 atan(tan(w / 2) / 2), but an edge's angle by w / 2. A rod between them is twisted by the difference,
+// w^3 / 32. In energy-momentum steps edges that turn by w have the rate 2 tan(w / 2) / dt. Parts of fourth-order steps
+// twist there and back, and so turn by less.
+constexpr double kMaxHeldTurn = 0.25, kMaxHeldTurnOfPart = 0.15;
+/// True if a shorter step reduced an excess. A user's function that jumps within a step jumps by as much in a shorter
+/// one.
 bool lessens(double now, double before) { return before == 0.0 || now < 0.9 * before; }
 
 }  // namespace
@@ -157,7 +157,7 @@ Contact* World::Implementation::watched_contact() const {
 /// Turn of what is held in a part, over the greatest that is accurate.
 double World::Implementation::held_turn_of(const PartResult& part) const {
   if (!options.adaptive || !acts_in_middle(options.integrator)) return 0.0;
-  return part.held_turn / (options.integrator == Integrator::fourth_order ? kMostHeldTurnOfPart : kMostHeldTurn);
+  return part.held_turn / (options.integrator == Integrator::fourth_order ? kMaxHeldTurnOfPart : kMaxHeldTurn);
 }
 
 /// Verdict on a part that was solved. `rejected`: what parts were rejected for before.
@@ -196,7 +196,7 @@ void World::Implementation::return_to_start() {
   apply_ramps(model, ramps, state.time, parameters);
 }
 
-/// What only steps that stay may do.
+/// Counts an accepted step.
 void World::Implementation::commit_step(const PartResult& part) {
   statistics.steps += 1;
   steps_taken += 1;
@@ -263,7 +263,7 @@ bool World::Implementation::inner_step(double dt, int slot, PartResult& part) {
   try {
     prescribe_custom(dt, prescribed);
     r = step_by_rule(dt, slot);
-    for (int tries = 0; r.too_deep && tries < kMostStiffenings; ++tries) {
+    for (int tries = 0; r.too_deep && tries < kMaxStiffenings; ++tries) {
       ledger.dissipated -= system.contact()->stiffen(state, false);
       systems.work.newton.matrix.owner = nullptr;
       r = step_by_rule(dt, slot);

@@ -18,7 +18,7 @@ int World::add_support(const SupportDescription& support) {
   Implementation& self = *implementation_;
   const Implementation backup(self);
   const Lagged lagged = self.systems.lagged();
-  // The first row that a released support has left, so that who clamps and lets go without end needs no more of them.
+  // The first row that a released support has left: clamping and releasing again and again needs no more rows.
   const auto& rows = self.model.supports;
   const auto index = static_cast<int>(
       std::find_if(rows.begin(), rows.end(), [](const Support& s) { return !s.active; }) - rows.begin());
@@ -69,7 +69,7 @@ void World::remove_support(int support) {
   require(
       support >= 0 && support < static_cast<int>(self.model.supports.size()) && self.model.supports[at(support)].active,
       "no such support, or it is released already: " + std::to_string(support));
-  // What is stored in a hand that lets go stays with it.
+  // The energy that is stored in a hand stays with it when it lets go.
   if (self.model.supports[at(support)].yields()) self.ledger.support_work -= self.hand_energy_of(support);
   self.model.supports[at(support)].active = false;
   self.rebuild(Rebuild::running);
@@ -154,7 +154,7 @@ void World::Implementation::note_residual() {
   reaction_current = true;
 }
 
-/// Of a part of a time step, whose reactions are the means over all parts.
+/// Adds the reactions of a part of a time step. Those of the time step are the means over its parts.
 void World::Implementation::keep_reactions(double dt, bool begins) {
   note_residual();
   note_tensions();

@@ -219,7 +219,7 @@ void World::set_contact(const ContactDescription& contact) {
     if (self.tape && (now.contact_stiffness != stiffness || now.pair_contact_stiffness != before_of_pairs))
       self.tape->refuse("the contact stiffness was set during the run; begin a new run at the change");
   }
-  // What surfaces and anchors hold changes with the numbers that they are made of.
+  // Energy stored in surfaces and anchors changes with their coefficients.
   self.ledger.actuation_work += energy() - before;
 }
 
@@ -233,7 +233,7 @@ void World::set_friction_shares(int pair, const VectorX& shares) {
   wanted.shares = shares;
   check_shares(self.model, wanted);
   const Contact* contact = self.systems.scheme().contact();
-  // What anchors hold changes with the coefficients that they are made of.
+  // Energy stored in anchors changes with their coefficients.
   const bool stores = contact && contact->anchored();
   const auto energy = [&] {
     return stores ? contact->energy_of(self.state, self.parameters, self.energy_scratch.contact) : 0.0;

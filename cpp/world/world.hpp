@@ -42,13 +42,13 @@ struct Reaction {
   Vector3 moment = Vector3::Zero();  ///< of the support on the rod, about the node [N m]
 };
 
-/// How far what a hand holds is from where it held it, of the whole: along the hand's axes and about them.
+/// Displacement of the held part of a rod in its hand, along the hand's axes and about them.
 struct Deflection {
   Vector3 shift = Vector3::Zero(), turn = Vector3::Zero();  ///< [m], [rad]
-  Vector3 slip = Vector3::Zero();                           ///< by what it has slipped besides [m]
+  Vector3 slip = Vector3::Zero();                           ///< slip beside that [m]
 };
 
-/// How a rod passes a ring.
+/// Passage of a rod through a ring.
 struct RingPassage {
   bool passes = false;   ///< until an end of the rod has passed
   double at = 0;         ///< arc length of the rod [m]
@@ -65,8 +65,8 @@ struct LeftRing {
 
 struct EquilibriumResult {
   bool stable = false;
-  /// Whether the stiffness says so by itself; else loads that turn with the rod make it unsymmetric, and where it
-  /// flutters is a matter of mass too.
+  /// True if the stiffness alone decides the stability. Loads that turn with the rod make it unsymmetric; flutter then
+  /// depends on mass too.
   bool decided = true;
   bool branch_changed = false;  ///< a jump, or a saddle that was left, lies between the state before and this one
   int iterations = 0;
@@ -94,19 +94,19 @@ struct EquilibriumPath {
   int iterations = 0;
 };
 
-/// What touches, a row each.
+/// Contacts, one per row.
 struct ContactTable {
   /// Rod and edge of a; rod and edge of b, or -1 - obstacle and -1; whether it sticks.
   Eigen::Matrix<int, Eigen::Dynamic, 5, Eigen::RowMajor> bodies;
-  /// Distance of the centrelines (of a centreline and an obstacle's plane or axis), gap of the surfaces, point (3),
-  /// normal from b to a (3), normal force, friction on a (3), place along a, along b from 0 to 1.
+  /// Columns: distance of the centrelines (of a centreline and an obstacle's plane or axis); gap of the surfaces. Point
+  /// (3); normal from b to a (3). Normal force; friction on a (3). Place along a and along b, from 0 to 1.
   Eigen::Matrix<double, Eigen::Dynamic, 14, Eigen::RowMajor> numbers;
 };
 
 /// Equations linearised about the present configuration, without what supports hold: mass x'' + stiffness x = 0. The
-/// stiffness is geometric + gradients^T diag(stiffnesses) gradients, kept apart since the sum rounds away slow motions:
-/// they bend N edges by 1 / N^2 of what a single node's motion would, so that its energy is some 1 / N^4 of the sum's
-/// entries.
+/// stiffness is geometric + gradients^T diag(stiffnesses) gradients. The parts are kept apart because the sum rounds
+/// away slow motions. These bend N edges by 1 / N^2 of what a single node's motion would. Their energy is some 1 / N^4
+/// of the sum's entries.
 struct Linearisation {
   SparseMatrix geometric;     ///< free unknowns x free unknowns: of forces in the rods, loads, contact
   SparseMatrix gradients;     ///< strains x free unknowns: elongations [m], discrete curvatures and twists [-]
@@ -126,8 +126,9 @@ struct EquilibriumGradient {
 
 struct EquilibriumGradients {
   std::vector<EquilibriumGradient> scalars;
-  /// Where a motion costs nothing, as of a rod that is free to spin: of the work of what is out of balance over that
-  /// motion, and over another at random. What the former depends on drives it, and has no derivative.
+  /// Gradients of the work of the residual over a motion that costs nothing, such as the spin of a free rod, and over a
+  /// random motion. Empty where no motion is free. A parameter on which the former depends drives that motion, and has
+  /// no derivative.
   std::vector<EquilibriumGradient> works;
 };
 
@@ -143,7 +144,7 @@ class World {
   const Plan& plan() const;
   /// Normal of the plane that the scene moves in, if it does.
   std::optional<Vector3> plane_normal() const;
-  /// Whether frames of joints and clamps, and hinges on them, are turned as they were drawn, within 1e-9.
+  /// True if frames of joints and clamps, and hinges on them, are turned as they were drawn, within 1e-9.
   bool frames_as_drawn() const;
   const Statistics& statistics() const;
   double time() const;
@@ -159,16 +160,16 @@ class World {
   /// Interrupted), with the state the last accepted one.
   void interrupt();
 
-  // Called before every inner step. `force_time`: when loads act in this step; `end_time`: where supports
-  // shall be at its end. May call set_load and, if it `prescribes`, prescribe. Empty: none.
+  // Called before every inner step. `force_time`: time at which loads act in this step; `end_time`: its end. May call
+  // set_load and, if it `prescribes`, prescribe. Empty: none.
   using StepCallback = std::function<void(World&, double force_time, double end_time)>;
   void set_step_callback(const StepCallback& callback, bool prescribes = true);
   /// Asked before every inner step and Newton iteration; what it throws ends the call, with the state the last
   /// accepted one. Must leave the world alone. Empty: none.
   void set_poll(const std::function<void()>& poll);
-  /// Custom forces, at the time at which the scheme's forces act: once an inner step, for the state extrapolated to
-  /// then; where the scene is to solve for them (`custom_implicit`), and in every equilibrium, for each state that
-  /// Newton's method tries. Empty: the last forces stay.
+  /// Custom forces, evaluated at the time at which the scheme's forces act: once an inner step, for the state
+  /// extrapolated to that time. Where the scene solves for them (`custom_implicit`), and in every equilibrium, they are
+  /// evaluated for each state that Newton's method tries. Empty: the last forces stay.
   void set_force_function(const CustomFunction& force);
 
   /// One row, or one an edge, as it was put on: world axes of the drawn scene [N], [N m], [N/m].
@@ -183,7 +184,7 @@ class World {
   /// Ramped linearly over `over` seconds from now (0: at once); a row a stencil, or one for all.
   void set_natural_curvature(int rod, const MatrixX2& curvature, double over);
   void set_natural_twist(int rod, const VectorX& twist, double over);
-  /// Likewise of every edge, or one for all: its length free of stress, over that of the drawing [-].
+  /// Length of every edge free of stress, or one for all, over that of the drawing [-]; ramped as curvature.
   void set_natural_stretch(int rod, const VectorX& stretch, double over);
   MatrixX2 natural_curvature(int rod) const;  ///< present value, of the smooth rod [1/m]
   VectorX natural_twist(int rod) const;       ///< [rad/m]
@@ -200,10 +201,10 @@ class World {
   void remove_support(int support);                    ///< the next one to be added takes its row
   /// Target position [m] and rotation relative to the drawn orientation, reached `over` seconds from now. What is not
   /// given goes on as it does. `roll` [rad] is the part of the rotation about the drawn axis of the support, in drawn
-  /// axes, with full turns counted; only an equilibrium or a static step follows it, so that `over` is 0.
+  /// axes, with full turns counted. Only an equilibrium or a static step follows it, so `over` must be 0.
   void move_support(int support, const std::optional<Vector3>& position, const std::optional<Matrix3>& rotation,
                     double over, const Vector3& roll = Vector3::Zero());
-  /// Position and rotation at the end of the coming inner step (from the step callback); likewise.
+  /// Sets position and rotation at the end of the coming inner step, from the step callback.
   void prescribe_support(int support, const std::optional<Vector3>& position, const std::optional<Matrix3>& rotation);
   Vector3 support_position(int support) const;
   Matrix3 support_rotation(int support) const;
@@ -214,7 +215,7 @@ class World {
   /// The drive of a ring feeds the rod towards its end from now on, by length at rest [m/s].
   void feed(int support, double rate);
   RingPassage passage(int support) const;  ///< of a ring
-  /// Of a ring without a drive, from now on [-]; what this does to the energy stored there is work of actuation.
+  /// Friction of a ring without a drive, from now on [-]. The change of the energy stored there is work of actuation.
   void set_ring_friction(int support, double friction);
   /// Rings that were released since this was last asked, at the end of the time step in which their rods left them.
   std::vector<LeftRing> take_left_rings();
@@ -224,22 +225,22 @@ class World {
   /// Reached `over` seconds from now. What is not given goes on as it does.
   void move_obstacle(int obstacle, const std::optional<Vector3>& position, const std::optional<Vector3>& turn,
                      double over);
-  /// At the end of the coming inner step; likewise.
+  /// Sets the place at the end of the coming inner step.
   void prescribe_obstacle(int obstacle, const std::optional<Vector3>& position, const std::optional<Vector3>& turn);
   Vector3 obstacle_position(int obstacle) const;  ///< [m]
   Vector3 obstacle_turn(int obstacle) const;      ///< [rad]
   /// Takes over friction, slip tolerance, restitution and stiffness of a description of the same bodies, and pairs that
   /// it has besides. What this does to the energy at the present state is work of actuation.
   void set_contact(const ContactDescription& contact);
-  /// What the nodes, then the edges, of a rod rub with on an obstacle, over the coefficients of their pair, which is
-  /// one of the description's.
+  /// Friction of the nodes, then of the edges, of a rod on an obstacle, over the coefficients of their pair. The pair
+  /// is one of the description's.
   void set_friction_shares(int pair, const VectorX& shares);
 
   // Read-outs: copies.
   MatrixX3 positions() const;   ///< every node once [m]
   MatrixX3 velocities() const;  ///< [m/s]
   void set_velocities(const MatrixX3& velocities);
-  /// Puts rods where they are told to be, all at once. Frames of joints take the orientation that stresses them least,
+  /// Puts rods into the given states, all at once. Frames of joints take the orientation that stresses them least,
   /// and turn as the edges at them do on the mean. Throws std::invalid_argument, and changes nothing, where a support
   /// holds what would move, an edge has no length, or surfaces would overlap.
   void set_state(const std::vector<RodState>& rods, std::optional<double> time);
@@ -255,8 +256,8 @@ class World {
   double joint_torque(int joint) const;      ///< on what turns: of its motor, its stiffness and its damping [N m]
   VectorX spins(int rod) const;              ///< per edge, angular velocity about the tangent [rad/s]
   Energy energy() const;
-  /// Of one rod: kinetic, stretch, bend, twist, gravity and their sum; what surrounds a joint belongs to the rods whose
-  /// edges meet there. All rods together have what the scene has, but for loads, contact and the energy balance.
+  /// Energy of one rod: kinetic, stretch, bend, twist, gravity and their sum. The energy around a joint belongs to the
+  /// rods whose edges meet there. The sum over all rods is that of the scene without loads, contact and the ledger.
   Energy rod_energy(int rod) const;
   Momentum momentum() const;
   /// Warnings since they were last taken.
@@ -264,14 +265,14 @@ class World {
   ContactTable contacts() const;
   Linearisation linearise() const;
 
-  /// Of scalars whose derivatives by read-outs are given, in the equilibrium that the scene is in. Throws
-  /// std::invalid_argument where it is in none, or where none is known.
+  /// Gradients of scalars whose derivatives by read-outs are given, in the present equilibrium. Throws
+  /// std::invalid_argument where the scene is in none, or where no gradient is known.
   EquilibriumGradients equilibrium_gradients(const std::vector<ReadoutAdjoint>& by) const;
-  /// Forward mode, for few numbers and many read-outs: the residual of the equations of statics with what acts now, per
-  /// unknown; how unknowns that a support holds go with its place and a rotation vector, (unknowns, 6); and how nodes
-  /// move, (3 nodes, n), where the residual changes by the columns of one and what is held by those of the other. Throw
-  /// std::invalid_argument where that is not known: where rods touch, with custom forces, and as
-  /// `equilibrium_gradients`.
+  /// Forward mode, for few numbers and many read-outs. `equilibrium_residual`: residual of statics with the present
+  /// forces, per unknown. `support_directions`: derivative of the unknowns that a support holds by its position and a
+  /// rotation vector, (unknowns, 6). `equilibrium_responses`: motions of nodes, (3 nodes, n), where the residual and
+  /// the held unknowns change by the columns of the arguments. They throw std::invalid_argument where rods touch, with
+  /// custom forces, and where `equilibrium_gradients` does.
   VectorX equilibrium_residual() const;
   MatrixX support_directions(int support) const;
   MatrixX equilibrium_responses(const MatrixX& residual, const MatrixX& held) const;
