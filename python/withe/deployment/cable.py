@@ -37,14 +37,14 @@ class Cable:
     gravito_bending_length : float [m]
         Lgb = (EI / 2w)^(1/3), EI the bending stiffness and w the weight per length: `measure` finds it with a ruler.
     natural_curvature : (float, float) [1/m]
-        Where nothing acts on it, towards x and y of the plan while it hangs from the jaw: `measure_curvature` finds it.
-        "optimised" plans make up for it; others lay the cable as if it were straight.
+        Curvature of the unloaded cable, towards x and y of the plan while it hangs from the jaw. `measure_curvature`
+        finds it. "optimised" plans compensate for it; other methods plan for a straight cable.
 
     Raises
     ------
     ValueError
-        A length that is not positive, a radius that no cable has, as are those in millimetres, a cable that is no
-        longer than it is thick, or bent tighter by itself than that.
+        A length that is not positive. A radius that no cable has (often given in millimetres). A cable that is not
+        longer than thick, or whose natural radius of curvature is below its own radius.
 
     Examples
     --------
@@ -112,19 +112,19 @@ def measure(
 ) -> MeasuredCable:
     """Find a cable's gravito-bending length Lgb = (EI / 2w)^(1/3) with a ruler or a camera.
 
-    Fold the cable back over itself on a table, one layer on the other, and let it go: it forms a loop whose highest
-    point is 1.1422 Lgb above the lower layer, however long the cable is [Pan et al. 2020; (9.10) has it for another
-    length, (EI / w)^(1/3), which is 26 % greater].
+    Fold the cable back over itself on a table, one layer on the other, and release it. The cable forms a loop. For any
+    length of cable its highest point is 1.1422 Lgb above the lower layer [Pan et al. 2020]. Equation (9.10) of the
+    dissertation uses another length, (EI / w)^(1/3), which is 26 % greater.
 
     Parameters
     ----------
     height : float [m]
-        Of the loop's highest point above the table, from centreline to centreline.
+        Height of the loop's highest point above the table, from centreline to centreline.
     image : str, Path or array_like of shape (height, width, 3)
-        Instead: a picture from the side, the table level, of the loop and nothing else before a plain background. The
-        lowest pixels of the cable belong to the layer that lies on the table.
+        Picture of the loop from the side, instead of `height`. The table is level, the background is plain, and nothing
+        else is visible. The lowest pixels of the cable must belong to the layer that lies on the table.
     scale : float [m]
-        Of one pixel of the image.
+        Size of one pixel of the image.
     error : float [m]
         Standard deviation of the height; by default 0.5 mm, or half a pixel of an image.
 

@@ -28,23 +28,23 @@ __all__ = ["Feasibility", "Method", "Slip", "examine"]
 
 FloatArray = npt.NDArray[np.float64]
 Method = Literal["exact", "least_friction"]
-_PER_CENT = 10.0  # what is more has been given so
+_PER_CENT = 10.0  # a larger number is probably given in per cent
 _BEND_STIFFNESS = 2.0  # EI in units of w Lgb^2
 _NEIGHBOURS = 4.0  # radii along a cable within which its parts are no obstacle to each other, times pi
 
 
 @dataclass(frozen=True)
 class Slip:
-    """A stretch of a pattern that friction will not hold.
+    """Part of a pattern that friction does not hold.
 
     Attributes
     ----------
     start, end : float [m]
-        Arc lengths.
+        Arc lengths of both ends of the part.
     needed : float
-        Greatest coefficient of friction that the stretch would need.
+        Largest friction coefficient that the part needs.
     test : str
-        What fails first there: "floor", "lift-off", "free end", "tail" or "overlap".
+        Test with the largest need: "floor", "lift-off", "free end", "tail" or "overlap".
     """
 
     start: float
@@ -61,44 +61,44 @@ class Slip:
 
 @dataclass(frozen=True, eq=False)
 class Feasibility:
-    """The coefficient of friction that each place of a pattern needs, by three tests, and what two more say.
+    """Friction coefficient that each place of a pattern needs, by three tests, and the results of two more tests.
 
-    None of them says how a cable rolls. Its lower side, stretched where it bends up to the jaw, contracts as it is laid
-    down: friction along it is used up at the lift-off point, however little is needed, and leaves a tension of up to
-    friction times the force there. In a bend that pushes to the inside, below the centreline, and what lies rolls. Of
-    a cable whose radius is a tenth of Lgb a millimetre comes together over a letter, which the stiff tail pulls back.
+    No test predicts rolling. The lower side of the cable is stretched where the cable bends up to the jaw, and
+    contracts as the cable is laid down. This contraction uses up the friction along the cable at the lift-off point,
+    and leaves a tension of up to friction times the force there. In a bend the tension pushes the cable inwards, below
+    the centreline, and the laid cable rolls. A cable with a radius of 0.1 Lgb shifts by about a millimetre over a
+    letter, and the stiff tail pulls this slack back.
 
     Attributes
     ----------
     arc_length : ndarray of shape (nodes,) [m]
     floor : ndarray of shape (nodes,)
-        Where the cable lies. With EI its stiffness, w its weight and n its tension, the floor gives
-        EI kappa'' - n kappa across and n' + EI kappa kappa' along it, per length; n is 0 at the free end and else
-        chosen so that the greatest need is least. (Dissertation (9.2) is the first term alone.)
+        Need of the lying cable. Let EI be its stiffness, w its weight per length and n its tension. Per length, the
+        floor applies EI kappa'' - n kappa across the cable and n' + EI kappa kappa' along it. The tension is 0 at the
+        free end, and otherwise minimizes the greatest need. (Dissertation (9.2) is the first term alone.)
     lift_off : ndarray of shape (nodes,)
-        While it is the lift-off point: the floor's force there along itself, over that across. Along the floor it
-        carries what the suspended part needs and the jump to the shear EI kappa' of the part that lies; where the
-        curvature is constant that is |Fy| / Fz. A push along the cable is taken up by up to 3 Lgb of what lies behind
-        too.
+        Need while the place is the lift-off point: tangential over normal force of the floor. The tangential force
+        carries the suspended part and the jump to the shear EI kappa' of the lying part. For a constant curvature the
+        ratio is |Fy| / Fz. Up to 3 Lgb of the cable behind the lift-off point help to carry a push along the cable.
     free_end : ndarray of shape (nodes,)
-        Between it and the free end at most friction times weight can turn and shear the cable: it needs
-        2 EI kappa / (w s^2) and EI kappa' / (w s), s the way from the free end. A pattern that begins with curvature
-        always slips a little.
+        Need of the part between the place and the free end. Friction times weight must turn and shear this part. With s
+        the distance from the free end, this takes 2 EI kappa / (w s^2) and EI kappa' / (w s). A pattern that begins
+        with curvature always slips a little.
     tail : ndarray of shape (nodes,)
-        The greatest need at lift-off of all places before. Where a bend slips inwards by c while it is laid, what is
-        laid behind it runs ahead by the integral of the curvature times c, for the cable does not stretch. The jaw
-        knows nothing of that. As long as much hangs, this gives; the stiff rest, from some 2.5 Lgb on, pulls
-        all that lies behind the bend back along itself, straight or not.
+        Greatest need at lift-off of all earlier places. If a bend slips inwards by c while it is laid, the cable behind
+        it runs ahead by the integral of the curvature times c, because the cable does not stretch. The jaw does not
+        correct for this. A long suspended part yields. A suspended part of about 2.5 Lgb or less is stiff, and pulls the
+        cable behind the bend back along itself, straight or not.
     overlap : ndarray of bool of shape (nodes,)
-        Where the pattern comes nearer to itself than the cable is thick: it cannot lie there, and pushes itself aside.
-        Pushed by at most four radii, from one side of itself to the other, it keeps its direction there, and moves
-        along (144 Lgb^3 4 radius / friction)^(1/4) to either side, as a beam does that friction loads: its deflection y
-        has EI d^4y/ds^4 = -friction w, with y, its slope and its curvature 0 where it begins to move, and the slope 0
-        where it is pushed. That much more slips.
+        True where the pattern approaches itself by less than the thickness of the cable. The cable pushes itself aside
+        there. The push is at most four radii, from one side of the other part to its other side. The cable keeps its
+        direction at the push, and moves along (144 Lgb^3 4 radius / friction)^(1/4) on either side. This is the length
+        of a beam under a friction load: EI d^4y/ds^4 = -friction w, where the slope vanishes at the push. At the other
+        end the deflection y, its slope and its curvature vanish. That length slips as well.
     friction : float
-        What there is.
+        Friction coefficient of the floor.
     slips : tuple of Slip
-        Stretches that need more.
+        Parts that need more friction.
     """
 
     arc_length: FloatArray
@@ -264,7 +264,7 @@ def _floor(s: FloatArray, curvature: FloatArray, slope: FloatArray, bend: FloatA
 
 
 def _overlap(points: FloatArray, arc_length: FloatArray, radius: float) -> npt.NDArray[np.bool_]:
-    """Where a curve comes nearer to a part of itself than two radii, which is not its neighbour."""
+    """True where a curve approaches a part of itself that is not its neighbour to less than two radii."""
     away = np.linalg.norm(points[:, None] - points[None], axis=-1)
     far = np.abs(arc_length[:, None] - arc_length[None]) > _NEIGHBOURS * np.pi * radius
     return np.asarray(((away < 2.0 * radius) & far).any(1))
@@ -273,7 +273,7 @@ def _overlap(points: FloatArray, arc_length: FloatArray, radius: float) -> npt.N
 def _pushed(
     overlap: npt.NDArray[np.bool_], arc_length: FloatArray, cable: Cable, friction: float
 ) -> npt.NDArray[np.bool_]:
-    """What moves with the stretches that overlap."""
+    """True for nodes that move together with the parts that overlap."""
     reach = (576.0 * cable.gravito_bending_length**3 * cable.radius / friction) ** 0.25
     return np.asarray((np.abs(arc_length[:, None] - arc_length[overlap]) <= reach).any(1))
 

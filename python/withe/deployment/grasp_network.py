@@ -36,10 +36,10 @@ def side(module: Any, curvature: Any) -> Any:
 
 
 def _string(module: Any, length: Any, curvature: Any, stretch: Any) -> tuple[Any, Any]:
-    """How far sideways and how high the end is of a string that hangs where the rod does, stretched a little [Lgb].
+    """Return the horizontal and vertical distance of the end of a hanging string that stretches slightly [Lgb].
 
-    Its horizontal force is that of a rod so tightly bent that its weight does not matter, EI curvature^2 / 2, here
-    curvature^2, and a little more, so that straight rods are nothing special.
+    The horizontal force is that of a rod whose bend is so tight that weight is negligible, EI curvature^2 / 2, here
+    curvature^2. A small constant is added so that straight rods are not a special case.
     """
     force = curvature * curvature + _LEAST_FORCE
     size = module.sqrt(length * length + force * force)

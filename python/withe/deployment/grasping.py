@@ -188,20 +188,20 @@ def _described(rows: FloatArray, questions: FloatArray, shape: tuple[int, ...]) 
 def carrying(laid: FloatArray, curvature: FloatArray) -> FloatArray:
     """Length behind the lift-off point that carries a push along the rod back, shape (n,) [Lgb].
 
-    At most 3: further back a rod in a bend gives way aside. And none of what lies next to the free end: there friction
-    is needed to turn the rod, by at most friction l^2 / 2 over a length l, so that a curvature takes
-    2 (curvature / friction)^(1/2), of which half is counted.
+    At most 3 Lgb carry the push: farther back, a bent rod yields sideways. The length next to the free end carries
+    nothing, because friction is needed there to turn the rod. A moment of at most friction l^2 / 2 acts over a length
+    l, so a curvature takes 2 (curvature / friction)^(1/2). Half of this length is subtracted.
     """
     return np.clip(laid - np.sqrt(np.abs(curvature) / _SLICK), 0.0, _CARRYING)
 
 
 def needed_friction(force: FloatArray, shear: FloatArray, carried: FloatArray) -> FloatArray:
-    """Coefficient of friction that lift-off needs, with what lies behind it, shape (n,).
+    """Friction coefficient that each lift-off point needs, including the lying rod behind it, shape (n,).
 
-    `force` is the floor's on what hangs, shape (n, 3), `shear` the force across, along y, of what lies on what hangs,
-    which the floor need not give [w Lgb]. A force across must be held where the rod lifts off. A push along it need
-    not: what lies takes it up too, over a length `carried` [Lgb], with as much friction per weight everywhere,
-    push / (force_z + carried).
+    `force` is the force of the floor on the suspended part, shape (n, 3) [w Lgb]. `shear` is the transverse force,
+    along y, of the lying part on the suspended part [w Lgb]; the floor need not apply it. The lift-off point must hold
+    the transverse force alone. The lying part shares a push along the rod over a length `carried` [Lgb]. The friction
+    per weight is then the same everywhere, push / (force_z + carried).
     """
     up = force[:, 2]
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -218,11 +218,13 @@ def least_friction(
 ) -> Grasp:
     """Grasps with the push along the rod that needs least friction, shapes (n,); see `grasp`, `needed_friction`.
 
-    `laid` is the length that lies behind the lift-off point [Lgb]. Where the pose alone is asked, the push is a share
-    of the curvature, the best of a few, and of the parabola through it and its neighbours. Along the way it is the
-    least that is nowhere less and changes by no more than a slick floor holds, for what lies keeps the push with which
-    it was laid; and at most what such a floor holds behind the lift-off point, for a rod that is pushed back as a whole
-    is off all along.
+    `laid` is the length behind the lift-off point [Lgb]. For a single pose the push is a share of the curvature: the
+    best of a few shares, improved by the parabola through it and its neighbours. Along a whole path the push is bounded
+    in three ways:
+
+    - It is nowhere below the push of the single poses.
+    - It changes by no more than a slippery floor holds, because the laid rod keeps the push with which it was laid.
+    - It is at most what such a floor holds behind the lift-off point, because otherwise the whole rod moves back.
     """
     near = np.minimum(suspended, _ENOUGH)
     bend, carried = np.abs(curvature), carrying(laid, curvature)

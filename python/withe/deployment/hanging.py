@@ -51,32 +51,35 @@ def measure_curvature(
     depth: float = 0.0,
     error: float | None = None,
 ) -> MeasuredCurvature:
-    """Find how a cable bends by itself, with a ruler or a camera.
+    """Find the natural curvature of a cable, with a ruler or a camera.
 
-    Let it hang from its jaw, the free end off the floor. Its weight pulls it straight but for the last few Lgb, and
-    the end hangs aside, towards the side to which the cable bends: by 2.044 curvature Lgb^2 where it bends little, by
-    less where it curls. (With u = s / (2^(1/3) Lgb), s the arc length above the free end, theta'' = u sin theta, theta'
-    = curvature at the end and theta = 0 far above.) Two measurements at right angles make `Cable.natural_curvature`:
-    seen along y, and along x.
+    Let the cable hang from its jaw, with the free end off the floor. The weight straightens the cable except for the
+    last few Lgb. There the end hangs aside, towards the side to which the cable bends. The distance is 2.044 curvature
+    Lgb^2 for a small curvature, and less for a cable that curls. Make two measurements at right angles, one seen along
+    y and one seen along x, for `Cable.natural_curvature`.
+
+    The model is theta'' = u sin theta with u = s / (2^(1/3) Lgb), where s is the arc length above the free end. The
+    boundary conditions are theta' = curvature at the end and theta = 0 far above.
 
     Parameters
     ----------
     gravito_bending_length : float [m]
         See `measure`.
     aside : float [m]
-        How far the free end is beside the straight part above it, positive towards the axis that is measured; 1.93 Lgb
-        at most: from there on it curls up, and is less far aside the more it bends.
+        Distance of the free end from the straight part above it, positive towards the measured axis. At most 1.93 Lgb:
+        beyond that distance the end curls up, and more curvature brings it back.
     image : str, Path or array_like of shape (height, width, 3)
-        Instead: a picture from the side of the hanging cable's lower 5 Lgb or more, and nothing else before a plain
-        background, its columns along the axis that is measured; of a cable whose end hangs at 70 degrees at most.
+        Picture from the side, instead of `aside`. It shows the lower 5 Lgb or more of the hanging cable before a plain
+        background, and nothing else. Its columns run along the measured axis. The end of the cable may hang at 70
+        degrees at most.
     scale : float [m]
-        Of one pixel of the image.
+        Size of one pixel of the image.
     depth : float [m]
-        How far the free end is aside along the line of sight, if it is: of a cable that bends by more than 0.3 / Lgb
-        both measurements need what the other one read.
+        Distance of the free end along the line of sight. If the cable bends by more than 0.3 / Lgb, each of the two
+        measurements needs the reading of the other.
     error : float [m]
-        Standard deviation of what is read, aside and depth; by default 0.5 mm, or of an image half a pixel
-        and what is not known of the shape of the cable's end.
+        Standard deviation of the readings `aside` and `depth`. The default is 0.5 mm. The default for an image is half
+        a pixel plus the uncertainty of the shape of the cable's end.
 
     Returns
     -------
@@ -121,7 +124,7 @@ def measure_curvature(
 
 @dataclass(frozen=True)
 class _Hanging:
-    """How a cable hangs: curvature and slope [rad] at its free end, and points down to it, shape (n,)."""
+    """Shape of a hanging cable: curvature and slope [rad] at its free end, and points down to it, shape (n,)."""
 
     curvature: float
     tilt: float
@@ -156,10 +159,10 @@ def _known() -> Any:
 
 
 def _seen_aside(image: str | os.PathLike[str] | npt.ArrayLike, scale: float, depth: float) -> tuple[float, float]:
-    """How far the free end is beside the line above it, by least squares over all rows of a picture; and its error.
+    """Return the distance of the free end from the line above it, by least squares over all rows, and its error.
 
-    The line may lean a little, as a camera does. The end is lower than its centreline by some part of its radius,
-    whether it is cut off square or is round.
+    The line may lean a little, because the camera may. The end lies below the end of the centreline by an unknown part
+    of the radius, which depends on the cut of the cable.
     """
     from scipy.optimize import least_squares
 

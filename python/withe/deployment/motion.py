@@ -262,6 +262,6 @@ def _turned(quaternions: FloatArray, vectors: FloatArray) -> FloatArray:
 
 
 def _continuous(quaternions: FloatArray) -> FloatArray:
-    """Of both signs of each quaternion the one near its predecessor."""
+    """Choose the sign of each quaternion that is closer to its predecessor."""
     agree = np.where((quaternions[1:] * quaternions[:-1]).sum(-1) < 0.0, -1.0, 1.0)
     return np.asarray(quaternions * np.concatenate([[1.0], np.cumprod(agree)])[:, None])

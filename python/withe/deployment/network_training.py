@@ -36,16 +36,17 @@ def train(
     Parameters
     ----------
     name : {"small", "source"}
-        "small": three layers of 96, smooth, of 80 kB, on 100,000 grasps; it learns how a rod differs from a
-        string. "source": four layers of 392 with ReLU, mean absolute error, gradient descent and Adam by turns,
-        batches that grow, on as many samples as there were [Choi, dissertation, 9.3.3]; 1.9 MB. How its samples were
-        spread is not printed: here evenly over suspended length, curvature and stretch stiffness.
+        "small" has three smooth layers of 96 units (80 kB) and 100,000 grasps as samples. It learns the difference
+        between a rod and a string. The network "source" is that of [Choi, dissertation, 9.3.3]: four ReLU layers of 392
+        units (1.9 MB), with as many samples. It minimizes the mean absolute error, by gradient descent and Adam in
+        turn, with growing batches. The dissertation does not state how its samples were distributed; here they are
+        uniform over suspended length, curvature and stretch stiffness.
     seed : int
-        Of the samples, of the weights at the start and of the order; equal seeds give equal networks.
+        Seed of the samples, of the initial weights and of the order. Equal seeds give equal networks.
     samples : int, optional
-        How many grasps.
+        Number of grasps.
     threads : int
-        Of torch.
+        Number of threads of torch.
     time_limit : float, optional [s]
         Training stops there, and so it does at Ctrl-C, with the best network so far. ``network.network.training`` says
         how it ended.

@@ -36,7 +36,7 @@ _GAIN = 0.97  # of the error that a step must leave at most to go on
 
 @dataclass(frozen=True)
 class Trial:
-    """What a path is shifted by, what goes along it, and how far the cable then lies from its places.
+    """Shift of a path, its method of planning, and the distances of the laid cable from its places.
 
     Shapes (knots + 3,), the last three of which move it as a whole, and (nodes, 2) [m].
     """
@@ -196,7 +196,7 @@ def _shifted(path: Path, basis: FloatArray, shift: FloatArray) -> Path:
 
 
 def _turn(angle: float) -> FloatArray:
-    """What rows are multiplied by from the right to be turned."""
+    """Return the matrix that turns row vectors by an angle when multiplied from the right."""
     return np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
 
 

@@ -252,7 +252,7 @@ class Pattern:
         lengths = _lengths(self.raw)
         even = np.linspace(0.0, lengths[-1], nodes)
         sampled = np.stack([np.interp(even, lengths, self.raw[:, i]) for i in range(2)], 1)
-        # What was given may be off by as much as it is smoothed.
+        # Input points may be wrong by as much as the smoothing moves them.
         reach = max(min(_REACH * even[-1], _ENOUGH * smoothing), 2.0 * even[1])
         end = -_start_curvature(sampled[::-1], reach)
         behind = _straight_on(sampled, end, reach)
@@ -432,7 +432,7 @@ def _drawn(image: Any, scale: float | None) -> FloatArray:
 
 
 def _start_curvature(points: FloatArray, reach: float) -> float:
-    """Of the circle through the beginning, the place so far along the curve, and that twice as far."""
+    """Return the curvature of the circle through the points at arc lengths 0, `reach` and 2 `reach`."""
     a, b, c = (_along(points, way) for way in (0.0, reach, 2.0 * reach))
     area = (b - a)[0] * (c - a)[1] - (b - a)[1] * (c - a)[0]
     sides = np.linalg.norm(b - a) * np.linalg.norm(c - b) * np.linalg.norm(c - a)

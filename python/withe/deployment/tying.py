@@ -132,8 +132,8 @@ def tie(
     Raises
     ------
     ValueError
-        No plan, a move of a cable that is not there or beyond its end, moves of a step with different numbers of legs,
-        picks that do not fit, friction that is not positive, negative noise.
+        Not a plan, a move of a missing cable or beyond the end of a cable, or moves of one step with different numbers
+        of legs. Also picks that do not match the steps, friction that is not positive, or negative noise.
     """
     _check(plans, steps, picks)
     friction = validation.positive(friction, "friction")
@@ -234,7 +234,7 @@ class _Table:
         self._rest(f"step {number}")
 
     def _taken(self, move: Move, pick: FloatArray | None, name: str) -> tuple[FloatArray, RunningHand | None]:
-        """Where a gripper reaches, and what it holds there."""
+        """Return the position that a gripper reaches, and the hand that holds the cable there."""
         setup, cable = self.setups[move.cable], self.cables[move.cable]
         points, s = self.simulation.positions(cable), setup.arc_length
         if pick is None:

@@ -170,13 +170,13 @@ def _slides(slow: FoldPlan) -> str | None:
 
 
 def _jumps(slow: FoldPlan) -> str:
-    """That the sheet will not follow to the end, and what may."""
+    """Return the text that the sheet jumps before the end, and which option may help."""
     free = "" if slow.grasp == "free" else ": use method='slip' with grasp='free', which also applies a moment"
     return f"the sheet jumps at {slow.jumps_at:.1f} of {slow.times[-1]:.1f} s, where its equilibrium ends{free}"
 
 
 def _unseen(slow: FoldPlan) -> str | None:
-    """What the last part asks for, of which a camera sees nothing, where that is too much."""
+    """Return a complaint if the last part, which no camera sees, needs too much friction; else None."""
     lgb, (_, share) = slow.paper.gravito_bending_length, slow.uncertainty
     least = slow.paper.friction * (1.0 - share)
     needed = float(slow.slip_ratio[slow.poses[:, 0] > slow.poses[-1, 0] - _UNSEEN * lgb].max())

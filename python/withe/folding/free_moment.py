@@ -1,11 +1,12 @@
-"""Ways of a jaw that turns the sheet's end as it likes, with whatever moment that takes; curvature is bounded instead.
+"""Paths of a jaw that turns the end of the sheet freely. Any moment is allowed; the curvature is bounded instead.
 
-An equilibrium is then named by three numbers: R and H, the table's forces at the lift-off point, and the suspended
-length. Where H = 0 the table is not asked for friction, and what lies does not slide however slick it is: a surface
-with a gentle part, R about 1.5, and a folded one, R about 4.9, that are one. All in units of Lgb and w.
+Three numbers name an equilibrium: R and H, the forces of the table at the lift-off point, and the suspended length.
+Equilibria with H = 0 need no friction, so the lying part does not slide even on a slippery table. These equilibria form
+one connected surface with a gentle part (R about 1.5) and a folded part (R about 4.9). All quantities are in units of
+Lgb and w.
 
-Short parts are ruled by bending alone, forces growing as 1 / length; so the lattice has R and H times the length, where
-that is below 1.
+Bending alone determines short suspended parts, whose forces grow as 1 / length. For a suspended length below 1 the
+lattice therefore stores R and H times the length.
 """
 
 from __future__ import annotations
@@ -34,11 +35,12 @@ _BEST = 3  # goals that are looked at more closely
 
 @dataclass(frozen=True)
 class Holding:
-    """A sheet and its jaw [Lgb], and how far it may bend [1/Lgb].
+    """A sheet and its jaw [Lgb], and the largest curvature of the sheet [1/Lgb].
 
-    `length` of the sheet from the jaw's inner edge on, and its `width` there; `share` by which Lgb may be other than
-    thought. On its way to a `goal`, a place of the outer edge, that is over the sheet by as much as it has to go there
-    times a slope, or by `clearance`: an edge that grazes the sheet pushes it, if the jaw is off by the least.
+    `length` is the length of the sheet from the inner edge of the jaw on, and `width` its width there. `share` is the
+    relative uncertainty of Lgb. On the way to a `goal`, which is a position of the outer edge, the height of the edge
+    over the sheet is at least the remaining distance times a slope, and at least `clearance`. An edge that grazes the
+    sheet pushes it if the jaw is off by a small amount.
     """
 
     length: float
@@ -52,7 +54,7 @@ class Holding:
     goal: float = np.inf
 
     def outer(self, sheet: Elastica) -> tuple[FloatArray, FloatArray]:
-        """Where the outer edge is, from where it lay; and how high over what the fingers need at least there."""
+        """Return x of the outer edge, from its position in the flat sheet, and its height above the least allowed."""
         x = sheet.x + self.depth * (1 - np.cos(sheet.angle))
         z = sheet.z + self.depth * np.sin(sheet.angle)
         return x, z - self.thickness - self.finger * np.abs(np.cos(sheet.angle))

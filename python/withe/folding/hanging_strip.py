@@ -47,7 +47,7 @@ class Measured:
 
 
 def _slopes(u: float | FloatArray, y: FloatArray) -> FloatArray:
-    """Of phi, phi', the drop and the reach, by the way from the tip: 2 phi'' = u sin(phi)."""
+    """Derivatives of phi, phi', the drop and the reach by arc length from the tip, where 2 phi'' = u sin(phi)."""
     sine = np.sin(y[0])
     return np.array([y[1], 0.5 * u * sine, np.cos(y[0]), sine])
 
@@ -144,8 +144,8 @@ def measure(
     Raises
     ------
     ValueError
-        Neither length and drop nor image and scale, lengths that are not positive or above 10 m, a drop that no strip
-        of the length can have, a picture without a sheet, two readings that are not of one strip.
+        Missing input: pass length and drop, or an image and its scale. Lengths that are not positive or above 10 m, or
+        a drop that no strip of this length can have. A picture without a sheet, or readings of two different strips.
 
     Examples
     --------
@@ -202,7 +202,7 @@ def _uncurled(flat: Measured, read: FloatArray, error: float) -> Measured:
     angles = np.full((2, 1), 0.5)  # of the tips, found last
 
     def misfits(unknowns: FloatArray) -> FloatArray:
-        """Of columns of unknowns."""
+        """Misfits of columns of unknowns."""
         lgb, length, curl = unknowns * scales[:, None]
         found, drops, reaches = _curled(length / lgb, np.stack([curl * lgb, -curl * lgb]), angles)
         angles[:] = found[:, :1]

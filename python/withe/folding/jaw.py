@@ -72,7 +72,7 @@ class Jaw:
 
 
 def inner_edge(poses: FloatArray, depth: float) -> FloatArray:
-    """Where the free part of a sheet ends: x from where that lay in the flat sheet, z, angle; from outer edges."""
+    """Return the inner edges of the jaw, from its outer edges: x from its position in the flat sheet, z, angle."""
     x, z, angle = poses.T
     return np.stack([x - depth + depth * np.cos(angle), z - depth * np.sin(angle), angle], axis=1)
 

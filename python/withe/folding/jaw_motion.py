@@ -1,4 +1,4 @@
-"""Where the jaw of a simulated robot is when: planned poses, one motion after another, and how it misses them."""
+"""Pose of the jaw of a simulated robot over time: planned poses, one motion after another, and the tracking errors."""
 
 from __future__ import annotations
 
@@ -96,9 +96,9 @@ class JawMotion:
         return max(float(np.exp(-age / _FOLLOWS)) * self._way.speed(time - age - _FOLLOWS, time - age) for age in ages)
 
     def longest_step(self, time: float, longest: float) -> float:
-        """How long a step that begins at a time may be [s]: what is quick, and what it has set in motion, is resolved.
+        """Return the longest timestep that resolves the motion of the jaw and the vibration that it excites [s].
 
-        No step goes beyond the end of a motion.
+        No timestep goes beyond the end of a motion.
         """
         left = self.end - time
         longest = left if 1e-9 < left < longest else longest

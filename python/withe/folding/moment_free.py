@@ -32,7 +32,7 @@ FloatArray = npt.NDArray[np.float64]
 _MOST_STEPS = 2000
 _ROOM = 2e-3  # of a path on which the sheet slides least, for it to be short [Lgb]
 SMOOTHING = 1.02
-"""What a path through nodes may need of friction when its corners are taken off, over what the nodes need."""
+"""Largest friction of a smoothed path, relative to the friction that the nodes of the path need."""
 
 
 @lru_cache(maxsize=8)
@@ -81,7 +81,7 @@ def connects(solve: Manifold, holding: Holding, goal: Elastica) -> bool:
 
 @lru_cache(maxsize=8)
 def _parts(solve: Manifold, holding: Holding) -> IndexArray:
-    """Of the grid that hang together, a label for each node."""
+    """Label each node of the grid by its connected part."""
     from scipy.sparse.csgraph import connected_components
 
     return np.asarray(connected_components(_by_ratio(solve, holding).graph, directed=False)[1])
@@ -112,8 +112,8 @@ def least_slide(
 ) -> Elastica | None:
     """Nodes of the shortest path on which the sheet slides least, bends counted.
 
-    At each pose there is a range of slides at which friction holds the sheet, and it slides no further than to the
-    nearer end of that; so what a path slides is the farthest of these ends from 0.
+    Friction holds the sheet within an interval of slides at each pose, and the sheet slides only to the nearer end of
+    this interval. The slide of a path is therefore the largest distance of these ends from 0.
     """
     slides = _needed_slides(solve, holding.length, friction)
     return _shortest_within(solve, holding, slides.at, (0.0, _ROOM), goal, start)
@@ -172,9 +172,9 @@ def _spread(
 
 
 class _NeededSlides:
-    """How far a sheet must have slid at nodes of the grid, for friction to hold it there [Lgb]; found where asked for.
+    """Slide at which friction holds the sheet, at nodes of the grid [Lgb]. Each slide is computed on first use.
 
-    Most nodes are of no concern to a path, and sheets that snap, whose slide has no end, take long.
+    A path visits few nodes, and the computation is slow for sheets that snap, whose slide is infinite.
     """
 
     def __init__(self, pose: Elastica, friction: float, length: float, width: Width) -> None:
@@ -227,7 +227,7 @@ def greedy(solve: Manifold, holding: Holding, goal: Elastica) -> Elastica | None
 
 
 def _head(nodes: Elastica) -> int:
-    """How many nodes at the start are lifted without tangential force: places of these say little of forces."""
+    """Return the number of initial nodes without tangential force. Their positions say little about forces."""
     pulls = np.abs(nodes.tangential_force) > 1e-9
     return int(np.argmax(pulls)) if pulls.any() else 0
 

@@ -22,7 +22,7 @@ __all__ = ["train"]
 FloatArray = npt.NDArray[np.float64]
 _STRAIGHT = (0.48, 5.72)  # least and greatest straight length of all sheets [Lgb]
 _SAMPLES = {"small": 300_000, "source": 95_796}
-# Of errors of angle, length, direction and size of the force, curvature, as parts of their spread.
+# Weights of the errors of angle, length, direction and size of the force, and curvature, relative to their spread.
 _WEIGHTS = (4.0, 1.0, 2.0, 0.5, 0.2)
 
 
@@ -41,15 +41,17 @@ def train(
     Parameters
     ----------
     name : {"small", "source"}
-        "small": three layers of 64, smooth, of 40 kB, on 300,000 equilibria; it learns how a sheet differs from a
-        straight one, and the direction and size of the force. "source": four layers of 392 with ReLU on x and z, mean
-        absolute error, gradient descent and Adam by turns, batches that grow, on as many samples as there were [Choi,
-        dissertation, 7.5.2]; 1.9 MB. How its samples were spread is not printed: here evenly over x and z.
+        "small" has three smooth layers of 64 units (40 kB) and 300,000 equilibria as samples. It learns the difference
+        between a sheet and a straight sheet, and the direction and size of the force. The network "source" is that of
+        [Choi, dissertation, 7.5.2]: four ReLU layers of 392 units on x and z (1.9 MB) and 95,796 samples. It minimizes
+        the mean absolute error, by gradient descent and Adam in turn, with growing batches. The dissertation does not
+        state how its samples were distributed; here they are uniform over x and z.
     seed : int
-        Of the samples, of the weights at the start and of the order; equal seeds give equal networks.
+        Seed of the samples, of the initial weights and of the order. Equal seeds give equal networks.
     samples : int, optional
-        How many equilibria; about, of the small one.
+        Number of equilibria (approximate for "small").
     threads : int
+        Number of threads of torch.
         Of torch.
     time_limit : float, optional [s]
         Training stops there, and so it does at Ctrl-C, with the best network so far. ``network.network.training`` says

@@ -76,10 +76,11 @@ class Noise:
 
 @dataclass(frozen=True)
 class Drawn:
-    """One trial's numbers: factors of Lgb and of friction, curl [1/m], tilt [rad], and how the jaw is off.
+    """Random numbers of one trial: factors of Lgb and friction, curl [1/m], tilt [rad], and errors of the jaw.
 
-    `shift` is (x, z [m], angle [rad]); `waves` of shape (waves, 2, 3): amplitude [m], frequency [rad/s] and phase of
-    the jitter in x and z; `patches` of shape (waves, 3): amplitude, wave number [rad/m] and phase of friction along x.
+    `shift` is the constant error of the jaw: x [m], z [m] and angle [rad]. `waves`, of shape (waves, 2, 3), holds the
+    amplitude [m], frequency [rad/s] and phase of its jitter in x and z. `patches`, of shape (waves, 3), holds the
+    amplitude, wave number [rad/m] and phase of the friction along x.
     """
 
     gravito_bending_length: float

@@ -39,9 +39,9 @@ class Paper:
     Raises
     ------
     ValueError
-        A length or friction that is not positive; sizes that no paper has, as are those in millimetres: above 20 m,
-        thicker than a tenth of the length, an Lgb of more than ten lengths; an outline that does not go from 0 to 1 or
-        is nowhere 1 wide.
+        A length or friction that is not positive. Sizes that no paper has (often given in millimetres): above 20 m,
+        thicker than a tenth of the length, or an Lgb of more than ten lengths. An outline that does not run from 0 to
+        1, or whose width is nowhere 1.
 
     Examples
     --------

@@ -214,7 +214,7 @@ def _with_friction(task: _Task, enough: float, goal: Elastica, start: Elastica |
 
 def least_friction(present: FoldPlan) -> float:
     """Friction with which a plan of method "slip" to the same target has no slide."""
-    if present.grasp == "free":  # which goes where least is needed, if that is not there
+    if present.grasp == "free":  # A free grasp already needs least friction.
         return float(present.slip_ratio.max())
     task = _task_of(present)
     sheet = _with_friction(task, 0.0, _checked_goal(_goal(task), task), None, _POSES)
@@ -222,12 +222,12 @@ def least_friction(present: FoldPlan) -> float:
 
 
 def replan(present: FoldPlan, pose: npt.ArrayLike, slide: float) -> FoldPlan:
-    """Plan the rest of a fold anew, from where the jaw is and where the sheet has slid to.
+    """Plan the rest of a fold again, from the present pose of the jaw and the present slide of the sheet.
 
-    Without moment it is a search over the manifold again: by least slide if the present plan is of method "slip", or
-    else by least accumulated force ratio; the difference of the present angle to that manifold's is taken out evenly
-    along the way [dissertation, (7.14)-(7.16)]. With a free moment the present plan goes on: how its forces differ from
-    those at the pose is taken out over a third of the rest.
+    For a grasp without moment the planner searches the manifold again: by least slide if the present plan is of method
+    "slip", and otherwise by least accumulated force ratio. The difference between the present angle and the angle of
+    the manifold is removed evenly along the way [dissertation, (7.14)-(7.16)]. For a grasp with free moment the present
+    plan continues. The difference between its forces and the forces at the pose is removed over a third of the rest.
 
     Parameters
     ----------
@@ -272,7 +272,7 @@ def replan(present: FoldPlan, pose: npt.ArrayLike, slide: float) -> FoldPlan:
 
 
 def _task_of(present: FoldPlan) -> _Task:
-    """What a plan was asked for, from where the sheet lies."""
+    """Return the task of a plan, relative to the present position of the sheet."""
     return _Task(
         paper=present.paper,
         target=present.target - present.offset,
@@ -379,7 +379,7 @@ def _reachable(task: _Task) -> str:
 
 
 def _free(task: _Task) -> FoldPlan:
-    """Without the table's friction where that can be, then with some, then for a sheet that is just as thought."""
+    """Plan without friction of the table if possible, else with friction, else for the nominal sheet only."""
     friction = task.paper.friction
     limit = friction * (1 - task.uncertainty[1])
     holding = task.free_holding
@@ -388,7 +388,7 @@ def _free(task: _Task) -> FoldPlan:
     if level is not None and level.ratio <= limit:
         return _along(task, level, holding, limit)
     thought = _free_way(task, exact, True, np.inf)
-    # Where the sheet that it should be slides anyway, the way is that for it: others need more friction still.
+    # If even the nominal sheet slides, plan for it alone: other sheets within the uncertainty need more friction.
     if thought is not None and thought.ratio <= friction:
         pulled = _free_way(task, holding, True, friction)
         ways = [way for way in (level, pulled) if way is not None and way.ratio <= friction]

@@ -138,7 +138,8 @@ class FoldPlan(PlanFile):
         return self._moved(self.paper)
 
     def _moved(self, paper: Paper) -> tuple[Elastica, FloatArray]:
-        """How a paper hangs and slides [Lgb], from where the sheet first hangs freely; before it has no force."""
+        """Return the sheet and its slide [Lgb] for another paper, from where it first hangs freely (no force
+        before)."""
         factor = paper.gravito_bending_length / self.paper.gravito_bending_length
         width, length = self._width.of_other(factor), self._length / factor
         flat = flat_forces(width)
@@ -253,10 +254,13 @@ class FoldPlan(PlanFile):
 
     @property
     def jumps_at(self) -> float | None:
-        """Time from which the slide is not predicted [s], from a plunge on at the latest; None where it is to the end.
+        """Time from which the slide is not predicted [s]; None if it is predicted to the end.
 
-        There the sheet jumps: no equilibrium is within reach, or none that is stable, all of the sheet is lifted, or it
-        slides so fast that it would coast on by more than 5 mm, v^2 / (2 friction g).
+        A plunge always begins an unpredicted part. Elsewhere the sheet jumps at this time for one of four reasons:
+
+        - no stable equilibrium is within reach
+        - all of the sheet is lifted
+        - the sheet would coast on by more than 5 mm, v^2 / (2 friction g)
         """
         lost = ~self._motion[0].valid
         return float(self.times[np.argmax(lost)]) if lost.any() else None
@@ -271,7 +275,7 @@ class FoldPlan(PlanFile):
 
     def __repr__(self) -> str:
         slow = self.before_plunge()
-        # Of half a circle nothing is known from where the sheet jumps.
+        # The forces of a half circle are not known from the time at which the sheet jumps.
         ratio, curvature = np.nanmax(slow.slip_ratio), np.nanmax(slow.max_curvature)
         way = f"{self.method}, {self.grasp}, {len(self)} poses in {self.times[-1]:.1f} s"
         if self.plunges_at is not None:
@@ -326,8 +330,9 @@ class FoldPlan(PlanFile):
             "frames": {
                 "world": "origin where the middle of the lifted edge lay in the flat sheet; x along the sheet to its "
                 "far edge, y across, z up; table at z = 0",
-                "pose": "of the sheet's outer edge; x of its frame points into the sheet along the part that the jaw "
-                "holds, z away from the side that lay on the table; the world's frame while the sheet is flat",
+                "pose": "pose of the sheet's outer edge. The x axis of its frame points into the sheet along the part "
+                "that the jaw holds. The z axis points away from the side that lay on the table. The frame is the "
+                "world's frame while the sheet is flat.",
             },
             "units": {"length": "m", "time": "s", "angle": "rad", "quaternion": "x, y, z, w", "curvature": "1/m"},
             "paper": dict(vars(self.paper)),

@@ -63,7 +63,7 @@ class _Tried:
         return self._held is None
 
     def missed(self, way: Part, aside: float = 0.0) -> tuple[float, float]:
-        """How far the crease is off, and the sheet slides beyond what is seen [m]; infinite where it snaps."""
+        """Return the error of the crease and the slide beyond the seen slide [m]; infinite if the sheet snaps."""
         if self._held is None:
             return np.inf, np.inf
         own = Part(way.times, np.vstack([self._from, shifted(way.poses[1:], aside)]))
@@ -103,14 +103,13 @@ def plunge(
         Of the way down, or those that are tried. The longer it takes the farther the sheet may slide meanwhile, the
         shorter, the more it is thrown.
     within : float [m]
-        How far off the crease may be on the worst of these sheets.
+        Duration of the way down, or the durations to try. The sheet slides farther in a longer plunge and is thrown
+        more in a shorter one.
+    within : float [m]
+        Largest error of the crease on the worst of these sheets.
     replans : int
-        How often the sheet will be looked at on the way (`fold`): these sheets are led so, and what counts is how far
-        they slide in the plunge.
-    sheet : mapping, optional
-        Options of `SimulatedSheet`; by default sheets at the bounds have 75 edges.
-    progress : bool
-        Whether to show a progress bar.
+        Number of times that `fold` will look at the sheet and replan on the way. The trials replan as often, and only
+        the slide during the plunge counts.
 
     Returns
     -------
@@ -120,8 +119,8 @@ def plunge(
     Raises
     ------
     ValueError
-        Not a plan, one that plunges already, or that is not over its target in the end; numbers that are not positive;
-        no way on which all of the simulated sheets are folded within bounds, with the friction that the slow way needs.
+        Not a plan, a plan that plunges already or does not end over its target, or numbers that are not positive. Also
+        if no way folds all simulated sheets within bounds at the friction that the slow way needs.
 
     Examples
     --------
@@ -180,9 +179,9 @@ def plunge(
 def _aimed(
     sheet: _Tried, down: Callable[[float], Part], short: float, aside: float
 ) -> tuple[float, tuple[float, float]]:
-    """How far to the side the edge goes down so that a crease is where it should be [m], and what it misses then.
+    """Return the sideways shift of the edge that puts the crease in its place [m], and the remaining errors.
 
-    By the secant method, from a first `aside`. The crease moves by about half of what the edge moves.
+    The secant method starts from `aside`. The crease moves by about half of the shift of the edge.
     """
     missed = sheet.missed(down(aside))
     if not abs(missed[0]) <= short:  # its sheet slides back from under the edge

@@ -179,7 +179,7 @@ def drag(
 
 
 def slides_to_rest(sheet: Elastica, friction: float, length: float, width: Width = EVEN) -> FloatArray:
-    """How far sheets slide while their jaws stand still, until friction holds them [Lgb]; infinite for those that snap.
+    """Slides of sheets, with jaws at rest, until friction holds them [Lgb]; infinite for sheets that snap.
 
     What lies, of sheets `length` long, slides as a rigid body by Coulomb's law. `sheet`: of shape (n,).
     """

@@ -158,7 +158,7 @@ class SimulatedSheet(TableSheet[Fold]):
         self._flat = self.simulation.hand("jaw").pose.rotation
 
     def _friction(self) -> float | Callable[[FloatArray], FloatArray]:
-        """Of the table: one number where it is the same everywhere, for that costs nothing."""
+        """Return the friction of the table: one number if it is uniform, since a function costs time."""
         drawn, of_paper = self._drawn, self.paper.friction
         if not drawn.patches[:, 0].any():
             return self.truth.friction
@@ -216,7 +216,7 @@ class SimulatedSheet(TableSheet[Fold]):
         return self._carried(JawMotion(motions, self._drawn), target, duration, progress)
 
     def hold(self) -> Held:
-        """What is now, between two motions: one that is asked for may `hold`, to `carry_on` from there otherwise."""
+        """Keep the state between two motions. A motion may call `hold`, and `carry_on` continues from that state."""
         return Held(self.simulation.snapshot(), copy(self._motion))
 
     def carry_on(self, held: Held, motions: Iterable[Motion], target: float) -> Fold:

@@ -55,7 +55,7 @@ def _strip(mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
 
 
 def _ink(picture: npt.NDArray[np.uint8], mask: npt.NDArray[np.bool_]) -> FloatArray:
-    """How much of each pixel the strip covers, up to a factor."""
+    """Share of each pixel that the strip covers, up to a factor."""
     from scipy.ndimage import binary_dilation
 
     near = binary_dilation(mask, iterations=2)

@@ -11,7 +11,7 @@ FloatArray = npt.NDArray[np.float64]
 
 
 def _lengths(poses: FloatArray, speed: float, turning: float) -> FloatArray:
-    """How long each piece takes at full speed, and full rate of turning [s]."""
+    """Duration of each piece at full speed and full rate of turning [s]."""
     steps = np.diff(poses, axis=0)
     return np.asarray(np.sqrt((steps[:, 0] ** 2 + steps[:, 1] ** 2) / speed**2 + (steps[:, 2] / turning) ** 2))
 

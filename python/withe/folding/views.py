@@ -1,4 +1,4 @@
-"""What cameras see of a simulated sheet: a strip of it that hangs, and the sheet on the table. Drawn by OpenCV."""
+"""Camera pictures of a simulated sheet: a hanging strip, and the sheet on the table. Drawn by OpenCV."""
 
 from __future__ import annotations
 

@@ -72,12 +72,12 @@ class WideFold:
 
 @keyword_hints
 class WideSheet(TableSheet[WideFold]):
-    """Two strips of a sheet on a table, joined at their far ends and held by one jaw: what slides unevenly turns.
+    """Two strips of a sheet on a table, joined at their far ends and held by one jaw. Uneven sliding turns the sheet.
 
-    As `SimulatedSheet`, in space. Each strip is a rod with half of the sheet's width, at the middle of its half, and
-    rubs on the table with a coefficient of its own. What joins their far ends weighs next to nothing. Stiff ribs across
-    the half of each strip that is turned over are as wide as it: layers lie on each other by these, where a line on a
-    line would slide off sideways, and bear nothing that presses on it.
+    This is the spatial counterpart of `SimulatedSheet`. Each strip is a rod with half of the width of the sheet, at the
+    middle of its half, and has its own coefficient of friction on the table. The link between the far ends has
+    negligible weight. Stiff ribs lie across the folded half of each strip and are as wide as the strip. The ribs
+    support layers that lie on each other: two lines would slide off sideways. They carry no other pressing load.
 
     Parameters
     ----------
