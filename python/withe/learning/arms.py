@@ -48,11 +48,12 @@ class Arm(Task):
     components : int
         Of curvature that are driven.
     time_step : float [s]
-        Of the simulation.
+        Timestep of the simulation.
     longest_meant : float [s]
-        Steps up to this bring the tip to within 1 cm RMS of a run with short steps, by `benchmarks/rl_throughput.py`;
-        that they do not resolve how the arm swings is meant, and no `CoarseStepWarning` is given. In `Follow`
-        velocities of nodes are off by 0.2 to 0.4 m/s RMS then, of 0.5 to 0.8: fast modes are not in phase.
+        Longest timestep without a `CoarseStepWarning`. A longer step does not resolve the vibration of the arm, which
+        is intended here: the tip stays within 1 cm RMS of a run with short steps (`benchmarks/rl_throughput.py`). In
+        `Follow` the velocities of nodes are then wrong by 0.2 to 0.4 m/s RMS, because fast modes lose their phase. The
+        velocities themselves are 0.5 to 0.8 m/s.
     """
 
     control_step = 0.1
@@ -364,7 +365,7 @@ def _rows(robots: Batch, chosen: IntArray) -> IntArray | slice:
 
 
 def _segment_distance(a0: FloatArray, a1: FloatArray, b0: FloatArray, b1: FloatArray) -> float:
-    """Of two segments [m]: where both lines are nearest if that is on both, else at an end of one."""
+    """Distance of two segments [m]: of the nearest points of their lines if both are inside, else of an end."""
     u, v, w = a1 - a0, b1 - b0, a0 - b0
     uu, uv, vv, uw, vw = u @ u, u @ v, v @ v, u @ w, v @ w
     determinant = uu * vv - uv * uv

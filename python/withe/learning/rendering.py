@@ -108,7 +108,7 @@ class Screen:
                 self._axes.plot(*ends.T, linewidth=width, solid_capstyle="round", **look)
 
     def _plane(self, outline: ObstacleOutline, place: npt.NDArray[np.float64]) -> None:
-        """What of a plane is in the box; nothing of one that does not cross it."""
+        """Draw the part of a plane that lies in the box, if any."""
         low, high = self._reach
         normal = outline.axis / np.linalg.norm(outline.axis)
         if abs(normal @ (0.5 * (low + high) - place)) < 0.5 * float(np.abs(normal) @ (high - low)):

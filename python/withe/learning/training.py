@@ -146,7 +146,7 @@ def _learn(policy: Any, total: int, callback: Callable[[Any], None] | None, norm
 
 @cache
 def _scaling() -> Any:
-    """Observations by their running mean and deviation, [Chan, Golub and LeVeque 1983]; made when torch is there."""
+    """Scale observations by their running mean and deviation [Chan, Golub and LeVeque 1983]. Imports torch."""
     torch = require("torch", "learn")
     base = require("stable_baselines3.common.torch_layers", "learn").BaseFeaturesExtractor
 
@@ -156,12 +156,12 @@ def _scaling() -> Any:
         def __init__(self, observation_space: Any) -> None:
             size = math.prod(observation_space.shape)
             super().__init__(observation_space, size)
-            # What is called running Stable-Baselines3 carries over to the critics that lag behind.
+            # Stable-Baselines3 copies buffers whose names begin with "running" to the target critics.
             for name, value in (("count", 0.0), ("mean", 0.0), ("variance", 1.0)):
                 self.register_buffer(f"running_{name}", torch.full((size,), value))
 
         def take_in(self, observations: Any) -> None:
-            """Those of some robots, shape (..., size) or that of the observations."""
+            """Add observations of some robots, of shape (..., size) or of the shape of the observation space."""
             mean, variance = self.running_mean, self.running_variance
             seen = torch.as_tensor(observations, dtype=mean.dtype).reshape(-1, len(mean))
             count = self.running_count + len(seen)

@@ -194,9 +194,9 @@ class Camera:
         Raises
         ------
         ValueError
-            A pixel that the lens shows no direction at, for its distortion turns back before it; a line of sight that
-            does not meet its plane in front of the camera; or a height other than 0 of a camera that is calibrated on
-            the plane only.
+            No direction leads to a pixel, because the distortion of the lens turns back before it. A line of sight does
+            not meet its plane in front of the camera. A height other than 0 for a camera that is calibrated on the
+            plane only.
         """
         seen = self._normalised(_checked(pixels, (None, 2), "pixels"))
         z = np.broadcast_to(np.asarray(height, dtype=float), (len(seen),))
@@ -230,10 +230,10 @@ class Camera:
         return ideal
 
     def _undistort(self, distorted: Array) -> Array:
-        """Where distortion gives these, as nearly as it does, shape (n, 2).
+        """Return the undistorted points that distortion maps to these, as nearly as possible, shape (n, 2).
 
-        Newton's method from the optical axis. Distortion is the gradient of a potential, convex where the lens does not
-        turn back, and steps that would leave that region or lead farther away are halved.
+        Newton's method starts at the optical axis. Distortion is the gradient of a potential, which is convex as far as
+        the lens does not turn back. Steps that would leave that region or increase the error are halved.
         """
         ideal = np.zeros_like(distorted)
         tolerance = _ROUNDING * np.maximum(1.0, _size(distorted))

@@ -1,4 +1,4 @@
-"""What spoils masks and pictures: ragged borders, specks and pinholes, things that lie on a cable."""
+"""Disturbances of masks and pictures: ragged borders, specks and pinholes, and objects that cover a cable."""
 
 from __future__ import annotations
 

@@ -101,9 +101,9 @@ def network_mask(model: Any, threshold: float = 0.5, size: tuple[int, int] | Non
     Parameters
     ----------
     model : str, Path, or torch.nn.Module
-        An ONNX file (run by OpenCV), a TorchScript file (.pt), or a module. It takes one image of shape
-        (1, 3, height, width), RGB from 0 to 1, and gives one value a pixel, shape (1, 1, height, width) or without
-        leading ones; of more than one channel the last counts.
+        An ONNX file (run by OpenCV), a TorchScript file (.pt), or a module. Its input is one image of shape
+        (1, 3, height, width), RGB from 0 to 1. Its output is one value per pixel, of shape (1, 1, height, width) or
+        without leading ones. Of several channels the last is used.
     threshold : float
         Pixels above it belong to cables.
     size : (int, int), optional

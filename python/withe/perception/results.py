@@ -202,9 +202,8 @@ class Tracing:
 def lifts(tracing: Tracing, camera: Camera, height: float, radius: float) -> list[Array]:
     """Return the lift of every row of every cable, by which upper strands clear lower ones [m].
 
-    At a crossing the upper strand lies 2.1 radii above the lower one, over the length in which their outlines
-    overlap, and comes down over as much again on both sides; strands that cross several others are lifted over the
-    highest.
+    At a crossing the upper strand lies 2.1 radii above the lower one, over the length in which their outlines overlap.
+    It comes down over the same length on both sides. A strand that crosses several others is lifted over the highest.
     """
     lines = [camera.to_plane(line, height)[:, :2] for line in tracing.centrelines]
     result = [np.zeros(len(line)) for line in lines]

@@ -16,11 +16,11 @@ _REACH = 0.55  # of a cell, on both sides of an edge: the cells inside must not 
 
 
 def refine_square(gray: NDArray[np.uint8], quad: Array, cells: int) -> Array:
-    """Corners of a black square on white, from lines through its four sides.
+    """Find the corners of a black square on white, from lines through its four sides.
 
-    Across a side the brightness goes from black b at -h to white w at h. The integral of (I - b) / (w - b) between them
-    is h less the place of the edge, if that is 0 or if h is beyond the blur; so edges are found again about where they
-    were found. The lines through these places meet at the corners.
+    Across a side the brightness I goes from black b at -h to white w at h. The integral of (I - b) / (w - b) between
+    these limits is h minus the position of the edge, if that position is 0 or if h is beyond the blur. The search is
+    therefore repeated around the edges that it found. The lines through the edges meet at the corners.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def _bilinear(gray: NDArray[np.uint8], points: Array) -> Array | None:
 
 
 def _meet(first: tuple[Array, Array] | None, second: tuple[Array, Array] | None) -> Array:
-    """Where two lines cross; NaN if they are nearly parallel."""
+    """Return the intersection of two lines; NaN if they are nearly parallel."""
     assert first is not None
     assert second is not None
     cross = first[1][0] * second[1][1] - first[1][1] * second[1][0]

@@ -160,7 +160,7 @@ def calibrate(
 def _problem(
     simulation: Simulation, tags: Tags, free: Sequence[str], unknowns: Sequence[Any] | None, side: int
 ) -> CameraProblem:
-    """Of a camera on one side of the plane."""
+    """Return the problem of a camera on one side of the plane."""
     copy = simulation.copy()
     own: list[Unknown] = (
         [NaturalCurvature(copy, rod) for rod in copy.rods] if unknowns is None else parse_unknowns(copy, unknowns)
@@ -210,7 +210,7 @@ class _Restricted:
 
 
 def _checked(simulation: Simulation, tags: Tags, free: Sequence[str]) -> list[str]:
-    """What is free, if all else can be."""
+    """Return the names of the free parameters of the camera, after checking all arguments."""
     if not isinstance(tags, Tags) or np.shape(tags.points)[2] != 2:
         raise ValueError("tags must be real2sim.Tags in pixels, shape (frames, tags, 2), without a camera")
     if len(tags.places) < 2:
@@ -278,7 +278,7 @@ def _calibration(problem: CameraProblem, found: dict[int, FloatArray], free: Boo
 
 
 def _not_told(problem: CameraProblem, solutions: dict[int, FrameSolution], free: BoolArray) -> tuple[Unobservable, ...]:
-    """What moves the tags by less than the misfit. The base may be tilted, even if that was not asked for."""
+    """Return combinations that move the tags by less than the misfit. The tilt of the base is always among them."""
     asked = free | np.array([name == Tilt.name for name in problem.names])
     shared = asked & ~problem.per_frame
     kept = {f: FrameSolution(s.coordinates, s.residual, s.jacobian[:, asked], 0, True) for f, s in solutions.items()}

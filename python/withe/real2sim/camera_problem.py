@@ -22,9 +22,9 @@ _VIEW = 4  # numbers of a view before the places of tags: roll, logarithm of sca
 
 
 class View:
-    """How a plane is seen at right angles, from the coordinates that follow those of the robot.
+    """Orthographic view of a plane, from the coordinates that follow the coordinates of the robot.
 
-    A point x is seen at offset + scale R(roll) axes x [px], R clockwise in the picture.
+    A point x appears at offset + scale R(roll) axes x [px], where R turns clockwise in the picture.
     """
 
     def __init__(self, coordinates: FloatArray, axes: FloatArray) -> None:
@@ -134,7 +134,7 @@ def _level_axes(simulation: Simulation, places: Places) -> FloatArray:
 
 
 def _means(seen: FloatArray) -> FloatArray:
-    """Where every tag was seen on the mean, NaN for one that never was."""
+    """Return the mean position of every tag, NaN for a tag that was never seen."""
     known = np.isfinite(seen)
     counts = known.sum(axis=0)
     sums = np.where(known, seen, 0.0).sum(axis=0)

@@ -269,7 +269,7 @@ def _refined(simulation: Simulation, target: Centrelines, rod: Rod | str, found:
         if count > len(voronoi) or per_function * count >= told:
             break
         unknowns = [(rod, "natural_curvature", _functions(voronoi, count))]
-        # What is drawn may lead to another minimum than what fewer functions have found.
+        # The fits from the drawn shape and from the coarser fit may end in different minima.
         coarser = simulation.copy()
         found.apply(coarser)
         fits = [
@@ -301,7 +301,7 @@ def _square(found: Fit, target: Centrelines) -> float:
 
 
 def _tells_more(finer: Fit, coarser: Fit, target: Centrelines) -> bool:
-    """Whether chance does not explain how much closer a fit with more functions comes, by the F test."""
+    """Return True if chance does not explain the gain of a fit with more functions, by the F test."""
     from scipy.special import fdtrc
 
     free, more = target.told(0) - len(finer.names), len(finer.names) - len(coarser.names)

@@ -96,9 +96,9 @@ def gather(
 
 
 class _Told(NamedTuple):
-    """What the targets tell in one fit: how many numbers, and the sum of the squares that it leaves of them.
+    """Number of observations in one fit, and the sum of squares of their residuals.
 
-    And the same of what lies across the plane of a planar scene, of which no fit leaves less.
+    The same two numbers exist for the components across the plane of a planar scene, which no fit can reduce.
     """
 
     numbers: int
@@ -114,7 +114,7 @@ class _Told(NamedTuple):
 
 
 def _told(targets: list[Target], fitted: int, residuals: FloatArray, normal: FloatArray | None) -> _Told:
-    """Of one row of residuals: a frame, or all of a motion. In a planar scene, without what lies across the plane."""
+    """Count one row of residuals: a frame, or a whole motion. Components across the plane are counted apart."""
     from scipy.linalg import block_diag
 
     seen_in = range(targets[0].frames) if len(residuals) != targets[0].frames else [fitted]  # a motion is one frame
@@ -210,7 +210,7 @@ def _off_plane(targets: list[Target], told: dict[int, _Told]) -> dict[int, str]:
 
 
 def _variance(stills: Coordinates, targets: list[Target], told: list[_Told]) -> float:
-    """Of a residual: 1 where sigma was given, else what all frames leave over the degrees of freedom."""
+    """Variance of a residual: 1 with sigma, else the sum of squares of all frames per degree of freedom."""
     if all(target.sigma is not None for target in targets):
         return 1.0
     numbers = sum(each.numbers for each in told)
@@ -231,7 +231,7 @@ def _inverse(spectrum: Spectrum) -> FloatArray:
 
 
 def _spectra(stills: Coordinates, solutions: dict[int, FrameSolution]) -> tuple[dict[int, Spectrum], Spectrum | None]:
-    """Of derivatives by every frame's own coordinates, and by those that frames share, if they do."""
+    """Spectra of the derivatives by every frame's own coordinates, and by the shared coordinates, if there are any."""
     local = stills.per_frame
     if not solutions:
         return {}, None

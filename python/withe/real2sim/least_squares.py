@@ -56,7 +56,7 @@ class Problem(Protocol):
 
 @dataclass(eq=False)
 class FrameSolution:
-    """What was found for a frame: derivatives are by coordinates over their scales."""
+    """Result of one frame. Derivatives are by coordinates divided by their scales."""
 
     coordinates: FloatArray
     residual: FloatArray
@@ -84,14 +84,14 @@ class Spectrum(NamedTuple):
 
 
 class Secants:
-    """Derivatives that are costly: secants update them from step to step [Broyden 1965, eq. 4.5].
+    """Secant updates of a Jacobian that is expensive to compute [Broyden 1965, eq. 4.5].
 
-    Coordinates count over their scales. No search ends with updated derivatives.
+    Coordinates are divided by their scales. A search never ends with an updated Jacobian.
 
     Attributes
     ----------
     updated : bool
-        Whether those at hand were.
+        True if the last Jacobian was updated, not computed.
     """
 
     def __init__(self) -> None:
@@ -102,7 +102,7 @@ class Secants:
     def jacobian(
         self, problem: Problem, coordinates: FloatArray, residual: FloatArray, state: FloatArray, frame: int
     ) -> FloatArray:
-        """At first, and after `renew`, that of the problem."""
+        """Return the Jacobian: of the problem at first and after `renew`, else updated by Broyden's formula."""
         self.updated = self._last is not None
         if self._last is None:
             found = problem.jacobian(coordinates, state, frame)
@@ -115,12 +115,15 @@ class Secants:
         return found
 
     def are_worth_renewing(self, gain: float, count: int) -> bool:
-        """Whether as many steps as derivatives by the coordinates cost would not bring the gain down to a hundredth."""
+        """Return True if a new Jacobian costs less than the steps that the updated Jacobian still needs.
+
+        At its present rate the updated Jacobian would need more steps to reduce the gain to a hundredth.
+        """
         rate, self._gain = gain / self._gain, gain
         return self.updated and rate ** (count + 1) > _WORTH
 
     def renew(self) -> bool:
-        """Ask the problem next, if those at hand were updated."""
+        """Discard an updated Jacobian, so that the problem computes the next one. Return True if there was one."""
         self._last = None if self.updated else self._last
         return self.updated
 
@@ -379,7 +382,7 @@ def _closed(
 
 
 def spectra(matrices: Sequence[FloatArray]) -> list[Spectrum]:
-    """Of matrices of one shape, all at once."""
+    """Spectra of matrices of one shape, all at once."""
     rows, count = matrices[0].shape
     _, values, vectors = np.linalg.svd(np.stack(matrices), full_matrices=rows < count)
     values = np.concatenate([values, np.zeros((len(values), count - values.shape[1]))], axis=1)

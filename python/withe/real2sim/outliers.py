@@ -25,24 +25,24 @@ _LEVERAGE = 0.1  # share of a jump that shows: below it, hardly anything else te
 def find_outliers(
     residuals: FloatArray, solutions: dict[int, FrameSolution], per_frame: BoolArray, least: float
 ) -> tuple[tuple[Outlier, ...], BoolArray]:
-    """Tags that jump, and where they were looked for.
+    """Find tags that jump, and the tags that could be checked.
 
-    In each frame a tag is compared with a line through what the fit leaves of it in the frames around in which it was
-    seen; these are aligned with each other, as other tags may be missing there. A tag that jumps pulls the fit with it,
-    and other tags away. With H the projector onto what the frame's unknowns can explain, leaving tag i out changes the
-    jumps r to r + H_i (1 - H_ii)^-1 r_i [Cook and Weisberg 1982], and r_i^T (1 - H_ii)^-1 r_i is what the sum of
-    squares loses. That, over the variance with which the line predicts, is a squared error of the tag, whatever its
-    leverage and wherever its frame. Of tags with too great an error, the one that explains most of the sum of squares
-    is left out first.
+    A tag is compared with a line through its residuals in the neighbouring frames. These residuals are first aligned
+    with each other, because other tags may be missing in each frame. A tag that jumps also pulls the fit, and thereby
+    displaces other tags. Let H be the projector onto the range of the frame's unknowns, and r the jumps. If tag i is
+    left out, the jumps become r + H_i (1 - H_ii)^-1 r_i [Cook and Weisberg 1982]. The sum of squares then decreases by
+    r_i^T (1 - H_ii)^-1 r_i. This decrease, over the variance of the line's prediction, is the squared error of the tag,
+    independent of its leverage and frame. Among the tags with too great an error, the tag with the greatest decrease is
+    left out first.
 
     Parameters
     ----------
     residuals : ndarray of shape (frames, tags, 2 or 3) [px or m]
     solutions : dict of int to FrameSolution
     per_frame : ndarray of bool
-        Which unknowns every frame has of its own.
+        True for unknowns that differ from frame to frame.
     least : float [px or m]
-        Error that is usual at least.
+        Lower bound of the usual error.
 
     Returns
     -------
@@ -75,15 +75,14 @@ def find_outliers(
 
 
 def _lines(values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """What the frames around tell of each value, by a line, as what a model does not explain drifts.
+    """Predict each value from the neighbouring frames by a line, because errors of the model drift.
 
-    By repeated medians, which a few outliers do not move [Siegel 1982]. NaN where too few frames tell.
-
+    The line is fitted by repeated medians, which a few outliers do not move [Siegel 1982]. NaN with too few frames.
     Returns
     -------
     expected : ndarray of shape (frames, tags, dimension)
     spread : ndarray of shape (frames, tags)
-        Variance of a value less what is expected, over that of a value: of a line by least squares.
+        Variance of (value - expected), over the variance of a value, as for a line by least squares.
     """
     expected, spread = np.full_like(values, np.nan), np.full(values.shape[:2], np.nan)
     for tag in range(values.shape[1]):
@@ -128,9 +127,9 @@ def _others(seen: npt.NDArray[np.int64], count: int) -> npt.NDArray[np.int64]:
 
 
 class _LeftOut(NamedTuple):
-    """Of each tag, were it left out of a fit: its error, what the sum of squares loses, how far the tag jumps.
+    """Error of each tag if it is left out of the fit, the decrease of the sum of squares, and the jump of the tag.
 
-    NaN, but for the last, where nothing tells.
+    Errors and decreases are NaN for tags that nothing can check.
     """
 
     errors: FloatArray
@@ -139,14 +138,14 @@ class _LeftOut(NamedTuple):
 
 
 class _Frame:
-    """How far the tags of a frame are from what is expected, shape (tags, dimension), and what the fit can explain."""
+    """Distances of a frame's tags from their prediction, shape (tags, dimension), and the range of the unknowns."""
 
     def __init__(self, jumps: FloatArray, jacobian: FloatArray, spread: FloatArray) -> None:
         self._jumps, self._jacobian, self._spread = np.nan_to_num(jumps), jacobian, spread
         self.compared: BoolArray = np.asarray(np.isfinite(jumps).all(axis=1))
 
     def left_out(self, kept: BoolArray) -> _LeftOut:
-        """What becomes of each tag that is kept."""
+        """Return the errors of each kept tag if this tag is left out."""
         tags, dimension = self._jumps.shape
         basis = Decomposed(self._jacobian * np.repeat(kept, dimension)[:, None]).range
         jump = np.where(kept[:, None], self._jumps, 0.0).ravel()

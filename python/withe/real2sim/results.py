@@ -32,8 +32,8 @@ class Outlier:
     frame, tag : int
         From 0.
     jump : float
-        Distance from what the frames around tell of its residual, were it left out of the fit, in the unit of the
-        target [px or m].
+        Distance between the residual of the tag and its prediction from the neighbouring frames, for a fit without the
+        tag, in the unit of the target [px or m].
     scatter : float
         Usual error: 1.48 times the median over all tags, at least sigma, or a millionth of the extent of all tags
         without one.
@@ -53,19 +53,21 @@ class Outlier:
 
 @dataclass(frozen=True, eq=False)
 class Unobservable:
-    """A combination of unknowns that the targets do not tell.
+    """A combination of unknowns that the targets do not determine.
 
     Attributes
     ----------
     weights : dict of str to float
-        Share of each unknown in it: of the logarithm of a parameter, of natural curvature times the rod's length.
+        Share of each unknown in the combination: of the logarithm of a parameter, or of natural curvature times the
+        length of the rod.
     effect : float
-        How far targets move (root of the mean square) with a change by a factor e, or by a turn of one radian,
-        while all other unknowns adapt; in units of sigma, or of the target without one.
+        Root mean square motion of the targets for a change by a factor e, or for a turn of one radian, while all other
+        unknowns adapt. In units of sigma, or of the target without sigma.
     misfit : float
-        What the fit leaves (root of the mean square), in the same unit: were it systematic, it would hide that change.
+        Root mean square residual of the fit, in the same unit as `effect`. A systematic misfit of this size would hide
+        the change.
     frames : tuple of int
-        Where, if it is not everywhere.
+        Frames with this combination; empty means all frames.
     """
 
     weights: dict[str, float]

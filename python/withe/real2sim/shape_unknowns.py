@@ -60,7 +60,7 @@ class _NaturalStrain(Unknown):
         return [(self._rod, self.word)]
 
     def chain(self, coordinates: FloatArray, found: list[list[Any]]) -> FloatArray:
-        """What each function stands for."""
+        """Derivatives by the coefficient of each function."""
         return np.asarray(np.reshape(found[0], (len(found[0]), -1)) @ self._rows.T)
 
 
@@ -261,7 +261,7 @@ def _turn_of(part: RodPart, support: SupportPart) -> FloatArray:
 
 
 def _further_turn(vector: FloatArray) -> FloatArray:
-    """How the rotation by a vector turns further as the vector changes: its left Jacobian [Chirikjian 2012, 10.87]."""
+    """Left Jacobian of the rotation by a vector [Chirikjian 2012, 10.87]."""
     angle = float(np.linalg.norm(vector))
     cross = np.cross(np.eye(3), vector)  # cross @ w = vector x w
     if angle < 1e-4:

@@ -129,7 +129,7 @@ class Coordinates:
         return np.asarray(by_positions - (by_positions @ normal)[..., None] * normal)
 
     def forget(self) -> None:
-        """What was set may not be there any more."""
+        """Forget the value that was set last: it may have been changed elsewhere."""
         self._written[:] = np.nan
 
 
