@@ -60,14 +60,14 @@ class GuardedBatch {
     objects_[at(lane)] = with;
   }
 
-  /// What has not been heard yet of any lane.
+  /// Warnings of all lanes that were not yet reported.
   Warnings take_warnings() {
     Warnings out;
     for (GuardedWorld* world : worlds_) out.add(world->changing().take_warnings());
     return out;
   }
 
-  /// Released since it was last asked: lane, support, when [s].
+  /// Supports released since the last call: lane, support, time [s].
   std::vector<std::tuple<int, int, double>> take_left_rings() {
     std::vector<std::tuple<int, int, double>> out;
     for (int lane = 0; lane < size(); ++lane)

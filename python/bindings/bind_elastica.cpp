@@ -112,8 +112,8 @@ py::tuple dragged_sheet(const Numbers& poses, const Numbers& forces, double fric
   return py::make_tuple(rows, slides);
 }
 
-/// How far each of many sheets must have slid, held at its pose with forces of its own, for friction to hold it; NaN
-/// where no equilibrium is within reach.
+/// Slide of each of many sheets at which friction holds it, for a fixed pose and given forces. NaN where no equilibrium
+/// is within reach.
 Numbers slides_to_rest(const Numbers& forces, double friction, double sheet_length, const SheetWidth& width) {
   require(forces.ndim() == 2 && forces.shape(1) == 3, "forces must have shape (sheets, 3)");
   Numbers slides(forces.shape(0));

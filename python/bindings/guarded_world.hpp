@@ -1,6 +1,6 @@
 #pragma once
-/// A World as Python may hold it: the GIL is released while it steps, Ctrl-C is noticed, and a call that
-/// would disturb a running step, from another thread or from a callback, is refused instead of crashing.
+/// A World that Python can hold. It releases the GIL while it steps, and notices Ctrl-C. It refuses a call that would
+/// disturb a running step, from another thread or from a callback.
 
 #include <chrono>
 #include <optional>
@@ -12,7 +12,7 @@
 
 namespace withe::bindings {
 
-/// Every member is called with the GIL held, which is what makes the plain flags safe.
+/// Every member function is called with the GIL held, so plain flags are safe.
 class GuardedWorld {
  public:
   GuardedWorld(const SceneDescription& description, const Options& options) : world_(description, options) {}
@@ -23,7 +23,7 @@ class GuardedWorld {
     refuse(stepping_ && !in_own_callback());
     return world_;
   }
-  /// For what a callback is there to set: loads and prescribed motion.
+  /// For the calls that a callback may make: setting loads and prescribed motion.
   World& steering() {
     refuse(stepping_ && !in_own_callback());
     return world_;

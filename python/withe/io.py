@@ -409,17 +409,17 @@ def pose_path(times: npt.NDArray[np.float64], poses: npt.NDArray[np.float64]) ->
 def write_vtk(record: Frames, folder: str | os.PathLike[str]) -> Path:
     """Write a record as a time series for ParaView: one .vtp file a frame, and a .pvd that lists them.
 
-    Every rod is one polyline. Its points carry radius [m], tension [N] (mean of the two edges at a
-    node), curvature (towards d1 and d2) [1/m], twist [rad/m], the first director and the velocity
-    [m/s]; at the ends of an open rod, curvature and twist are those of the nearest inner node. The
-    polyline carries the number of its rod, and the file the names.
+    Every rod is one polyline. Its points carry radius [m], tension [N] (mean of the two edges at a node), curvature
+    (towards d1 and d2) [1/m], twist [rad/m], the first director and the velocity [m/s]. The ends of an open rod have
+    the curvature and twist of the nearest inner node. The polyline carries the index of its rod, and the file carries
+    the names of the rods.
 
     Parameters
     ----------
     record : Record
-        Or whatever answers to its read-outs.
+        Record, or another object with the same read-outs.
     folder : path
-        Created if missing; files of the same names are written over. The .pvd file is written last: it is
+        Created if missing; files with the same names are overwritten. The .pvd file is written last: it exists
         there only when every frame is.
 
     Returns

@@ -1,4 +1,4 @@
-"""Centrelines of knots, and what tells one from another: crossings, Alexander polynomial, signature, writhe."""
+"""Centrelines of knots, and invariants that distinguish knots: crossings, Alexander polynomial, signature, writhe."""
 
 from __future__ import annotations
 
@@ -25,17 +25,19 @@ __all__ = [
 FloatArray = npt.NDArray[np.float64]
 Tails = Literal["up", "sideways"]
 
-# Of the helices that two strands wind about each other, over the radius of the rod: they do not touch yet.
+# Radius of the helices of two braided strands, over the radius of the rod. The strands do not touch.
 _BRAID_RADIUS = 2.5
 # Rise of a strand along the braid while it turns by pi, over the circumference of half a turn.
 _BRAID_SLOPE = 1.5
-# Longest edge over the radius of the rod. By h^2 / (8 rho) such a chord leaves a helix of that braid, rho = 3.25 braid
-# radii, by 1.25 radii; strands that are 4.8 radii apart, the corners of the braid rounded off, then do not touch.
+# Longest edge over the radius of the rod. Its chord leaves the helix of the braid, whose radius of curvature rho is
+# 3.25
+# braid radii, by h^2 / (8 rho) = 1.25 radii. Strands are 4.8 radii apart after the corners are rounded, so they do not
+# touch.
 _LONGEST_EDGE = 9.0
-_NODES = 301  # or more, where nobody asks for a number
-# Length of a rod over what its knot takes of it, where nobody asks for a length.
+_NODES = 301  # least number by default
+# Default length of a rod over the length of its knot.
 _TAIL_ROOM = 1.25
-# Distance of points, over the largest coordinate, that is taken for rounding: they are the same.
+# Distance of points, over the largest coordinate, below which they count as equal.
 _ROUNDING = 1e-12
 
 

@@ -18,8 +18,8 @@ T = TypeVar("T", bound=Callable[..., Any])
 
 _OWN = ("self", "cls")
 
-# What other packages (PyElastica, DisMech, MuJoCo), textbooks and habit call what our words name; those count that the
-# function called has.
+# Our names for the words of other packages (PyElastica, DisMech, MuJoCo), textbooks and habit. A hint names only words
+# that the called function has.
 _ELSEWHERE: dict[str, tuple[str, ...]] = {
     "dt": ("time_step",),
     "h": ("time_step", "height"),
@@ -150,7 +150,7 @@ def _hinted(function: Callable[..., Any], name: str) -> Any:
         try:
             return function(*arguments, **keywords)
         except TypeError as error:
-            # What has no frame below this one comes from Python, which found no place for an argument.
+            # Python itself raises the error of a wrong argument, with no frame below this one.
             if error.__traceback__ is None or error.__traceback__.tb_next is not None:
                 raise
             message = _explained(function, name, len(arguments), keywords)

@@ -1,6 +1,6 @@
 """Contact and friction: the methods of `Scene` for obstacles and pairs of bodies.
 
-Its numbered equations are those of Andrew Choi's doctoral dissertation, University of California, Los Angeles, whose
+The equation numbers are those of Andrew Choi's doctoral dissertation, University of California, Los Angeles. Its
 chapters on contact follow Tong, Choi, Joo, Jawed: A fully implicit method for robust frictional contact handling in
 elastic rods, Extreme Mechanics Letters 58, 2023.
 """

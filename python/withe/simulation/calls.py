@@ -353,7 +353,7 @@ class Ledger:
 
 
 def _share(session: Session, key: _Key, reached: _core.Reached) -> float:
-    """Of its way that a pose has behind it."""
+    """Share of its motion that a pose has completed."""
     obstacle = find_obstacle(session.directory, key[0])
     if obstacle is not None:
         return float(reached.obstacles[obstacle[0]]) if len(reached.obstacles) else 1.0

@@ -66,11 +66,11 @@ class Moment:
 
 
 Share = Callable[[str, str], float]
-"""How much of what was drawn is in the value that a word of a part has: 1, or less once it is set."""
+"""Share of the drawn shape in the present value of a word of a part: 1, or less after the value was set."""
 
 
 def points_reader(session: Session, part: RodPart) -> Callable[[_core.EquilibriumGradient], FloatArray]:
-    """Reads derivatives of equilibria by drawn nodes, (nodes, 3) [1/m], of a rod."""
+    """Return a function that reads derivatives of equilibria by drawn nodes of a rod, (nodes, 3) [1/m]."""
     nodes = DrawnNodes(session, part, Moment.now(session))
 
     def read(g: _core.EquilibriumGradient) -> FloatArray:
@@ -81,14 +81,14 @@ def points_reader(session: Session, part: RodPart) -> Callable[[_core.Equilibriu
 
 
 class DrawnNodes:
-    """Derivatives by drawn nodes, from those by rest lengths, natural shape, and how edges are turned.
+    """Derivatives by drawn nodes, from those by rest lengths, natural shape and directions of edges.
 
-    How these follow from the nodes is geometry alone, whose differences are taken. Rods that are joined to the rod have
-    nodes of it, and are drawn anew with these.
+    The drawn nodes determine these quantities by geometry alone, so finite differences give the chain rule. Rods that
+    are joined to the rod share nodes with it, and are drawn again together with it.
     """
 
     def __init__(self, session: Session, part: RodPart, begin: Moment, *, run: bool = False) -> None:
-        """`begin`: how the equilibrium is, or the run began, whose scalar it is."""
+        """`begin` is the state of the equilibrium, or the state at the start of the run."""
         rows = session.directory.layout.rows
         self._session, self._part, self._rows = session, part, rows(part.index)
         self._shapes = []
@@ -107,14 +107,14 @@ class DrawnNodes:
         self._by_springs = np.zeros(len(self._springs))
 
     def add(self, found: _core.ParameterGradient, share: Share = lambda name, word: 1.0) -> None:
-        """Take in derivatives by what acted."""
+        """Add derivatives by the natural shape, rest lengths and springs."""
         for shape in self._shapes:
             shape.add(found, share)
         for i, spring in enumerate(self._springs):
             self._by_springs[i] += share(spring.name, "rest_length") * found.spring_rest_length[spring.index]
 
     def gradient(self, g: _core.EquilibriumGradient | _core.InitialGradient) -> FloatArray:
-        """Those that were taken in, and forgets them. `g`: by what is where it was drawn."""
+        """Return the sum of the derivatives and reset it. `g` holds derivatives by quantities that stay as drawn."""
         by_nodes = np.asarray(g.drawn_nodes).copy()
         for spring, by in zip(self._springs, self._by_springs, strict=True):
             by_nodes[spring.rows[1]] += by * spring.direction
@@ -132,10 +132,10 @@ class DrawnNodes:
 
 
 class _Shape:
-    """A rod that is drawn anew with nodes of another one, or its own, and derivatives by what follows from that."""
+    """A rod that is drawn again with nodes of another rod or its own, and derivatives by its drawn shape."""
 
     def __init__(self, part: RodPart, edges: slice, shared: list[npt.NDArray[np.intp]], begin: Moment) -> None:
-        """`edges`: of the scene; `shared`: for each node of the other rod those that go with it."""
+        """`edges` of the scene; `shared` lists for each node of the other rod the nodes that move with it."""
         self.part, self.edges, self._shared = part, edges, shared
         self._follows = (
             np.array_equal(begin.natural_curvature[part.index], part.natural_curvature),
@@ -144,7 +144,7 @@ class _Shape:
         self.clear()
 
     def clear(self) -> None:
-        """Nothing is taken in."""
+        """Reset all sums."""
         part = self.part
         self._by_length, self.by_turn = np.zeros(len(part.lengths)), np.zeros_like(part.tangents)
         self._by_curvature, self._by_twist = np.zeros_like(part.natural_curvature), np.zeros_like(part.natural_twist)
@@ -162,7 +162,7 @@ class _Shape:
             self._by_twist += share(name, "natural_twist") * np.asarray(found.natural_twist[rod])
 
     def add_slopes(self, out: FloatArray) -> None:
-        """What was taken in, by nodes of the other rod, (nodes, 3)."""
+        """Add the derivatives by the nodes of the other rod to `out`, (nodes, 3)."""
         step = _STEP * float(self.part.lengths.min())
         for node, nodes in enumerate(self._shared):
             for axis in range(3) if len(nodes) else ():

@@ -48,8 +48,8 @@ Loss = npt.ArrayLike | Mapping[str, Any]
 def _poses_unknown(session: Session) -> bool:
     """Return True if derivatives of reaction moments by poses are not available.
 
-    Reactions hold the inertia of what supports turn by other rates than the equations of midpoint steps do, and of held
-    edges in space; and moments of the parts of a fourth-order step are about where a hand is in each.
+    Reactions contain the inertia of rotating supports and of held edges in space, at other rates than the equations of
+    a midpoint step. The stages of a fourth-order step take moments about the position of the hand in each stage.
     """
     if session.options.integrator in ("implicit_midpoint", "fourth_order"):
         return True
@@ -143,14 +143,14 @@ def _rows_of(session: Session, rod: Any) -> npt.NDArray[np.int64]:
 
 
 def _forward_jacobian(session: Session, rows: npt.NDArray[np.int64], wrt: Sequence[Unknown]) -> list[FloatArray] | None:
-    """Derivatives of positions of nodes, one (nodes, 3, ...) for each of `wrt`, by one solve for each number of them.
+    """Derivatives of positions of nodes, one (nodes, 3, ...) for each of `wrt`, by one linear solve per unknown number.
 
-    None where the adjoint method takes fewer solves, or has to look closer: where the residual is not linear in a
-    number (its change is then no derivative), where rods touch, and where motions cost nothing.
+    Return None if the adjoint method takes fewer solves or is more general. It is more general where the residual is
+    not linear in an unknown (so that a difference is no derivative), where rods touch, and for free motions.
     """
     if session.options.planar is not True and session.world.plane_normal is not None:
-        return None  # what the adjoint method is asked for may lead out of the plane
-    unknown_readers(session, wrt)  # refuses what cannot be
+        return None  # derivatives out of the plane need the adjoint method
+    unknown_readers(session, wrt)  # raises for unknowns without a gradient
     if session.world.equilibrium_gradients([])[1]:
         return None
     changes: list[FloatArray] = []

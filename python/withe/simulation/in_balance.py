@@ -69,7 +69,7 @@ def _strains_of(session: Session, part: RodPart) -> list[_Strains]:
 
 
 def _columns(session: Session, strains: list[_Strains]) -> FloatArray:
-    """How the residual changes with what stores a unit of energy, a column for each strain."""
+    """Derivatives of the residual by each strain, scaled so that one unit stores a unit of energy; one per column."""
     start, columns = np.array(session.world.equilibrium_residual()), []
     for kind in strains:
         for i in np.ndindex(*kind.value.shape):
@@ -82,12 +82,12 @@ def _columns(session: Session, strains: list[_Strains]) -> FloatArray:
 
 
 def _put_in_balance(session: Session, strains: list[_Strains]) -> None:
-    """Finds the natural strains, and gives them to the session.
+    """Find the natural strains, and set them in the session.
 
-    Forces at a configuration are linear in natural strains y, but for how curvature is measured: r + A y, with y such
-    that y^2 / 2 is elastic energy. Those found leave nodes where they are, u = K^-1 (r + A y) = 0, and store the least
-    energy that does: y = -B^T m, B B^T m = K^-1 r, B = K^-1 A. Beside clamps, which bend by what the stencil next to
-    them is free of stress at, u is least squares, and of second order in the length of an edge.
+    At a given configuration the forces are r + A y, nearly linear in the natural strains y, which are scaled so that
+    y^2 / 2 is elastic energy. The solution leaves every node in its place, u = K^-1 (r + A y) = 0, with the least
+    energy: y = -B^T m, B B^T m = K^-1 r, B = K^-1 A. Beside clamps the solution is one of least squares, with u of
+    second order in the length of an edge, because there the natural strain of the next stencil bends the clamp.
     """
     from scipy.linalg import cho_factor, cho_solve
 
@@ -111,14 +111,14 @@ def _put_in_balance(session: Session, strains: list[_Strains]) -> None:
 
 
 def find_balance(directory: Directory, gravity: FloatArray, options: BuildOptions) -> list[tuple[int, FloatArray]]:
-    """Puts natural shapes into `directory` for rods that are to be in balance as drawn.
+    """Set natural shapes in `directory` for rods that are to be in balance as drawn.
 
-    Returns the index of each, and its natural over its drawn lengths, of shape (edges, 1) [-].
+    Return the index of each such rod, and its ratios of natural to drawn lengths, of shape (edges, 1) [-].
 
     Raises
     ------
     ValueError
-        Where no natural shape holds a rod as drawn, or none is known: where rods touch, with custom forces.
+        No natural shape holds a rod as drawn, or none can be found: for rods that touch, and with custom forces.
     """
     parts = [part for part in directory.all(RodPart) if part.in_balance]
     if not parts:

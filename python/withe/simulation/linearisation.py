@@ -238,11 +238,13 @@ class Linearisation:
         )
 
     def _neutral(self, shapes: npt.NDArray[Any], shift: float) -> FloatArray:
-        """Squares that are no greater than this may be of neutral motions.
+        """Bound of the squared frequencies of neutral motions.
 
-        By what rounding leaves of the parts of the stiffness; and by what is left out of balance, F: along q(a) on
-        which the energy is the same, K q' . q' = -F . q'', and nodes that turn by a have |q''| of |q'|. Twice that, as
-        a bar that is pulled by rounding reaches it.
+        The bound is twice the sum of two errors, because rounding reaches it for a bar under tension:
+
+        - the rounding error of the parts of the stiffness
+        - the error of forces F out of balance: along a motion q(a) of constant energy, K q' . q' = -F . q'', and nodes
+          that turn by an angle a have |q''| = |q'|
         """
         sizes = np.abs(shapes)
         strains = np.abs(self._gradients @ shapes) * (abs(self._gradients) @ sizes)
@@ -251,14 +253,14 @@ class Linearisation:
         forces = np.linalg.norm((self._displacement @ self._imbalance).reshape(-1, 3), axis=1)
         ways = np.linalg.norm((self._displacement @ shapes).reshape(len(forces), 3, -1), axis=1)
         kinetic = np.abs((shapes.conj() * (self._mass @ shapes)).sum(axis=0))
-        # Where much is out of balance, as on the way somewhere, nothing is neutral.
+        # Far from equilibrium, as during motion, no motion counts as neutral.
         return np.asarray(twice / kinetic + np.minimum(2.0 * (forces @ ways) * turns / kinetic, _TOLERATED * shift))
 
     @cached_property
     def _shift(self) -> float:
-        """A square of a frequency s near that of the slowest motion that is not neutral, and above any that diverges.
+        """Squared frequency near that of the slowest motion that is not neutral, and above any diverging motion.
 
-        Within some powers of ten is near enough: what is neutral then is great in the inverse, and what is not has its
+        Some powers of ten are near enough. Neutral motions are then large in the inverse, and the others keep their
         digits.
         """
         nodes = max(2, self._displacement.shape[0] // 3)

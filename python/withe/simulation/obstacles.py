@@ -68,7 +68,7 @@ def move_obstacle(
         about = validation.unit_vector(tangent, f"tangent of {name!r}") if axis is None else axis
         turn = validation.number(roll, f"roll of {name!r}") * about
     session.world.move_obstacle(index, place, turn, over)
-    # What is not given goes on as it does.
+    # A motion that is not given continues.
     if place is not None:
         session.settings.paths.pop((name, "position"), None)
     if turn is not None:

@@ -18,7 +18,7 @@ OF_DRAGS = "drag of drags"  # makes a rod's drag where add_drag's handles do
 
 
 def made_by(session: Session, part: Part | BodyPair | None, word: str) -> dict[Array, set[str]]:
-    """Which arrays of rods a word of a rod or a drag makes anew, and of which words each is made then."""
+    """Arrays of rods that a word of a rod or a drag recomputes, each with the words that determine it."""
     if isinstance(part, RodPart) and word in ROD_WORDS:
         return {(part.name, array): words for array, words in MADE_OF.get(word, {word: {word}}).items()}
     if isinstance(part, DragPart):
@@ -27,15 +27,15 @@ def made_by(session: Session, part: Part | BodyPair | None, word: str) -> dict[A
 
 
 def arrays_of(session: Session, unknown: Unknown) -> dict[Array, set[str]]:
-    """The same of one of `wrt`."""
+    """Return `made_by` of one of `wrt`."""
     return {} if isinstance(unknown, str) else made_by(session, part_of(session, unknown[0]), unknown[1])
 
 
 def setting_rank(session: Session, unknown: Unknown) -> tuple[int, int]:
-    """What is set together is set from the least rank to the greatest, so that nothing undoes what was set before it.
+    """Rank of an unknown. Unknowns are set in the order of rank, so that none overwrites one that was set before it.
 
-    A drag comes before the rods whose drag it makes; words of rods as one call of `set` sets them; positions before
-    velocities.
+    A drag comes before the rods whose drag it determines. The words of a rod have the order in which one call of `set`
+    sets them. Positions come before velocities.
     """
     if isinstance(unknown, str):
         return 0, INITIAL_WORDS.index(unknown) if unknown in INITIAL_WORDS else 0
@@ -45,12 +45,12 @@ def setting_rank(session: Session, unknown: Unknown) -> tuple[int, int]:
 
 
 def order_of_setting(session: Session, unknowns: Sequence[Unknown]) -> list[int]:
-    """Their places from the least rank to the greatest.
+    """Return the places of the unknowns in the order of rank.
 
     Raises
     ------
     ValueError
-        Two of them name the same word of the same part.
+        Two unknowns name the same word of the same part.
     """
     seen = set()
     for target, word in (unknown for unknown in unknowns if not isinstance(unknown, str)):
@@ -62,7 +62,8 @@ def order_of_setting(session: Session, unknowns: Sequence[Unknown]) -> list[int]
 
 
 def remaining(session: Session, unknowns: Sequence[Unknown]) -> list[Any]:
-    """What to ask for derivatives by unknowns that are all set: `Remaining` for those that another undoes in part."""
+    """Return unknowns for the derivatives after all are set: `Remaining` for unknowns that another partly
+    overwrites."""
     own = [arrays_of(session, unknown) for unknown in unknowns]
     made: dict[Array, set[str]] = {}
     for place in order_of_setting(session, unknowns):
@@ -75,5 +76,5 @@ def remaining(session: Session, unknowns: Sequence[Unknown]) -> list[Any]:
 
 
 def _word(session: Session, unknown: Unknown) -> str:
-    """As `made_by` calls it."""
+    """Return the name of the word in `made_by`."""
     return OF_DRAGS if isinstance(part_of(session, unknown[0]), DragPart) else unknown[1]

@@ -124,7 +124,7 @@ def move_support(
             counted = rolled * turn.drawn[0]
         turn = turn.arrived(session.world.time)
     session.world.move_support(index, target, matrix, over, counted)
-    # What is not given goes on as it does.
+    # A motion that is not given continues.
     if target is not None:
         session.settings.paths.pop((part.name, "position"), None)
     if matrix is not None:
@@ -153,7 +153,7 @@ def _turn(
         drawn = rod.tangents[edge], rod.directors[edge]
     now = session.world.time
     start_tangent, start_roll = _tangent_and_roll(np.array(session.world.support_rotation(index)), drawn)
-    # Where it goes without this.
+    # The motion before this call.
     before = session.settings.paths.get((part.name, "rotation"))
     if isinstance(before, Turn):
         start_roll = _beside(before.roll_at(now), start_roll)

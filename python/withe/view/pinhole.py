@@ -18,8 +18,8 @@ _NEAREST = 1e-4  # what is closer to the camera is cut off, over the distance of
 class Pinhole(Protocol):
     """Camera of a picture, such as `withe.perception.Camera`.
 
-    A point X of the world is seen at R X + t = (x, y, z) from the camera, z forwards, and at the pixel whose
-    coordinates are the first two rows of the matrix times (x / z, y / z, 1): (0, 0) is the middle of the first pixel.
+    A point X of the world has the coordinates R X + t = (x, y, z) in the camera, with z forwards. Its pixel is the
+    first two rows of the matrix times (x / z, y / z, 1), where (0, 0) is the centre of the first pixel.
     """
 
     matrix: FloatArray
@@ -29,7 +29,7 @@ class Pinhole(Protocol):
 
 
 def check_pinhole(camera: Pinhole) -> None:
-    """Raises ValueError for a camera that is none without a lens, or whose pose is not known."""
+    """Raise ValueError for a camera that is no pinhole camera, or whose pose is unknown."""
     if np.any(camera.distortion):
         raise ValueError(
             f"distortion of the camera must be zero, for pictures have no lens, got {np.ravel(camera.distortion)}"
