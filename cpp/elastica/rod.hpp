@@ -1,20 +1,23 @@
 #pragma once
 /// The suspended part of a rod in space: a heavy elastic rod that leaves a flat floor and is held by a gripper.
 ///
-/// In units of the gravito-bending length Lgb = (EI / 2w)^(1/3) and of the weight per length w, so that EI = 2. The
-/// lift-off point is the origin, the rod leaves it along x, z is up; s is the length of the unstretched rod from there,
-/// t the tangent, m the moment, n the force of what lies beyond s on what lies before, F that of the floor on the rod:
+/// Units are the gravito-bending length Lgb = (EI / 2w)^(1/3) and the weight per length w, so that EI = 2. The lift-off
+/// point is the origin, the rod leaves it along x, and z is up. The variables are the arc length s of the unstretched
+/// rod from the origin, the tangent t and the moment m. F is the force of the floor on the rod, and n the force that
+/// the part beyond s applies to the part before s:
 ///   t' = m x t / 2,  m' = -(1 + e) t x n,  n = -F + s z,  e = n.t / EA,  r' = (1 + e) t,
-///   t(0) = x,  m(0) = -2 kappa z,  r(0) = 0:
-/// curvature kappa in the floor's plane (kappa > 0 bends towards -y), none across it, for a floor gives no moment about
-/// y; and no twist anywhere, for m.t is constant along a rod whose section bends alike in all directions.
+///   t(0) = x,  m(0) = -2 kappa z,  r(0) = 0.
+/// The curvature kappa lies in the plane of the floor, and kappa > 0 bends towards -y. The curvature across this plane
+/// is zero, because a floor applies no moment about y. The twist is zero everywhere: m.t is constant along a rod whose
+/// section has equal bending stiffness in all directions.
 ///
-/// A rod of some thickness rests on its surface, and F acts a lever r below its centreline: then
+/// A thick rod rests on its surface, and F acts at a lever r below its centreline. Then
 ///   m(0) = r (F_x y - F_y x) + (b F_y - 2 kappa) z,
-/// and m.t = -r F_y twists it all along. Where it lies it may roll, and moves aside by y = -r phi, phi its turn about
-/// itself. Friction f across bends it, EI y'''' = f, and turns it, GJ phi'' = -r f; so y'''' = y'' / b^2 with
-/// b = r sqrt(EI / GJ), and F_y is spread behind lift-off as exp(-s / b): its resultant acts b behind.
-/// [Kirchhoff's rod with stretch; dissertation (9.1), with what (9.3) leaves of it.]
+/// and m.t = -r F_y twists the whole suspended part. The lying part may roll, and moves sideways by y = -r phi, where
+/// phi is its rotation about its axis. Transverse friction f bends it, EI y'''' = f, and rotates it, GJ phi'' = -r f.
+/// Hence y'''' = y'' / b^2 with b = r sqrt(EI / GJ). F_y is distributed behind lift-off as exp(-s / b), so its
+/// resultant acts at a distance b behind.
+/// [Kirchhoff's rod with stretch; dissertation (9.1) and the parts of (9.3) that apply here.]
 
 #include <array>
 #include <vector>

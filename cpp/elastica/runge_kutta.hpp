@@ -1,6 +1,6 @@
 #pragma once
-/// One explicit Runge-Kutta step of order 8 with 12 stages [Dormand and Prince; Hairer, Norsett, Wanner 1993, II.5], on
-/// numbers that may carry derivatives: the derivatives found are those of the discrete map, exact to rounding.
+/// One explicit Runge-Kutta step of order 8 with 12 stages [Dormand and Prince; Hairer, Norsett, Wanner 1993, II.5].
+/// Numbers may carry derivatives. These are the derivatives of the discrete map, exact to rounding.
 
 #include <array>
 

@@ -1,13 +1,14 @@
 #pragma once
 /// The suspended part of a sheet, seen from the side: a heavy elastica that leaves a flat floor and is held at its tip.
 ///
-/// In units of the gravito-bending length Lgb = (EI / 2w)^(1/3) and of the weight per length w where b = 1, s from the
-/// lift-off point, theta the angle of the tangent above the floor, m the moment, b the width (`SheetWidth`):
+/// Units are the gravito-bending length Lgb = (EI / 2w)^(1/3) and the weight per length w at b = 1. The variables are
+/// the arc length s from the lift-off point, the angle theta of the tangent above the floor, the moment m, and the
+/// width b (`SheetWidth`):
 ///   theta' = m / (2 b),  m' = (R - W) cos(theta) - T sin(theta),  X' = cos(theta),  Z' = sin(theta),
 ///   W(s) = the weight of the part before s,  theta(0) = m(0) = X(0) = Z(0) = 0.
-/// R and T are the floor's forces on the sheet at lift-off, up and forward (the way the sheet leaves). That the moment
-/// vanishes there is what a flat floor that only pushes asks for; the tip carries a given moment.
-/// [Dissertation (7.6) with the condition that it lacks.]
+/// R and T are the forces of the floor on the sheet at lift-off, up and forward (the direction in which the sheet
+/// leaves). The moment vanishes there because a flat floor can only push. The tip carries a given moment.
+/// [Dissertation (7.6) with the missing condition m(0) = 0.]
 
 #include <array>
 #include <vector>

@@ -1,8 +1,7 @@
 #pragma once
-/// All poses in which a sheet of one width can be held without moment: the manifold of solutions with theta >= 0,
-/// tabulated once so that every other solution begins next to its answer, by cubic interpolation. For one position of
-/// the tip there are several equilibria; those of this manifold are one family, reached from the flat sheet without a
-/// jump.
+/// All poses in which a gripper holds a sheet of one width without moment: the manifold of solutions with theta >= 0.
+/// A table with cubic interpolation gives every solve a start near its solution. One position of the tip has several
+/// equilibria. This manifold is the family that is reached from the flat sheet without a jump.
 
 #include <array>
 #include <optional>

@@ -1,9 +1,9 @@
 #pragma once
-/// A sheet whose tip is held at a pose: what comes of any three numbers, and how it slides while the pose changes.
+/// A sheet whose tip is held at a pose: its equilibrium for given forces, and its slide while the pose changes.
 ///
-/// With a free moment at the tip an equilibrium is named by the floor's forces R, T at lift-off and the suspended
-/// length, and is an initial value problem; a pose (x, z, theta) of the tip is met by continuation from one that is
-/// known.
+/// If the moment at the tip is free, three numbers name an equilibrium: the forces R, T of the floor at lift-off and
+/// the suspended length. They pose an initial value problem. Continuation from a known equilibrium reaches a pose
+/// (x, z, theta) of the tip.
 
 #include <array>
 #include <vector>
@@ -27,8 +27,8 @@ struct SheetMotionData {
 /// Makes data.path the equilibrium of given forces, by integration from the lift-off point.
 void set_sheet_forces(const SheetShape& shape, const SheetForces& forces, SheetMotionData& data);
 
-/// Moves the tip from where data.path has it to a pose; false where the way ends before, which is a snap or a limit of
-/// what was asked for: steps of less than a share of it are not tried.
+/// Moves the tip from its place in data.path to a pose. Returns false if the motion ends before: at a snap, or at the
+/// smallest increment, `least_share` of the motion.
 bool move_sheet(const SheetPose& pose, SheetMotionData& data, double least_share = 1.0 / 16);
 
 /// Coulomb's law for a sheet that lies as a rigid body behind its lift-off point: |T| <= friction (R + weight of

@@ -5,10 +5,11 @@
 
 namespace withe {
 
-/// True where the second variation of the energy, integral of 2 b eta'^2 - ((R - W) sin(theta) + T cos(theta)) eta^2,
-/// is positive for all eta that keep the pose of the tip and the lift-off point: eta = 0 at both ends, and the
-/// integrals of eta sin(theta) and eta cos(theta) vanish. Linear elements; their matrix bordered by the two constraints
-/// has exactly two negative eigenvalues then [Maddocks 1985].
+/// True if the equilibrium is stable for the given pose of the tip: if the second variation of the energy,
+///   integral of 2 b eta'^2 - ((R - W) sin(theta) + T cos(theta)) eta^2,
+/// is positive for all admissible eta. These vanish at both ends, and the integrals of eta sin(theta) and
+/// eta cos(theta) vanish. The elements are linear. For a stable equilibrium their matrix, bordered by the two
+/// constraints, has exactly two negative eigenvalues [Maddocks 1985].
 bool sheet_is_stable(const SheetShape& shape, const SheetProblem::Path& path);
 
 }  // namespace withe

@@ -9,8 +9,8 @@
 
 namespace withe {
 
-/// b(t), t the distance from the tip [Lgb], relative to the width at which w is the sheet's weight per length; so b is
-/// also its weight per length, in w, and its bending stiffness, over 2 w Lgb^3. Beyond the last place b is as there.
+/// Width b(t) at a distance t from the tip [Lgb], relative to the width at which w is the weight per length. It equals
+/// the weight per length over w, and the bending stiffness over 2 w Lgb^3. The width is constant beyond the last place.
 class SheetWidth {
  public:
   SheetWidth() = default;  ///< 1 everywhere

@@ -1,8 +1,8 @@
 #pragma once
-/// Multiple shooting: a boundary value problem cut into segments, Newton's method on the states at the cuts and on a
-/// few parameters together. Single shooting multiplies an error of its parameters by exp(growth x length); here no
-/// error grows over more than a segment, and the linear systems are solved with pivots across the cuts [Ascher,
-/// Mattheij, Russell 1995, chapters 4.3 and 7.2].
+/// Multiple shooting. A boundary value problem is cut into segments, and Newton's method solves for the states at the
+/// cuts and a few parameters together. Single shooting multiplies an error of its parameters by exp(growth x length).
+/// In multiple shooting no error grows over more than one segment, and the linear systems are solved with pivots across
+/// the cuts [Ascher, Mattheij, Russell 1995, chapters 4.3 and 7.2].
 
 #include <algorithm>
 #include <array>

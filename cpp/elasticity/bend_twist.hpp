@@ -80,8 +80,9 @@ BendTwistMoments<Scalar> bend_twist_moments(const BendMeasure& measure, const Be
   return m;
 }
 
-/// From derivatives by the curvatures halfway and tau to those by the curvatures v in the first frame, and tau: with
-/// R(tau) the turn by half a twist, kappa = R v and d kappa / d tau = (kappa2, -kappa1) / 2.
+/// Changes derivatives by the curvatures in the halfway directors, and tau, to derivatives by the curvatures v in the
+/// directors of the first frame, and tau. R(tau) is the rotation by half of the twist: kappa = R v and d kappa / d tau
+/// = (kappa2, -kappa1) / 2.
 template <bool second_too, class Scalar>
 void apply_half_twist(const HalfTwist<Scalar>& half, const BendTwistStrain<Scalar>& s, BendTwistMoments<Scalar>& m) {
   const Vec2<Scalar> by_tau{0.5 * s.kappa2, -0.5 * s.kappa1}, moment{m.by[0], m.by[1]};

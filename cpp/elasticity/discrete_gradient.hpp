@@ -1,24 +1,27 @@
 #pragma once
-/// Discrete gradients of bending and twisting: moments between two frames whose work over a step is exactly what the
-/// energy changes by, and which, with the forces that an edge makes of them, neither push nor turn the stencil.
+/// Discrete gradients of bending and twisting. These are moments between two frames whose work over a step equals the
+/// change of the energy exactly. Together with the forces that an edge makes of them, they apply neither a net force
+/// nor a net moment to the stencil.
 ///
 /// In a step a frame F turns from F0 to F1 by a rotation with the Cayley vector w, F1 - F0 = w x (F0 + F1) / 2. So a
-/// product of vectors of two frames changes exactly by a1 . b1 - a0 . b0 = (w_a - w_b) . (mean a x mean b), and is left
-/// alone where both turn alike [Gonzalez 1996: discrete gradients in quadratic invariants]. The twist and the
+/// product of vectors of two frames changes exactly by a1 . b1 - a0 . b0 = (w_a - w_b) . (mean a x mean b). It is
+/// constant if both frames turn alike [Gonzalez 1996: discrete gradients in quadratic invariants]. The twist and the
 /// curvatures v in the directors of the first frame are quotients of such products: with x = t_a . t_b, X = 1 + x,
 ///   v_i = y_i / X,  y_i = 2 di_a . t_b,
 ///   X cos(tau) = c = d1_a . d1_b + d2_a . d2_b,  X sin(tau) = s = d2_a . d1_b - d1_a . d2_b,
 /// and change exactly (D for differences) by
 ///   D v_i = (D y_i - mean v_i D x) / mean X,
 ///   D tau = D tau / (X0 X1 sin D tau) (mean c D s - mean s D c),
-/// and so do those in the directors of the second frame, y_i = -2 t_a . di_b. Those halfway are kappa = R v(a) =
-/// R^T v(b), R a turn by tau / 2. Half of either, so that a rod drawn backwards has the same moments, makes
+/// and the curvatures in the directors of the second frame, y_i = -2 t_a . di_b, change in the same way. The curvatures
+/// in the halfway directors are kappa = R v(a) = R^T v(b), where R turns by tau / 2. The mean of both forms, by which a
+/// rod drawn backwards has the same moments, gives
 ///   D kappa = mean R D v(a) / 2 + mean R^T D v(b) / 2 + tan(D tau / 4) sin(D tau / 2) / (2 D tau) D kappa' D tau,
-/// kappa' the change of kappa over the step: with J (x, y) = (y, -x), D R = (2 tan(D tau / 4) / D tau) J mean R D tau.
-/// The energy is a sum of squares of f(|kappa|^2) times strains, f rational, whose differences are exact products too.
-/// What follows is a moment m with m . (w_a - w_b) = E1 - E0, without a quotient of differences: it is as smooth as the
-/// energy, where Gonzalez's correction along a direction of the unknowns depends on how little a stencil deforms while
-/// it turns.
+/// where kappa' is the change of kappa over the step: with J (x, y) = (y, -x),
+///   D R = (2 tan(D tau / 4) / D tau) J mean R D tau.
+/// The energy is a sum of squares of f(|kappa|^2) times strains, with f rational. Its differences are exact products
+/// as well. The result is a moment m with m . (w_a - w_b) = E1 - E0, without a quotient of differences. It is as smooth
+/// as the energy. Gonzalez's correction along a direction of the unknowns lacks this smoothness: it depends on how
+/// little a stencil deforms while it turns.
 
 #include <cmath>
 
@@ -228,11 +231,11 @@ void discrete_moment(const BendMeasure& measure, const EdgeFrame<Scalar>& a0, co
   }
 }
 
-/// An edge in a step: how it makes forces of a moment m on its frame. With e the mean of its vectors at both ends of
-/// the step, t and l that one's direction and length, the force
+/// An edge in a step, and the forces by which it carries a moment m on its frame. Let e be the mean of its vectors at
+/// both ends of the step, t the direction of e and l its length. The force
 ///   f = m x t / l + nu t  on the edge's vector,  m . t on its angle,
-/// has the moment m about wherever the edge is in the middle of the step, and nu is what makes its work
-/// m . w: f . (e1 - e0) + (m . t) D chi = m . w, D chi = 2 tan(D theta / 2) / (mean of t0 and t1 along t).
+/// has the moment m about the mid-step position of the edge. The factor nu makes the work equal to m . w:
+///   f . (e1 - e0) + (m . t) D chi = m . w,  D chi = 2 tan(D theta / 2) / (mean of t0 and t1 along t).
 template <class Scalar>
 struct MovingEdge {
   Vec3<Scalar> t0, t1, t, zeta;  ///< nu = m . zeta

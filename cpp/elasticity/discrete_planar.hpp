@@ -5,8 +5,9 @@
 
 namespace withe {
 
-/// D E / D kappa of E = K (f kappa - n)^2 / 2 between two strains, and its derivative by kappa at the end: the moment
-/// K (mean f kappa - n) times D (f kappa) / D kappa, whose quotient is written out.
+/// Divided difference D E / D kappa of E = K (f kappa - n)^2 / 2 between two strains, and its derivative by kappa at
+/// the end. It is the moment K (mean f kappa - n) times D (f kappa) / D kappa, computed without a quotient of
+/// differences.
 template <class Scalar>
 struct DividedMoment {
   Scalar value, by_end;

@@ -2,9 +2,9 @@
 /// Energies, gradients and Hessians of many ordinary stencils at once, added straight to the residual and to the
 /// matrix, by the instruction set in use. Raw pointers only: the kernels behind share no code with the rest.
 ///
-/// A stencil here has consecutive unknowns (11 in space: node, angle, node, angle, node; 6 in a plane), and the
-/// matrix keeps each of its lines (columns of the lower triangle, or whole lines of an unsymmetric matrix) together.
-/// It brings along the stretching of those of its edges that it owns, which saves a round through the matrix.
+/// A stencil here has consecutive unknowns: 11 in space (node, angle, node, angle, node) and 6 in a plane. The matrix
+/// stores each line of the stencil contiguously: a column of the lower triangle, or a whole line of an unsymmetric
+/// matrix. A stencil also computes the stretching of the edges that it owns, which saves one pass through the matrix.
 
 #include <cstddef>
 

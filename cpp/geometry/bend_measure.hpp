@@ -3,11 +3,12 @@
 ///
 /// Strains are f(|kappa|^2) (kappa1, kappa2, tau) with |kappa| = 2 tan(phi / 2) for a turn by phi, and
 ///   f(x) = (1 + a x) / (1 + b x).
-/// a = b = 0 are the strains of [Bergou et al. 2010, section 3]: a turn by phi bends as 2 tan(phi / 2), stiffer by
-/// phi^2 / 2, and twists with the moment along t0 + t1 over 1 + t0 . t1, stiffer by phi^2 / 4. With a = 1/15, b = 3/20,
-/// f is the Pade approximant of (phi / 2) / tan(phi / 2), with which the strains are the rotation vector from one frame
-/// to the other: exactly in bending (to phi^6), to first order in tau. It tends to 4/9 as a stencil folds over, so that
-/// the energy still grows without end, where the angle itself would let it fold.
+/// With a = b = 0 the strains are those of [Bergou et al. 2010, section 3]. A turn by phi then bends as 2 tan(phi / 2),
+/// too stiff by phi^2 / 2. It twists with the moment along t0 + t1 over 1 + t0 . t1, too stiff by phi^2 / 4. With
+/// a = 1/15, b = 3/20, f is the Pade approximant of (phi / 2) / tan(phi / 2). The strains are then the rotation vector
+/// from one frame to the other, exactly in bending (to phi^6), and to first order in tau. The factor tends to 4/9 as a
+/// stencil folds over, so the energy still grows without bound. The energy of the angle itself would let the stencil
+/// fold.
 
 namespace withe {
 

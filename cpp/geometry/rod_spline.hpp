@@ -5,9 +5,9 @@
 /// Piece i lies about node i, between the middles of the edges before and after it, with x0, x1, x2 = nodes i - 1, i,
 /// i + 1:
 ///   c(a) = (1 - a)^2 / 2 x0 + (1/2 + a - a^2) x1 + a^2 / 2 x2,   s(a) = s1 - l0 (1 - a)^2 / 2 + l1 a^2 / 2,
-/// for 0 <= a <= 1, with s1 the arc length at rest of the node and l0, l1 the lengths at rest of the edges before and
-/// after it. c, c', s and s' are continuous from piece to piece. At the ends of an open rod a piece is half an edge,
-/// straight, from a = 1/2 on, or up to there, and the curve goes on straight beyond.
+/// for 0 <= a <= 1, where s1 is the arc length at rest of the node, and l0, l1 are the rest lengths of the edges before
+/// and after it. The functions c, c', s and s' are continuous from piece to piece. The first and last piece of an open
+/// rod are straight and half an edge long (a from 1/2 or up to 1/2), and the curve continues straight beyond them.
 
 #include <cmath>
 

@@ -5,8 +5,8 @@
 /// with u = a1 - a0, v = b1 - b0. Without A and B this is the distance of [Lumelsky 1985], whose gradient jumps from
 /// one end of the overlap to the other as parallel segments turn past each other. With them, small against squared
 /// lengths, the problem is strictly convex: D has a continuous gradient everywhere (where D > 0), and parallel segments
-/// touch in the middle of their overlap. Each set of parameters that are free, and not held at an end, is a class (edge
-/// to edge, point to edge, point to point); the second derivative is exact within a class and jumps between them.
+/// touch in the middle of their overlap. The free parameters, which are not at an end, define a class: edge to edge,
+/// point to edge, or point to point. The second derivative is exact within a class and jumps between classes.
 
 #include <algorithm>
 #include <cmath>

@@ -30,9 +30,8 @@ _BRAID_RADIUS = 2.5
 # Rise of a strand along the braid while it turns by pi, over the circumference of half a turn.
 _BRAID_SLOPE = 1.5
 # Longest edge over the radius of the rod. Its chord leaves the helix of the braid, whose radius of curvature rho is
-# 3.25
-# braid radii, by h^2 / (8 rho) = 1.25 radii. Strands are 4.8 radii apart after the corners are rounded, so they do not
-# touch.
+# 3.25 braid radii, by h^2 / (8 rho) = 1.25 radii. Strands are 4.8 radii apart after the corners are rounded, so they do
+# not touch.
 _LONGEST_EDGE = 9.0
 _NODES = 301  # least number by default
 # Default length of a rod over the length of its knot.

@@ -52,7 +52,6 @@ def train(
         Number of equilibria (approximate for "small").
     threads : int
         Number of threads of torch.
-        Of torch.
     time_limit : float, optional [s]
         Training stops there, and so it does at Ctrl-C, with the best network so far. ``network.network.training`` says
         how it ended.
