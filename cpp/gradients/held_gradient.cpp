@@ -44,8 +44,8 @@ void StepGradient::add_held(const StepAdjoint& adjoint, const VectorX& end_veloc
   if (moves() && !model.planar()) turn_held(start, held.pose);
 }
 
-/// From derivatives by q1 to those by how frames and directors are turned at the end, and were at the start: a Cayley
-/// vector w is J dw = phi - R(w) phi0, an angle d theta = d psi - spin . de - back . de0.
+/// Maps derivatives by q1 to derivatives by the rotations of frames and directors at the end and at the start. A Cayley
+/// vector w has the differential J dw = phi - R(w) phi0, and an angle d theta = d psi - spin . de - back . de0.
 void StepGradient::turn_held(VectorX& start, VectorX& pose) const {
   const Model& model = equations_.model();
   for (const Support& support : model.supports) {

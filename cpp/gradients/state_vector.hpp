@@ -1,24 +1,24 @@
 #pragma once
-/// States as vectors, beside another one: how a state differs from a reference, and what is reached from there.
+/// States as vectors relative to a reference: the difference of two states, and the state at a given difference.
 ///
-/// A vector has what supports leave free, in the places of the unknowns: displacements of nodes, turns of an edge's
-/// directors about its tangent (beyond the smallest turn that takes the tangent of the reference along), Cayley vectors
-/// of the turns of joints' frames, and angles of hinges; then the rates of all these. To first order it is what
-/// `StateAdjoint` has derivatives by.
+/// A vector holds the free unknowns in their places, and then their rates: displacements of nodes, rotations of an
+/// edge's directors about its tangent, Cayley vectors of rotations of joint frames, and angles of hinges. The rotation
+/// of directors counts from the smallest rotation that carries the tangent of the reference along. To first order,
+/// these are the variables of `StateAdjoint`.
 
 #include "forces/custom_forces.hpp"
 #include "model/state.hpp"
 
 namespace withe {
 
-/// Columns: an orthonormal basis of what supports leave free, all unknowns x free unknowns.
+/// Orthonormal basis of the unknowns that supports leave free, of size unknowns x free unknowns.
 SparseMatrix free_basis(const Model& model);
 
-/// From a reference to a state.
+/// Returns the difference of a state and a reference.
 VectorX state_difference(const Model& model, const State& reference, const State& state);
 
-/// Adds such a vector to a state. Throws std::invalid_argument, with the state as it was, where an edge would be folded
-/// back onto the next or lose its length.
+/// Adds a difference to a state. Throws std::invalid_argument, and leaves the state unchanged, if an edge would fold
+/// back onto the next edge or lose its length.
 void displace_state(const Model& model, const VectorX& by, State& state);
 
 }  // namespace withe

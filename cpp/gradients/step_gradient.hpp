@@ -1,17 +1,17 @@
 #pragma once
-/// The adjoint of one step: derivatives of a scalar by the state at a step's end become those by the state at its start
-/// and by the numbers that act in it.
+/// The adjoint of one step: it maps derivatives of a scalar by the state at the end of a step to derivatives by the
+/// state at its start and by the parameters of the step.
 ///
-/// A step solves R(z; start, p) = 0. With zbar the derivative of the scalar by z, R_z^T r = -zbar gives r, and the
-/// scalar's derivative by anything else x is r^T R_x, beside what depends on x directly [Giles and Pierce 2000,
-/// sec. 2.1]. R_z is the exact matrix; r^T R_x is what the terms say (`Term::add_adjoint`).
+/// A step solves R(z; start, p) = 0. With zbar the derivative of the scalar by z, R_z^T r = -zbar gives r. The
+/// derivative by any other quantity x is r^T R_x, plus direct dependence on x [Giles and Pierce 2000, sec. 2.1]. R_z is
+/// the exact matrix. The terms compute r^T R_x (`Term::add_adjoint`).
 ///
-/// What a step carries on besides q and v is where directors are. A reference director that is transported along has
-/// one angle to it, so a state is differentiated by positions, by how an edge's directors turn about it (psi) and by
-/// how a joint's frame turns (a rotation vector), in the places that q has for angles and frames. From a start with
-/// vector e0 to the vector e directors turn by
+/// Besides q and v, a step passes on the orientation of directors. A reference director that is transported along has
+/// one angle to the director. A state is therefore differentiated by positions, by the rotation psi of an edge's
+/// directors about the edge, and by the rotation vector of a joint's frame. These stand in the places of angles and
+/// frames in q. From a start with vector e0 to the vector e, directors turn by
 ///   d psi = d theta + spin . d e + back . d e0,    spin = -(t0 x t) / (l (1 + t0 . t)),   back = l / l0 spin,
-/// theta counted from a start that turns along.
+/// where theta counts from the transported start.
 
 #include <optional>
 

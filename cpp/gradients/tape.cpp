@@ -404,7 +404,7 @@ InitialGradient Tape::gradient(const std::vector<MomentAdjoint>& given, const Pa
   const StepRule rule = steps_.empty() ? StepRule::backward_euler : steps_.front().rule;
   const Assembler& assembler = player.gradient(rule).equations().assembler();
   moments.add(0, assembler, acting_.start(), [&] { return starts_.front(); }, adjoint);
-  assembler.project(adjoint.v);  // what is held goes as it is told
+  assembler.project(adjoint.v);  // velocities of held unknowns are prescribed
   const State& first = starts_.front();
   const std::vector<SupportPose> hands = poses_of(first);
   PoseAdjoint poses = by_poses(model_, first.q, adjoint.q, adjoint.hands, {hands, first.hands});
@@ -423,9 +423,8 @@ RunJacobian Tape::jacobian() const {
           "of a state vector: use grasp without force_limit=");
   if (acting_.count() > 1)
     throw std::invalid_argument(
-        "no Jacobian is known of a step in which a natural shape is on its way, or of a run in which something was "
-        "set: "
-        "set it at once, without over=, or take the gradient of a record");
+        "no Jacobian is available while a natural shape ramps, or for a run in which a parameter was set: set "
+        "parameters before the run, without over=, or take the gradient of a record");
   const SparseMatrix basis = free_basis(model_), back = basis.transpose();
   const Eigen::Index free = basis.cols();
   std::vector<StateAdjoint> adjoints;

@@ -1,5 +1,5 @@
 #pragma once
-/// A run as the adjoint method needs it: what each step led to, so that states come again without a solve.
+/// A run as the adjoint method needs it: the result of each step, from which states are replayed without a solve.
 
 #include <functional>
 #include <map>
@@ -18,55 +18,56 @@ namespace withe {
 struct InitialGradient {
   MatrixX3 positions;   ///< per node [1/m]; directors turn along with their edges, without spin
   MatrixX3 velocities;  ///< per node [s/m]
-  PoseAdjoint poses;    ///< by where what supports hold was, and obstacles
-  DrawnAdjoint drawn;   ///< by a drawing in which the run began; where no support moves
+  PoseAdjoint poses;    ///< by the initial poses of supports and obstacles
+  DrawnAdjoint drawn;   ///< by the drawing, if the run began in it; only without moving supports
 };
 
-/// Takes derivatives of a scalar by what acted from a step on until the next that it is given; or by what a read-out at
-/// a moment takes, then `moment` is its place among those given, else -1. `time`: when these numbers acted, in the last
-/// of the steps [s]. From the end of a run to its start.
+/// Receives derivatives of a scalar by parameters, from the end of a run to its start. A call reports the parameters
+/// that acted from `step` on to the previously reported step. If `moment` is not -1, it reports the parameters of the
+/// read-out at this index among the moments instead. `time` is the time in the last of these steps [s].
 using ParameterVisitor = std::function<void(long step, long moment, double time, const ParameterGradient&)>;
 
-/// Derivatives of the state at the end of a run by that at its start and by what acts, a row each for the numbers of a
-/// state vector (state_vector.hpp).
+/// Derivatives of the state at the end of a run by the state at its start and by parameters. There is one row per
+/// component of a state vector (state_vector.hpp).
 struct RunJacobian {
   MatrixX state;
   std::vector<ParameterGradient> rows;
 };
 
-/// Derivatives of a scalar at a moment of a run, after a number of steps; moments in the order of time.
+/// Derivatives of a scalar at a moment of a run, after a number of steps; moments are sorted by time.
 struct MomentAdjoint {
   long steps = 0;
   ReadoutAdjoint by;
 };
 
-/// Share of the way that positions and rotations of supports, and positions of obstacles, have gone, from 0
-/// to 1; empty: all are there.
+/// Completed share of the motion of supports (positions and rotations) and of obstacles (positions), from 0 to 1. Empty
+/// if all motions are complete.
 struct Reached {
   MatrixX supports;
   VectorX obstacles;
 };
 
-/// Takes derivatives by poses at the end of a step, and how far they had come then.
+/// Receives derivatives by poses at the end of a step, and the completed shares of their motions.
 using PoseVisitor = std::function<void(long step, const Reached& reached, const PoseAdjoint&)>;
 
-/// A step that has been accepted.
+/// Accepted step of a run.
 struct AcceptedStep {
   StepRule rule;
   double duration;
   const VectorX& end;            ///< q1
-  const State& after;            ///< at its end
-  const Parameters& parameters;  ///< as they acted
+  const State& after;            ///< at the end of the step
+  const Parameters& parameters;  ///< in the step
   Reached reached;
-  std::vector<SupportPose> hands;   ///< where hands are at its end, per support; empty: there is none
-  bool begins = true;               ///< whether it is the first part of a time step
-  const char* unknown = nullptr;    ///< why no gradient goes through it, unless it is cut off again
-  bool tensions_in_middle = false;  ///< whether axial forces after it are read out in its middle
+  std::vector<SupportPose> hands;   ///< poses of hands at the end, per support; empty: no hands
+  bool begins = true;               ///< true for the first part of a time step
+  const char* unknown = nullptr;    ///< reason why no gradient exists through the step, unless `cut` removes it
+  bool tensions_in_middle = false;  ///< true if axial forces after the step are read out in its middle
 };
 
 class Tape {
  public:
-  /// Tape of a run that begins so, with friction or not; these are kept. `hands`: see `AcceptedStep`.
+  /// Tape of a run with this initial state, with or without friction. The arguments are copied. `hands`: see
+  /// `AcceptedStep`.
   Tape(const Model& model, EquationOptions options, State first, const Parameters& parameters, bool frictional,
        std::vector<SupportPose> hands);
 

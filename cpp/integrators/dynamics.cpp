@@ -36,14 +36,16 @@ double moved_by(VectorX& force, Equations& equations, const Newton& newton, doub
   return newton.norms().displacement(force);
 }
 
-/// Estimated error of the step just taken [m]: dt^2 / 2 times the mean acceleration (backward Euler), or
-/// c dt^(p + 1) times its derivative of order p - 1: c = 1/12 for midpoint, p = 2; for fourth-order steps, p = 4,
-/// c = |sum g^5| / 80 over their parts g, whose own errors of the third power cancel. The latter is known at the last
-/// part, and 0 before.
+/// Estimated error of the step just taken [m]. Backward Euler: dt^2 / 2 times the mean acceleration. Other schemes:
+/// c dt^(p + 1) times the derivative of order p - 1 of the acceleration.
 ///
-/// Such errors add up to a shift in phase, and that to no more than a mode's amplitude a is: of frequency w over T,
-/// min(2 a, a c (w dt)^p w T). The two meet at (w dt)^(p + 1) = 2 dt / (c T); p + 1 running means leave slower modes as
-/// they are and take that power of the ratio off faster ones.
+/// - Midpoint has p = 2 and c = 1/12.
+/// - Fourth-order steps have p = 4 and c = |sum g^5| / 80 over their parts g, whose own errors of third order cancel.
+///   Their error is known at the last part, and 0 before.
+///
+/// Such errors add up to a shift in phase, whose displacement is at most twice a mode's amplitude a. After a time T,
+/// the error of frequency w is min(2 a, a c (w dt)^p w T). Both bounds meet at (w dt)^(p + 1) = 2 dt / (c T). p + 1
+/// running means leave slower modes unchanged, and divide faster modes by that power of the ratio.
 double estimated_error(Equations& equations, const Newton& newton, const Options& options, const StepPlan& plan,
                        Predictor& predictor, StepWorkspace& work) {
   VectorX& error = work.assumed;

@@ -44,15 +44,16 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
                          const Parameters& parameters, const Prescribed& prescribed, const StepPlan& plan, State& state,
                          Predictor& predictor, StepWorkspace& work);
 
-/// Velocities in the middle of a step, to second order: those over the last two steps are carried on to `time` [s], for
-/// velocities at their ends ring on modes that are stiff to the midpoint rule. `state.v` where they are not known.
+/// Velocities in the middle of a step, to second order: the mean velocities of the last two steps, extrapolated to
+/// `time` [s]. Velocities at the ends of steps would not do, because modes that the midpoint rule does not resolve
+/// oscillate in them. Returns `state.v` without past steps.
 void extrapolate_velocity(const State& state, double time, VectorX& v);
 
-/// Finds the acceleration at the state, with loads and custom forces as they are now, where it is not known.
+/// Finds the acceleration at the state if it is unknown, with the present loads and custom forces.
 void find_acceleration(Equations& equations, const Parameters& parameters, const Prescribed& prescribed, double dt,
                        State& state, StepWorkspace& work);
 
-/// Finds the acceleration at the state where it is not known, and where an explicit step leads: positions in `work.z`,
+/// Finds the acceleration at the state if it is unknown, and the result of an explicit step: positions in `work.z`,
 /// velocities (predicted ones, to second order) in `work.velocity`.
 void begin_verlet(Equations& equations, const Parameters& parameters, const Prescribed& prescribed, double dt,
                   State& state, StepWorkspace& work);
@@ -61,15 +62,15 @@ void begin_verlet(Equations& equations, const Parameters& parameters, const Pres
 StepResult verlet_step(Equations& equations, const Parameters& parameters, const Prescribed& prescribed, double dt,
                        State& state, StepWorkspace& work);
 
-/// Largest stable step of the explicit scheme at a state: a mode of frequency omega that resistance damps at the rate
-/// gamma, and which Verlet's predicted velocity feels, is stable while (omega dt)^2 / 4 + gamma dt <= 1. Found as the
-/// dt for which the greatest eigenvalue of M^-1 (K + 4 C / dt) is 4 / dt^2, resistance C that of friction, drag and
-/// viscosity.
+/// Largest stable step of the explicit scheme at a state. A mode of frequency omega that resistance damps at the rate
+/// gamma is stable while (omega dt)^2 / 4 + gamma dt <= 1, because resistance acts on Verlet's predicted velocity. The
+/// result is the dt for which the greatest eigenvalue of M^-1 (K + 4 C / dt) is 4 / dt^2. The resistance C comes from
+/// friction, drag and viscosity.
 double stable_step(Equations& equations, const Parameters& parameters, const Prescribed& prescribed, const State& state,
                    StepWorkspace& work);
 
-/// True if the mean velocity of held nodes, which has changed by `gain` since the step before, goes on like that;
-/// else it jumps. From rest at an even acceleration, the second step is 2/3 faster.
+/// True if the mean velocity of held nodes, which has changed by `gain` since the last step, continues smoothly. Else
+/// it jumps. From rest at a constant acceleration, the gain of the second step is 2/3 of its velocity.
 inline bool carries_on(const Vector3& now, const Vector3& gain) { return gain.norm() <= 0.75 * now.norm(); }
 
 }  // namespace withe

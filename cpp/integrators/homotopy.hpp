@@ -1,7 +1,7 @@
 #pragma once
-/// Equilibria that go with a factor s, along which supports move, natural shapes, tensions and loads change:
-///   F(q, s) = grad V(q, s) - f(s) - (1 - s) r = 0, with the held unknowns of q where they are to be at s.
-/// r is what the start, s = 0, is out of balance by, so that the path begins there and ends, at s = 1, in equilibrium.
+/// Equilibria along a factor s, which drives supports, natural shapes, tensions and loads. The equation is
+///   F(q, s) = grad V(q, s) - f(s) - (1 - s) r = 0, where held unknowns have their positions of s.
+/// r is the imbalance of forces at the start s = 0. The path therefore begins there, and ends at s = 1 in equilibrium.
 
 #include <functional>
 
@@ -20,19 +20,23 @@ struct Boundary {
   /// Sets the poses of supports in `prescribed` to those at a factor; nothing where no hand that yields moves.
   std::function<void(double factor)> move = nullptr;
 };
-/// Sets what acts at a factor; nothing where it all stays.
+/// Sets the parameters that act at a factor; empty if all of them are constant.
 using ActingPath = std::function<void(double factor, Parameters& parameters)>;
 
-/// Natural shapes and tensions from those `before` (if they have changed) to the present ones, so that rods bend by
-/// their muscles and tendons and are not bent to there; and loads that turn with the rod (moments, followers) from the
-/// share of them that the state carries already to all of them: a dead imbalance would pull where they do not. Other
-/// loads stay, as they are part of what is out of balance.
+/// Returns the path of parameters that change with the factor:
+///
+/// - natural shapes and tensions, from `before` (if they have changed) to the present ones. Rods are then bent by their
+///   muscles and tendons, not by the imbalance.
+/// - loads that turn with the rod (moments, followers), from the share that the state carries already to all of them.
+///   An imbalance of fixed direction would pull elsewhere.
+///
+/// Other loads are constant, and part of the imbalance.
 ActingPath growing(Equations& equations, Parameters& parameters, const Prescribed& prescribed, const State& state,
                    NewtonWorkspace& work, const Actuation* before);
 
 class Homotopy {
  public:
-  /// Parameters that act are those of the last factor.
+  /// The acting parameters are those of the last factor.
   Homotopy(Equations& equations, const Newton& newton, Parameters& parameters, Boundary boundary, ActingPath acting,
            State& state, NewtonWorkspace& work)
       : equations_(equations),
@@ -92,9 +96,9 @@ class Homotopy {
   NewtonWorkspace& work_;
   VectorX imbalance_, target_, held_, moved_, shift_;
   Configuration scratch_;
-  double factor_ = 0.0, present_ = 0.0;  // last gone to; that of the present state
-  /// Over the smaller radius, how deep surfaces may be in each other on the way: an obstacle that was pushed into them
-  /// holds them there by what is out of balance, which is no force that contact is to be stiff for.
+  double factor_ = 0.0, present_ = 0.0;  // last computed; that of the present state
+  /// Largest overlap of surfaces on the path, over the smaller radius. The imbalance holds surfaces in an obstacle that
+  /// was pushed into them. Contact need not be stiff enough for this force.
   double deepest_ = kMaxDepth;
   bool moves_ = false, hold_neutral_ = false;
 };

@@ -24,10 +24,10 @@ struct Balance {
   bool either = false;  ///< each within that, or below the tolerance times the forces in the scene
 };
 
-/// The limiting accuracy of Newton's method [Tisseur 2001]: residuals halve no more, in two iterations, or in one whose
-/// step is no half of the last one either (what is free to spin is driven on by rounding). That each row is within its
-/// rounding error bound is no end of the iterations: thousands of rows that are off in the same sense bend a fine rod
-/// by far more than rounding does, whose errors have no sense.
+/// The limiting accuracy of Newton's method [Tisseur 2001]. It is reached when residuals do not halve in two
+/// iterations, or in one iteration whose step is not half of the last step either (rounding keeps neutral motions
+/// going). That each row is within its rounding error bound is not enough to stop. Thousands of rows with errors of one
+/// sign bend a fine rod by far more than rounding errors, whose signs are random.
 class Stagnation {
  public:
   /// After each evaluation: the greatest residual [N], and the step that led there [m], infinite at the start.
@@ -59,15 +59,15 @@ inline constexpr double kMaxContraction = 0.5;
 /// prediction for the first correction, kMaxContraction times the one before for others.
 bool leaves_path(double correction, double bound, double predicted, double tolerance);
 
-/// A solution predicted from another one on the same path, with its axial forces in work.axial_force if it has them. A
-/// guess that is near enough is drawn in fast: where the first correction is longer than the prediction, or the
-/// corrections do not halve, the path is lost, or another one not far [Deuflhard 2011, section 5.1].
+/// A solution predicted from another one on the same path, with its axial forces in work.axial_force if it has them.
+/// Newton's method converges fast from a guess that is near enough. If the first correction is longer than the
+/// prediction, or the corrections do not halve, the solve may be on another path [Deuflhard 2011, section 5.1].
 struct Prediction {
   double length = 0;   ///< greatest displacement from the known solution [m]; 0 and not strict: no bound
-  bool strict = true;  ///< whether corrections have to shrink too; else none may be longer than `length`
-  int kinks = 0;       ///< corrections that may fail so because forces have kinks
-  bool forces = true;  ///< whether work.axial_force goes with it
-  double enough = 0;   ///< a correction after which no other is needed, for a point on the way [m]
+  bool strict = true;  ///< true if corrections must shrink too; else none may be longer than `length`
+  int kinks = 0;       ///< number of corrections that may fail this test, because forces have kinks
+  bool forces = true;  ///< true if work.axial_force is predicted too
+  double enough = 0;   ///< length of a correction that ends the solve of an intermediate point [m]
 };
 
 /// Options of one solve.

@@ -8,11 +8,11 @@
 
 namespace withe {
 
-/// Polynomials in time through means of the last steps, each taken at the middle of its step: through their
-/// accelerations a, which gives v0 + h a from the velocity v0 that the step starts with, or through their velocities.
-/// Modes that a midpoint step does not resolve flip the sign of v0 and a from step to step, and every degree in a
-/// amplifies them more; their mean velocities are small. Used is what would have predicted the last step best. Steps of
-/// a composition differ in how far they look ahead, so each has a slot.
+/// Polynomials in time through means of the last steps, each at the middle of its step. They extrapolate either
+/// accelerations a, which gives v0 + h a from the velocity v0 at the start of the step, or velocities. Modes that a
+/// midpoint step does not resolve flip the sign of v0 and a from step to step, and each degree in a amplifies them
+/// further. Their mean velocities are small. The predictor uses the polynomial that would have predicted the last step
+/// best. The steps of a composition differ in their horizon, so each has its own slot.
 class Predictor {
  public:
   static constexpr int kDepth = 4, kSlots = 5;

@@ -17,11 +17,12 @@ class StepNorms {
   double turn(const VectorX& step) const;
   /// Factor by which a step is shortened, so that nothing moves or turns too far at once.
   double cap(const VectorX& step) const;
-  /// True if `cap` surely leaves a step alone in which no node moves, and nothing turns, by more than `most`.
+  /// True if `cap` certainly does not shorten a step in which no node moves, and nothing turns, by more than `most`.
   bool leaves_alone(double most) const;
 
-  /// Per unknown: 1 where it is a coordinate of a node, 1 where it is an angle, else 0; and what makes a force of a
-  /// force or moment: 1, or the inverse of the shortest edge [1/m].
+  /// Indicators per unknown: `coordinates` is 1 for a coordinate of a node, and `angles` is 1 for an angle; else 0. The
+  /// `inverse_arms` turn a force or moment into a force: 1 for forces, the inverse of the shortest edge [1/m] for
+  /// moments.
   const VectorX& coordinates() const { return coordinates_; }
   const VectorX& angles() const { return angles_; }
   const VectorX& inverse_arms() const { return inverse_arms_; }

@@ -5,23 +5,23 @@
 
 namespace withe {
 
-/// Work of loads, and what all but contact takes from the motion, over the step, with the forces that acted in it.
+/// Adds the work of loads over the step, and the dissipation except that of contact, from the forces of the step.
 void add_work(const Equations& equations, const Parameters& parameters, const VectorX& change, StepWorkspace& work,
               StepResult& result);
 
-/// Held unknowns move as they are told, and so act on the edges next to them by their acceleration, (v1 - v0) / dt.
-/// The supports' work is that of the forces on what they hold, over its way, and
-/// (v0 + v1) / 2 times M (v1 - v0) there: the latter, with what the others' equations say of theirs, is exactly what
-/// the kinetic energy grows by. Puts M (v1 - v0) / dt into the reactions in place of `work.assumed`, the inertia in the
-/// residual; of what is held itself, M (v1 - v0) / `held_time`, which lies between those two velocities of supports.
+/// Held unknowns have prescribed motion, and act on the edges next to them by their acceleration (v1 - v0) / dt. The
+/// work of supports is that of their forces over their motion, and of inertia: (v0 + v1) / 2 times M (v1 - v0) there.
+/// Together with the other equations, the latter equals the change of the kinetic energy exactly. The function replaces
+/// `work.assumed`, the inertia in the residual, by M (v1 - v0) / dt in the reactions. For the held part itself it
+/// uses M (v1 - v0) / `held_time`, where `held_time` lies between those two velocities of supports.
 void add_support_work(const Equations& equations, const VectorX& v0, const VectorX& v1, double dt, double held_time,
                       StepWorkspace& work, StepResult& result);
 
-/// Advance of an explicit step from a state to q: the configuration there, and that of `next`. Returns by how much
-/// edges turn at most [rad].
+/// Advances an explicit step from a state to q: computes the configuration at q, and that of `next`. Returns the
+/// largest rotation of an edge [rad].
 double advance(const Model& model, const State& state, const VectorX& q, Configuration& configuration, State& next);
 
-/// Finds the fluid's force at q on velocities v, and the time that takes.
+/// Finds the fluid's force at q for velocities v, and measures the computing time.
 bool solve_flow(Equations& equations, const VectorX& q, const VectorX& v, Counters& counters);
 
 }  // namespace withe

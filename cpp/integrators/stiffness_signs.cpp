@@ -56,16 +56,16 @@ bool StiffnessSigns::neutral(const State& state, StepData& data) {
 VectorX StiffnessSigns::neutral_motion(const State& state, StepData& data, double slack) {
   if (definite(symmetric_part(), -1.0, neutral_shift(equations_, kMaxRounding))) return {};
   VectorX mode = lowest_mode(0);
-  // A hundredth of what rounding leaves of the matrix: what is softer than that is none of its motions.
+  // A hundredth of the rounding error of the matrix: no motion is softer.
   const double least = 0.01 * neutral_shift(equations_, kEpsilon).dot(mode.cwiseAbs2());
   const Lowest found = lowest(mode, state, data);
   if (std::abs(found.curvature) > slack * found.unknown + least) mode.resize(0);
   return mode;
 }
 
-/// A neutral mode comes out on either side of zero by rounding, and by what is left out of balance, F: along q(a) on
-/// which the potential is the same, K q' . q' = -F . q'', and nodes that turn by a have |q''| of |q'|; twice that, as a
-/// bar that is pulled by rounding reaches it.
+/// The curvature of a neutral mode is not exactly zero, for two reasons. One is rounding. The other is a force F out of
+/// balance: along q(a) of constant potential, K q' . q' = -F . q'', and nodes that turn by a have |q''| = |q'|. The
+/// bound is twice the latter, because rounding reaches it for a bar under tension.
 StiffnessSigns::Lowest StiffnessSigns::lowest(const VectorX& mode, const State& state, StepData& data) {
   VectorX imbalance = data.residual;
   equations_.assembler().project(imbalance);

@@ -1,13 +1,13 @@
 #pragma once
 /// Globalisation of Newton's method between surfaces.
 ///
-/// Contact and friction turn on and off, so that full steps may go to and fro for ever. A step is kept at a length to
-/// which it leads downhill, which needs no more than an evaluation, or from which the same matrix asks for a smaller
-/// step next: the natural monotonicity test [Deuflhard 2011, section 3.3], which sees displacements only and so no
-/// difference between forces and moments.
+/// Contact and friction turn on and off, so full steps may alternate for ever. A step is kept at a length that passes
+/// one of two tests. The first needs one evaluation: the potential still decreases along the step at its end, and less
+/// steeply than at its start. The second is the natural monotonicity test: the next step with the same matrix is
+/// smaller [Deuflhard 2011, section 3.3]. It compares displacements only, so forces and moments need no common scale.
 ///
-/// Pressing has negative stiffness where surfaces slide off each other, and with much of it a step may lead uphill, to
-/// where forces balance but do not hold. Where little of such a step can be kept, it is made anew without that
+/// Contact has negative geometric stiffness where surfaces slide off each other. With much of it a step may lead
+/// uphill, to an unstable equilibrium. If only little of such a step can be kept, it is computed again without that
 /// stiffness.
 
 #include "integrators/newton_system.hpp"
