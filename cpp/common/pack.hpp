@@ -1,10 +1,9 @@
 #pragma once
 /// A handful of doubles that are computed with together, on the compiler's vector extensions.
 ///
-/// Included only by translation units that are compiled for one instruction set. Such a file defines
-/// WITHE_INSTRUCTION_SET (a namespace) and WITHE_LANES first, and calls no inline function of any other header but
-/// templates on Pack: the linker keeps one copy of every other inline function, and might keep one that the present
-/// machine cannot run.
+/// Only translation units that are compiled for one instruction set may include this header. Such a file first defines
+/// WITHE_INSTRUCTION_SET (a namespace) and WITHE_LANES. It calls no inline function of another header except templates
+/// on Pack. The linker keeps one copy of every other inline function, which the present machine may not be able to run.
 
 #include <cstddef>
 
@@ -213,8 +212,8 @@ inline Pack arctangent(Pack y, Pack x) {
   return with_sign_of(angle, y);
 }
 
-/// atanh(u), 0 <= u < 1: with (1 + u) / (1 - u) = 2^k m, m within sqrt(2) of 1, it is k ln(2) / 2 + atanh(t), where
-/// t = (m - 1) / (m + 1); to an ulp of the result and what the rounding of 1 - u makes of it.
+/// atanh(u) for 0 <= u < 1. Let (1 + u) / (1 - u) = 2^k m with m within a factor sqrt(2) of 1, and t = (m - 1) / (m +
+/// 1). Then atanh(u) = k ln(2) / 2 + atanh(t). The error is one ulp of the result, plus the effect of rounding 1 - u.
 inline Pack inverse_tanh(Pack u) {
   using Unsigned = unsigned long long __attribute__((vector_size(8 * WITHE_LANES)));
   const Pack up = Pack(1.0) + u, down = Pack(1.0) - u;

@@ -411,11 +411,12 @@ class Builder {
     return held;
   }
 
-  /// Strains at nodes are a trapezoidal rule along the rod. At a frame the moment ends with a slope, and the first of
-  /// Gregory's end corrections to that rule (weights 5/12, 13/12, 1, 1, ... edges) makes it third order there: the node
-  /// next to a frame carries a twelfth of an edge for it. Not so where a rod is gripped while it runs, which must leave
-  /// it as it is; nor along an edge that is held or once was (`UncorrectedEnd`), between whose sides nothing is passed
-  /// on: what one side gave to the other, or took, would be of first order.
+  /// Strains at nodes are a trapezoidal rule along the rod. At a frame the moment ends with a slope. The first of
+  /// Gregory's end corrections (weights 5/12, 13/12, 1, 1, ... edges) makes the rule third order there: the node next
+  /// to a frame carries a twelfth of an edge for the frame. There are two exceptions. A rod that is gripped during a
+  /// run must not change. An edge that is held or once was (`UncorrectedEnd`) passes no bending from one side to the
+  /// other:
+  /// a correction across it would be an error of first order.
   void share_bending() {
     const std::vector<bool> held = held_edges();
     std::vector<UncorrectedEnd>& ends = model_.description.uncorrected_ends;

@@ -11,9 +11,9 @@
 
 namespace withe {
 
-/// A rod as a chain of nodes. Arrays have one row per edge, unless their comment names stencils.
-/// An open rod of N nodes has N - 1 edges and N - 2 stencils (the inner nodes); a closed one has N, N
-/// and N (stencil i sits at node i, between edges i - 1 and i).
+/// A rod as a chain of nodes. Arrays have one row per edge, unless their comment names stencils. An open rod of N nodes
+/// has N - 1 edges and N - 2 stencils, which are the inner nodes. A closed rod has N edges and N stencils, where
+/// stencil i sits at node i, between edges i - 1 and i.
 struct RodDescription {
   std::string name;
   std::vector<int> nodes;  ///< rows of SceneDescription::positions, in order; closed: the first is not repeated

@@ -3,23 +3,23 @@
 ///
 /// The velocity of an edge goes linearly from one node's to the other's, so an edge of mass m has the kinetic energy
 ///   m (|va|^2 + va . vb + |vb|^2) / 6 = (m / 2) (|va|^2 + |vb|^2) / 2 - (m / 12) |vb - va|^2,
-/// and rows of the mass matrix read m / 6, 4 m / 6, m / 6 [any textbook on finite elements: the consistent matrix]. It
-/// is positive definite, its row sums are the masses m / 2 at either end, and as it is a scalar matrix times the
-/// identity of space, momentum and angular momentum are kept as with lumped masses. Bending waves gain most: their
-/// frequencies are off by O(l^4), where lumped masses leave O(l^2), at free ends the most of it.
+/// and rows of the mass matrix read m / 6, 4 m / 6, m / 6 [any textbook on finite elements: the consistent matrix]. The
+/// matrix is positive definite, and its row sums are the masses m / 2 at either end. It is a scalar matrix times the
+/// identity of space, so it conserves momentum and angular momentum as lumped masses do. Bending waves gain most: their
+/// frequencies have errors of O(l^4). Lumped masses leave errors of O(l^2), mainly at free ends.
 ///
-/// A node that a support holds acts on its neighbours through what couples them: a bar of one edge that hangs on a pin
-/// has the moment of inertia m l^2 / 3, and when its pin is moved it lags behind. Its velocity at the end of
-/// a step is known to second order only (`find_held_velocity`), so fourth-order steps leave the mass of edges at held
-/// nodes at their nodes (`Parameters::held_lumped`).
+/// A node that a support holds acts on its neighbours through the coupling terms. For example, a bar of one edge that
+/// hangs on a pin has the moment of inertia m l^2 / 3, and lags behind when the pin moves. The velocity of a held node
+/// at the end of a step is known to second order only (`find_held_velocity`). Fourth-order steps therefore lump the
+/// mass of edges at held nodes (`Parameters::held_lumped`).
 ///
-/// A frame of a joint or a clamp takes a quarter of the rotary inertia of each edge that is attached to it, what lies
-/// within half of its stencil: the edge, which has the rest, turns in its middle. About an edge's axis the inertia of
-/// both is that of the edge. A hinge has as much again against its frame, as a mass of its own must not vanish.
+/// A frame of a joint or a clamp carries a quarter of the rotary inertia of each attached edge, which is the part
+/// within half of its stencil. The edge carries the rest and turns in its middle. About the axis of the edge, the sum
+/// is the inertia of the edge. A hinge has an equal inertia relative to its frame, because no mass may vanish.
 ///
-/// Rods whose edges are chords of arcs, of more than a radian in all, have their mass at their nodes: a chord that
-/// spins about the centre of its arc is nearer to it than the arc, by which the consistent matrix loses kappa^2 l^2 / 6
-/// of the energy and the lumped one nothing. An explicit scheme divides by masses, and so takes the row sums alone
+/// Rods whose edges are chords of arcs, of more than a radian in all, have lumped masses. A chord that spins about the
+/// centre of its arc is nearer to the centre than the arc. By this the consistent matrix loses kappa^2 l^2 / 6 of the
+/// energy, and the lumped matrix nothing. An explicit scheme divides by masses, and uses the row sums alone
 /// (`Parameters::lumped`).
 
 #include "model/model.hpp"

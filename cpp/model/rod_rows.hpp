@@ -5,8 +5,8 @@
 
 namespace withe {
 
-/// The edge with which the next rod of a row goes on from the last edge of one (`behind`), or the one before from the
-/// first; -1 where there is none, or where more than two rods meet.
+/// Returns the edge of the next rod in a row that continues after the last edge of a rod (`behind`), or the edge of the
+/// previous rod before its first edge. Returns -1 if there is none, or if more than two rods meet.
 inline int next_in_row(const Model& model, int edge, bool behind) {
   const auto e = static_cast<std::size_t>(edge);
   const int node = behind ? model.edge_head[e] : model.edge_tail[e];

@@ -23,15 +23,16 @@ Scalar in_series(const Scalar& flexibility0, const Scalar& flexibility1) {
   return 1.0 / (flexibility0 + flexibility1);
 }
 
-/// A moment along the middle of an arc that turns by phi bends its ends, to either side: 1 / Kt + phi^2 / (12 K), K
-/// against bending about the arc's normal, of which the curvature's `share` towards either director tells the part.
+/// Twisting stiffness of a stencil on an arc that turns by phi. A moment along the middle of the arc also bends both of
+/// its ends: the compliance is 1 / Kt + phi^2 / (12 K). K is the stiffness against bending about the normal of the arc,
+/// from the `share` of the squared curvature towards each director.
 template <class Scalar>
 Scalar twist_of_arc(const Scalar& twist, const Scalar& bend1, const Scalar& bend2, double square_of_turn,
                     const Vector2& share) {
   return 1.0 / (1.0 / twist + square_of_turn / 12.0 * (share(0) / bend2 + share(1) / bend1));
 }
 
-/// 2 tan(|kappa| V / 2) / |kappa| [m], which makes a discrete curvature of one of the smooth rod.
+/// Factor 2 tan(|kappa| V / 2) / |kappa| [m], which turns a curvature of the smooth rod into a discrete curvature.
 template <class Scalar>
 Scalar discrete_over_smooth(const Scalar& kappa1, const Scalar& kappa2, double voronoi) {
   using std::sqrt;

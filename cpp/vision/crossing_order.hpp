@@ -6,10 +6,10 @@
 
 namespace withe {
 
-/// Decides every crossing from the picture: the upper strand looks in the crossing as it does before and behind it,
-/// flank by flank, the lower one does not. The picture inside the crossing is compared with the cross-profiles of
-/// either strand just outside, interpolated along it; over is the one with the smaller squared difference, and the
-/// confidence is the difference of both relative to their sum.
+/// Decides the order of every crossing from the picture. The upper strand looks the same inside, before and behind the
+/// crossing, flank by flank; the lower strand does not. The picture inside is compared with the cross-profiles of each
+/// strand just outside, interpolated along the strand. The upper strand is the one with the smaller squared difference.
+/// The confidence is the difference of the two squared differences, relative to their sum.
 void decide_order(const ColorImage& image, Tracing& tracing);
 
 }  // namespace withe

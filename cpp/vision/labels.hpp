@@ -8,13 +8,13 @@
 
 namespace withe {
 
-/// Writes cable number + 1 into every pixel of the mask (rows one after the other, zeros before): that of the nearest
-/// centreline, measured in half widths; at crossings whose order is known the upper cable in its full width.
-/// Parts of the mask that no cable runs through stay 0.
+/// Writes cable number + 1 into every pixel of the mask, row by row; `labels` must be zero before. A pixel belongs to
+/// the nearest centreline, measured in half widths. At crossings with known order the upper cable has its full width.
+/// Parts of the mask without a cable stay 0.
 void paint_labels(const BitImage& mask, const Tracing& tracing, std::int32_t* labels);
 
-/// The published way: discs around every row, as wide as half of the cable's rows or more, in whole pixels; later
-/// cables over earlier ones, then the upper cable of every crossing.
+/// The published method: discs around every row, as wide as half of the cable's rows or more, in whole pixels. Later
+/// cables cover earlier ones, and finally the upper cable of every crossing is drawn.
 void paint_discs(const BitImage& mask, const Tracing& tracing, std::int32_t* labels);
 
 }  // namespace withe

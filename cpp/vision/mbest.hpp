@@ -6,14 +6,19 @@
 
 namespace withe {
 
-/// Traces a mask in the seven published steps: skeleton; ends and intersections by counting neighbours; split ends up
-/// to twice the largest half width pruned; intersections clustered, Y-shaped ones within ten largest half widths
-/// matched in pairs, the nearest first, and replaced by their middle; the pairs of ends with the least sum of
-/// discrete curvatures (8.2) continue each other; paths follow the pixels of the skeleton.
+/// Traces a mask in the published steps:
+///
+/// - compute the skeleton
+/// - find ends and intersections by counting neighbours
+/// - prune split ends up to twice the largest half width
+/// - cluster intersections. Match Y-shaped ones within ten largest half widths in pairs, the nearest first, and replace
+///   each pair by its middle
+/// - pair the ends at each intersection with the least sum of discrete curvatures (8.2)
+/// - follow the pixels of the skeleton
 Tracing trace_mbest(const BitImage& mask);
 
-/// Step seven (8.2.7): over is the path through the crossing with the smaller sum of standard deviations of its
-/// colours, measured in the picture blurred by a 5 x 5 box.
+/// Step seven (8.2.7): the upper path through a crossing has the smaller sum of standard deviations of its colours,
+/// measured in the picture blurred by a 5 x 5 box.
 void decide_order_mbest(const ColorImage& image, Tracing& tracing);
 
 }  // namespace withe
