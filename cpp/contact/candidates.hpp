@@ -1,9 +1,9 @@
 #pragma once
 /// Which surfaces may touch, and how far an iterate may go.
 ///
-/// A grid finds the pairs of edges that may come near on the way of an iterate, and beyond it by a margin; they are
-/// found again when a node leaves that. What touches, and how far an iterate may go, depends on where the bodies are
-/// and on nothing that came before: bounds of how far nodes must move to change either only let pairs be skipped.
+/// A grid finds the pairs of edges that may come near on the path of an iterate, with a margin. The search is repeated
+/// when a node leaves the margin. The set of touching pairs, and the allowed length of an iterate, depend only on the
+/// positions of the bodies, not on earlier searches. Bounds of the motion only let the search skip pairs.
 
 #include <vector>
 
@@ -12,7 +12,7 @@
 
 namespace withe {
 
-/// Scratch of a search for what is near.
+/// Scratch of a search for near pairs.
 struct CandidateSearch {
   BroadPhase broad_phase;
   std::vector<Box> boxes;

@@ -1,13 +1,13 @@
 #pragma once
-/// Contact of a scene in one step: what touches, its energy and forces, friction, and how far an iterate may go.
+/// Contact of a scene in one step: touching pairs, energy and forces, friction, and the allowed length of an iterate.
 ///
-/// Contact acts at the end configuration q1 of every scheme. Its potential k E(D) stays finite where centrelines cross,
-/// so every iterate is shortened until no pair of centrelines passes through another on its way (`allowed`): the path
-/// from one accepted state to the next keeps every knot.
+/// Contact acts at the end configuration q1 of every scheme. Its potential k E(D) stays finite if centrelines cross.
+/// `allowed` therefore shortens every iterate so that no pair of centrelines passes through another on its path. The
+/// path from one accepted state to the next keeps every knot.
 ///
-/// Four parts do that: `Candidates` know what may touch, a `ContactSet` what touches at q1; pressing and friction are
-/// functions of its entries and of the `ContactProblem`, which is const while a step is solved; and `ContactStiffness`
-/// makes the records that a step leaves of those that it began with.
+/// Contact has four parts. `Candidates` are the pairs that may touch, and a `ContactSet` holds those that touch at q1.
+/// Pressing and friction are functions of its entries and of the `ContactProblem`, which is const during a solve.
+/// `ContactStiffness` computes the records at the end of a step from the records at its start.
 
 #include <span>
 #include <utility>

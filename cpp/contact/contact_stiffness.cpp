@@ -27,8 +27,9 @@ constexpr double kMaxFadingSpeed = 0.1;
 // contact is stiff for.
 constexpr double kMaxDrawnForce = 1e-6;
 
-/// A contact that is yet to come starts as stiff as its rods' greatest force has wanted, so that those which take over
-/// from each other while surfaces slide have no need to change; that fades where it is much more than is wanted now.
+/// A new contact starts with the stiffness that the greatest force of its rods has needed. When one contact takes over
+/// from another while surfaces slide, no stiffness then changes. The start stiffness decays if it is far above the
+/// need.
 void follow_forces(const ContactProblem& problem, const VectorX& greatest, VectorX& stiffness) {
   const VectorX& firm = problem.parameters->firm_stiffness;
   for (Eigen::Index rod = 0; rod < greatest.size(); ++rod) {
@@ -423,11 +424,11 @@ bool ContactStiffness::begins_at_rest(const Touching& t, ContactRecord& record) 
   return true;
 }
 
-/// Surfaces that a scene begins with within the tolerance of contact fall onto each other if they store less than what
-/// moves and weight will give, and rest if not. Later they may part and meet again within it, and those that press may
-/// be hit by more than the impact that is not yet over. The speed at which they near each other is then that of another
-/// impact, which is on its way in while its age is 0: for it contact is as stiff as if it only began, without a change
-/// of energy.
+/// Surfaces that a scene begins with within the contact tolerance may fall onto each other or rest. They fall if they
+/// store less energy than motion and weight will supply. Later, surfaces may part and meet again within the tolerance,
+/// or a stronger impact may hit surfaces before the first impact is over. Their approach speed then belongs to a new
+/// impact, which is compressing while its age is 0. The contact gets the stiffness of a new impact, without a change of
+/// energy.
 bool ContactStiffness::begins_anew(const Touching& t, bool struck, ContactRecord& record) const {
   const ContactPair& pair = t.pair;
   double speed = approach_speed(problem_, pair);

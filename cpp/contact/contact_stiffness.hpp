@@ -1,21 +1,21 @@
 #pragma once
-/// Stiffness of contacts: from the records of contacts as a step begins, and what touches at its end, to the records
-/// that it leaves.
+/// Stiffness of contacts: computes the records of contacts at the end of a step from the records at its start and the
+/// touching pairs at its end.
 ///
-/// Stiffness k follows each contact's force so that surfaces are about `kDepth` of the smaller radius deep in each
-/// other. In steps, what becomes stiffer under load yields, so that it goes on pressing as hard as before, and stores
-/// less, or in an impact stores as much; the depth that presses no more wears off as surfaces part, and fades where
-/// they rest. In equilibria nothing yields, and contacts are as stiff as those which are yet to begin: what slides on
-/// from one to the next would otherwise be held, as by friction.
+/// The stiffness k of a contact follows its force, so that the overlap of surfaces is about `kDepth` of the smaller
+/// radius. If a loaded contact stiffens during a step, it also yields: the force stays the same and the stored energy
+/// decreases, or in an impact stays the same. The yielded depth carries no force. It decreases as surfaces part, and
+/// decays while they rest. In equilibria nothing yields, and contacts have the stiffness of new contacts. Otherwise a
+/// sliding surface would be held at the change from one contact to the next, as if by friction.
 
 #include "contact/contact_set.hpp"
 
 namespace withe {
 
-/// Stiffness of a contact that begins, for a whole node [N/m]. `stiffness`: of contacts that begin, per rod.
+/// Stiffness of a new contact, for a whole node [N/m]. `stiffness` is the stiffness of new contacts per rod.
 double start_stiffness(const ContactProblem& problem, const ContactPair& pair, const VectorX& stiffness);
-/// Stiffness of a contact without a record. What touches already when the step begins does not become stiffer by its
-/// speed, which would put energy in.
+/// Stiffness of a contact without a record. The approach speed does not stiffen pairs that touch when the step begins,
+/// because that would add energy.
 double first_stiffness(const ContactProblem& problem, const ContactPair& pair);
 
 /// Scratch of the end of a step.
@@ -26,35 +26,35 @@ struct StiffnessScratch {
   };
   std::vector<ContactRecord> records;
   std::vector<Fading> fading;
-  VectorX greatest;                 ///< stiffness wanted, per rod [N/m]
+  VectorX greatest;                 ///< required stiffness, per rod [N/m]
   VectorX force;                    ///< per unknown [N]
-  double pressing = 0, change = 0;  ///< the greatest force, and by how much one has changed, of an equilibrium [N]
+  double pressing = 0, change = 0;  ///< greatest force in an equilibrium, and greatest change of a force [N]
 };
 
 class ContactStiffness {
  public:
   explicit ContactStiffness(const ContactProblem& problem) : problem_(problem) {}
 
-  /// Makes `scratch.records` those of what touches at the end of a step, whose stiffness follows the forces, and so
-  /// does that of contacts that begin, per rod. Returns the energy that this put in, no more than `spare`, and below
-  /// zero where it took some [J].
+  /// Sets `scratch.records` to the records of touching pairs at the end of a step. Their stiffness, and the stiffness
+  /// of new contacts per rod, follow the forces. Returns the added energy, which is at most `spare`, and negative if
+  /// energy was removed [J].
   double accept(const ContactSet& set, double spare, StiffnessScratch& scratch, VectorX& stiffness) const;
-  /// The same in an equilibrium, or on the way to one. Where a force wants a greater stiffness, on the way where
-  /// surfaces are deeper in each other than `deepest`, all contacts of their rods become stiffer, and press harder; in
-  /// an equilibrium those of rods that are far too stiff for their forces softer.
+  /// `accept` for an equilibrium, or for a point on the path to it. If a force needs a greater stiffness, all contacts
+  /// of its rods become stiffer and press harder; on the path, only where the overlap exceeds `deepest`. In an
+  /// equilibrium, contacts of rods that are far too stiff for their forces become softer.
   void accept_at_rest(const ContactSet& set, bool arrived, double deepest, StiffnessScratch& scratch,
                       VectorX& stiffness) const;
-  /// The greatest of the stiffnesses that forces want of contacts, over what they have; no less than 1.
+  /// Greatest ratio of required to present stiffness of any contact; at least 1.
   double wanted_ratio(const ContactSet& set) const;
-  /// The same for a step so short that stiffness stays as it is.
+  /// `accept` for a step so short that the stiffness does not change.
   void remember(const ContactSet& set, const VectorX& stiffness, std::vector<ContactRecord>& records) const;
-  /// Makes contacts stiffer that are too deep in `set`, records of the step's start and stiffness of contacts that
-  /// begin; `start`: what touches there. In an equilibrium those alone that `accept_at_rest` leaves as they are.
-  /// Returns the energy put in [J].
+  /// Stiffens the contacts of `set` with too much overlap: their records at the start of the step, and the stiffness of
+  /// new contacts. `start` is the set at the start of the step. In an equilibrium, only contacts are stiffened that
+  /// `accept_at_rest` does not change. Returns the added energy [J].
   double stiffen(const ContactSet& set, const ContactSet& start, bool at_rest, std::vector<ContactRecord>& records,
                  VectorX& stiffness) const;
-  /// Which contacts begin with the scene, of those that touch as the step begins, and which surfaces near each other
-  /// anew by then; gives them to `start`.
+  /// Marks in `start` the contacts that begin with the scene, among those that touch as the step begins, and the
+  /// surfaces that approach each other again.
   void renew(ContactSet& start, std::vector<ContactRecord>& records) const;
 
  private:

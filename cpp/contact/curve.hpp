@@ -4,24 +4,24 @@
 /// About an inner node 1 between nodes 0 and 2, and between the middles of both its edges, the curve is
 ///   c(s) = m + s u + (s^2 / 2) k,   s in [-1/2, 1/2],
 ///   m = x1,   u = (x2 - x0) / 2,   k = x0 - 2 x1 + x2.
-/// It is the quadratic B-spline of the nodes (m = x1 + k / 8), which has the edges as tangents at their middles, so
-/// that directions are continuous from piece to piece; moved by k / 8 to go through the nodes. On an evenly bent rod it
-/// is the arc through its nodes up to the fourth power of an edge's length; elsewhere pieces meet up to an eighth of
-/// the third difference of the nodes. A rod that lies flat touches at its nodes, each with the load that is lumped
-/// there: moments of |x| about a node, as of a stick that spins, are those of the trapezoidal rule. A curve that went
-/// nearer to the edges, m = x1 + k / 24, would have the arc of their length, but spread what presses on a node to both
-/// others. Beside the last node of a rod it is half an edge, straight, s = 0 there; of that a plane touches its ends
-/// only, and so the node, as the piece before has the other one.
+/// It is the quadratic B-spline of the nodes (m = x1 + k / 8), moved by k / 8 to pass through the nodes. The B-spline
+/// has the edges as tangents at their middles, so directions are continuous from piece to piece. On an evenly bent rod
+/// the curve is the arc through the nodes, up to the fourth power of an edge's length. Elsewhere pieces meet up to an
+/// eighth of the third difference of the nodes. A rod that lies flat touches at its nodes, each with the load that is
+/// lumped there. Moments of |x| about a node, as of a spinning stick, are then those of the trapezoidal rule. A curve
+/// nearer to the edges, m = x1 + k / 24, would have the arc length of the edges, but would spread the load of a node to
+/// both neighbours. Beside the last node of a rod the piece is half an edge, straight, with s = 0 at the node. A plane
+/// touches only its ends, and so only the node, because the other end belongs to the previous piece.
 ///
-/// The distance delta of an obstacle from c is taken at both ends of a piece and in its middle, and by the parabola
-/// through these elsewhere, g0 + g1 s + g2 s^2 / 2; the piece is as near as
-///   D = min over s of g0 + g1 s + (s^2 / 2) phi(g2),   phi(g) = (g + sqrt(g^2 + 4 a^2)) / 2,
-/// where phi, with a small length a, keeps the place s from jumping between both ends of a piece that lies along the
+/// The distance delta of an obstacle from c is computed at both ends of a piece and in its middle. Elsewhere it is the
+/// parabola through these values, g0 + g1 s + g2 s^2 / 2. The distance of the piece is
+///   D = min over s of g0 + g1 s + (s^2 / 2) phi(g2),   phi(g) = (g + sqrt(g^2 + 4 a^2)) / 2.
+/// The function phi, with a small length a, prevents a jump of s between both ends of a piece that lies along the
 /// obstacle. D and its gradient are continuous. All distances are in m.
 ///
-/// a: a piece that presses by its depth, p - g1 s at a tilt g1, presses on the whole at s = -g1 / (12 p), which is
-/// where D is taken for a = 12 p. Ends of a piece that is tilted by more are a / 8 farther than they are drawn, 3 p
-/// / 2. On half an edge, whose s is twice as long, a is a fourth of that.
+/// Choice of a: consider a piece whose pressure is proportional to its depth, p - g1 s at a tilt g1. Its resultant acts
+/// at s = -g1 / (12 p), and for a = 12 p this is the place where D is evaluated. At a larger tilt, the ends of the
+/// piece are farther by a / 8 = 3 p / 2 than drawn. On half an edge, whose s is twice as long, a is a fourth of that.
 
 #include "contact/obstacle.hpp"
 

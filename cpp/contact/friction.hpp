@@ -1,30 +1,30 @@
 #pragma once
 /// Friction of two surfaces that press against each other.
 ///
-/// The slip of a step is that of the two material points at the contact, S = J (q1 - q0), without its part along the
-/// normal: what the closest points of the centrelines (and an obstacle) move, and what their edges turn and spin,
+/// The slip of a step is the relative motion of the two material points at the contact, S = J (q1 - q0), without its
+/// normal part. It contains the motion of the closest points of the centrelines (and of an obstacle), and the rotation
+/// and spin of their edges,
 ///   S = sum_i w_i (x_i - x_i^0) + phi_a x r_a - phi_b x r_b,   phi = t x (e - e^0) / |e| + t (theta - theta^0),
-/// with r from the centreline to the surface. Where an obstacle touches a smooth curve (curve.hpp), w_i are its
-/// weights, and phi is that of both edges in the shares 1/2 - s and 1/2 + s. The force F on S goes back through the
-/// same J, so its work, F . S, is never negative, whatever the integrator. Under the midpoint rules t, |e| and the way
-/// between two rods, which r_b - r_a is, are those in the middle of the step: a rotation of both rods there is no slip,
-/// and so friction leaves their angular momentum as it is. In energy-momentum steps theta - theta^0 becomes the angle
-/// by which moments about an edge do work there, 2 tan((theta - theta^0) / 2) over (t^0 + t^1) . t / 2, t in the
-/// middle.
+/// with r from the centreline to the surface. If an obstacle touches a smooth curve (curve.hpp), w_i are the weights of
+/// the curve, and phi combines both edges in the shares 1/2 - s and 1/2 + s. The force F on S acts through the same J,
+/// so its work F . S is never negative, for any integrator. Under the midpoint rules t, |e| and the vector r_b - r_a
+/// between two rods are those in the middle of the step. A rotation of both rods is then no slip, and friction
+/// conserves their angular momentum. In energy-momentum steps theta - theta^0 becomes the angle over which moments
+/// about an edge do work, 2 tan((theta - theta^0) / 2) over (t^0 + t^1) . t / 2, with t in the middle.
 ///   implicit, lagged: F = mu N tanh(K |S| / (2 dt)) S / |S|, K = 15 / nu [Choi, dissertation, (5.7)-(5.14),
 ///                     there between centrelines]
 ///   anchored:         F = k_t (stick + S), of length mu N at most: an elastic stick that slips [Simo and Hughes 1998]
-/// Where an obstacle has other coefficients along a rod than across it, F is that of the greatest coefficient, mu,
-/// times the matrix (mu_t / mu) tt^T + (mu_n / mu) (1 - tt^T), t the rod's tangent along the surface, and mu_t one
-/// coefficient where S . t > 0, the rod slides towards its end, and another where it slides towards its start: for a
-/// slip in the direction s, F = N (mu_t (s . t) t + mu_n (s . n) n) [Hu, Nirody, Scott and Shelley 2009, eq. 1]. That
-/// matrix is symmetric and not negative, so F . S is not either; F is continuous, as F . t is nothing where mu_t
+/// An obstacle may have different coefficients along and across a rod. F is then the force for the greatest coefficient
+/// mu, times the matrix (mu_t / mu) tt^T + (mu_n / mu) (1 - tt^T). Here t is the rod's tangent along the surface. mu_t
+/// has one value if the rod slides towards its end (S . t > 0), and another if it slides towards its start. For a slip
+/// in the direction s, F = N (mu_t (s . t) t + mu_n (s . n) n) [Hu, Nirody, Scott and Shelley 2009, eq. 1]. The matrix
+/// is symmetric and positive semidefinite, so F . S is not negative. F is continuous, because F . t vanishes where mu_t
 /// changes.
 ///
-/// Rolling friction on an obstacle is a couple against the turning of a rod's surface there: the same laws, for the way
-/// R = (phi_a - phi) x r_a by which the slip is more than what the centreline moves, phi the obstacle's turn, with a
-/// coefficient of its own. Its force on R goes back through that part of J alone, so that the couple is mu_r r N at
-/// most [Johnson, Contact Mechanics, 1985, section 9.1], and nothing pushes the rod along.
+/// Rolling friction on an obstacle is a couple against the rotation of the rod's surface. It follows the same laws with
+/// its own coefficient. In place of the slip it uses R = (phi_a - phi) x r_a, the slip minus the motion of the
+/// centreline, where phi is the rotation of the obstacle. Its force acts on R alone. The couple is at most mu_r r N
+/// [Johnson, Contact Mechanics, 1985, section 9.1], and there is no net force along the rod.
 
 #include <cmath>
 #include <type_traits>
@@ -157,10 +157,10 @@ FrictionForce<Scalar> friction_force(const FrictionSetting& f, const Vec3<Scalar
 
 /// F = g(|S|^2, N) S, where an anchor's S has its stick in it.
 ///
-/// Friction has a corner where surfaces stop, and Newton's method goes to and fro round it: the tangent on one side
-/// knows nothing of the other. So F and S are linearised as unknowns of their own, F / g = S in place of F = g S [Chan,
-/// Golub and Mulet 1999]: where balance asks for less than the limit, a step predicts that while surfaces still slip,
-/// and the next derivative, g dS + 2 g' (S . dS) F / g with that F, holds them.
+/// Friction has a corner where surfaces stop, and Newton's method may alternate around it, because the tangent on one
+/// side does not contain the other side. The method therefore linearises F and S as separate unknowns, F / g = S in
+/// place of F = g S [Chan, Golub and Mulet 1999]. If balance needs less than the limit, the step predicts this F while
+/// the surfaces still slip. The next derivative, g dS + 2 g' (S . dS) F / g with that F, then holds them.
 struct ForceLaw {
   double factor = 0, by_square = 0, by_pressing = 0;  ///< g, g', g_N
 

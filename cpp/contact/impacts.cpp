@@ -46,12 +46,12 @@ double smooth_step(double x) {
 
 double smooth_slope(double x) { return x > 0.0 && x < 1.0 ? 6.0 * x * (1.0 - x) : 0.0; }
 
-/// Steps in a swing by which what an impact gives back, e of the speed, is known to a hundredth: in the one in which it
-/// turns round nothing of the speed is lost, which is the more the less is to be left.
+/// Number of steps per oscillation of a contact at which the restitution e of an impact is accurate to 1 %. The step in
+/// which the motion reverses loses no speed. Its share of the impact matters more for a smaller e.
 double steps_in_swing(double restitution) { return std::clamp(10.0 / std::max(restitution, 1e-3), 12.0, 40.0); }
 
-/// 1 for surfaces that have just met at a speed, 0 for those that rest on each other: of an impact that is over after
-/// so many swings.
+/// Elastic share of an impact that lasts `swings` oscillations: 1 for surfaces that have just met at a speed, 0 for
+/// surfaces that rest on each other.
 double share_within(const ContactProblem& problem, const Touching& t, double speed, double swings) {
   if (!(t.approach > 0.0)) return 0.0;
   const double over = swings * swing_time(problem, t) + kImpactSteps * problem.duration;

@@ -120,9 +120,9 @@ Slipping lagged_slipping(const ContactProblem& problem, const Touching& t, doubl
   return out;
 }
 
-/// Lagged: mu N tanh(K |S| / (2 dt)) along the slip S of the step. Semi-explicit: mu N gamma tanh(K s / (2 dt)) along
-/// the direction at the start, s = S . direction where that is positive: constant while surfaces slip on, and nothing
-/// where they would slip back, so that it never pushes them.
+/// Lagged friction is mu N tanh(K |S| / (2 dt)) along the slip S of the step. Semi-explicit friction is mu N gamma
+/// tanh(K s / (2 dt)) along the direction at the start. Here s = S . direction if that is positive, else 0.
+/// The force is then constant while surfaces keep slipping, and vanishes if they slip back, so it never drives them.
 LaggedForce lagged_force(const ContactProblem& problem, const Touching& t, double rate, const Vec3d* predicted) {
   const LaggedFriction& lagged = problem.lagged_friction[at(t.lagged)];
   const double limit = t.pair.friction * lagged.pressing;

@@ -1,16 +1,16 @@
 #pragma once
 /// Points and direction by which two rods press on each other in a step.
 ///
-/// Let the points closest at its start be (s0, t0), D0 apart, and those at its end (s1, t1), D1 apart. Between them, a
-/// share b of the way, lie the points (s, t) whose ways d0 and d1 from b to a at the start and the end obey
+/// Let (s0, t0) be the closest points at the start, at a distance D0, and (s1, t1) those at the end, at a distance D1.
+/// The points (s, t) lie between them at a share b. Their vectors d0 and d1 from b to a, at the start and the end, obey
 ///   |d1|^2 - |d0|^2 = D1^2 - D0^2.
-/// There is such a share from 0 to 1: as no points are closer than the closest, the left side is greater than the right
-/// one at b = 0, and less at b = 1; it is of second order in b. A force f w_i (d0 + d1) / (D0 + D1) on the nodes, w the
-/// weights of these points, then
-///   - acts along the way between the points in the middle of the step: it turns nothing there;
-///   - does the work f (D1 - D0), which, as E is convex, is never more than what contact gives: pressing gains no
-///     energy, however far surfaces slide;
-///   - is at right angles to the way of surfaces that slide past each other, whose share is a half: it brakes nothing.
+/// This equation is quadratic in b and has a solution from 0 to 1. No points are closer than the closest points, so the
+/// left side is greater than the right side at b = 0, and less at b = 1. Let w be the weights of these points. A force
+/// f w_i (d0 + d1) / (D0 + D1) on the nodes has three properties:
+///   - It acts along the line between the points in the middle of the step, so it has no moment there.
+///   - It does the work f (D1 - D0). As E is convex, this is never more than the contact energy supplies, however far
+///     surfaces slide.
+///   - It is perpendicular to the motion of surfaces that slide past each other (b = 1/2), so it does not brake them.
 
 #include <cmath>
 
@@ -26,7 +26,7 @@ struct MeanPoints {
   Scalar start, end;  ///< D0, D1 [m]
 };
 
-/// Points that are the closest in a configuration, and what of D^2 is the weights of `closest_points`.
+/// Closest points in a configuration, and the contribution of the weights of `closest_points` to D^2.
 template <class Scalar>
 struct PointsOfRods {
   Scalar s, t, spread, square;  ///< the last: D^2

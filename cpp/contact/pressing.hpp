@@ -8,11 +8,14 @@
 
 namespace withe {
 
-/// The share b of the gradient g0 of a distance D at the start of a step in a mean of it and of g1 at the end,
-///   m = (1 - b) g1 + b g0,   b = 1/2 + e d / (d^2 + a^2),   e = D1 - D0 - (p0 + p1) / 2,   d = p0 - p1,
-/// p = g . (x1 - x0), so that m . (x1 - x0) = D1 - D0, but for a, where b is between 0 and 1. Where d vanishes any
-/// share does that work, and without a, a little of what nodes add to p0, b would jump from one end to the other:
-/// forces with it, where a contact is about to lift off.
+/// Share b of the gradient g0 at the start of a step in the mean gradient m of a distance D. The mean, with the
+/// gradient g1 at the end, and the share are:
+///
+///   m = (1 - b) g1 + b g0,   b = 1/2 + e d / (d^2 + a^2),   e = D1 - D0 - (p0 + p1) / 2,   d = p0 - p1.
+///
+/// Here p = g . (x1 - x0), and b is limited to 0 to 1. Up to the effect of a, m . (x1 - x0) = D1 - D0 holds. If d
+/// vanishes, any share satisfies this equation. The small number a is a fraction of what nodes add to p0. Without it, b
+/// would jump from one end to the other, and so would the forces, at contacts that are about to lift off.
 struct StartShare {
   double value;
   double by_excess, by_apart;  ///< its derivatives by e and d; 0 where it is at an end

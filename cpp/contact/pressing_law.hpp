@@ -1,13 +1,13 @@
 #pragma once
 /// The force of a step on two surfaces that press against each other, from the energy k E(D) that their contact stores.
 ///
-/// With D0 and D1 the distances at the start and the end of a step, `first` is what takes the place of k E'(D1):
-///   a Q + (1 - a) k E'(D1),   Q = k (E(D1) - E(D0)) / (D1 - D0),
-/// in which a, the elastic share, is 1 for surfaces that have just met and 0 for those that rest on each other. Q does
-/// as much work over the step as contact stores, so that an impact gives back what it took, also where it lasts less
-/// than a step [Gonzalez 1996; Laursen and Chawla 1997]; E'(D1) does more, as E is convex, and lets surfaces rest. With
-/// a coefficient of restitution e below 1 the whole is times e^2 where surfaces part faster than a small speed, and
-/// less so below it: of the energy that it took a contact gives back e^2.
+/// With D0 and D1 the distances at the start and the end of a step, `first` replaces k E'(D1) by
+///   a Q + (1 - a) k E'(D1),   Q = k (E(D1) - E(D0)) / (D1 - D0).
+/// The elastic share a is 1 for surfaces that have just met, and 0 for surfaces that rest on each other. The work of Q
+/// over the step equals the change of the stored energy. An impact therefore returns its energy, even if it is shorter
+/// than a step [Gonzalez 1996; Laursen and Chawla 1997]. E'(D1) does more work, as E is convex, and lets surfaces rest.
+/// For a coefficient of restitution e below 1, the force is multiplied by e^2 while surfaces part faster than a small
+/// speed, and by a factor nearer to 1 below that speed. A contact then returns the share e^2 of its energy.
 
 #include <algorithm>
 #include <cmath>
