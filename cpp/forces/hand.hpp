@@ -3,18 +3,17 @@
 ///
 /// The hand, at p with its axes R, has grasped the point at p + R a, and the directors G = R F (columns d1, d2, t).
 /// Then
-///   E = (K u . u) / 2 + (C1 r1^2 + C2 r2^2 + C3 r3^2) / 2,   u = G^T (x - p - R a) - s,
-/// with x where the point is now, K = diag(k1, k2, k3) [N/m] along d1, d2, t, and r the strains of
-/// elasticity/bend_twist.hpp from G to the edge's frame, which are the rotation vector between them (exactly where the
-/// rod bends or twists alone): C1, C2, C3 [N m/rad] about d1, d2, t. s is by how much it has slipped.
+///   E = (K u . u) / 2 + (C1 r1^2 + C2 r2^2 + C3 r3^2) / 2,   u = G^T (x - p - R a) - s.
+/// Here x is the present position of the point, and s its slip. K = diag(k1, k2, k3) [N/m] acts along d1, d2, t. The
+/// strains r from G to the edge's frame are those of elasticity/bend_twist.hpp, with the stiffnesses C1, C2, C3
+/// [N m/rad] about d1, d2, t. They equal the rotation vector between the frames if the rod only bends or only twists.
 ///
-/// The force on the rod is f = -G K u at x. What the hand does when it moves by dp and turns by dw is its wrench about
-/// p,
+/// The force on the rod is f = -G K u at x. If the hand moves by dp and turns by dw, the work of its wrench about p is
 ///   f . dp + ((x - p) x f + m) . dw,
-/// with m the moment on the rod: both of a rigid motion leave E as it is.
+/// with m the moment on the rod. A rigid motion of hand and rod does not change E.
 ///
-/// Beyond a limit L the point slips: f keeps its direction, |f| = L, and s follows, so that K u is back at L (return
-/// mapping of elastic, perfectly plastic friction [Simo and Hughes 1998, section 1.4]).
+/// Beyond a limit L the point slips. The force f keeps its direction with |f| = L, and s grows so that K u stays at L
+/// (return mapping of elastic, perfectly plastic friction [Simo and Hughes 1998, section 1.4]).
 
 #include <algorithm>
 #include <cmath>

@@ -4,10 +4,11 @@
 /// on what turns, and its opposite on what it turns against: a motor's moment m [N m], stiffness k [N m/rad] towards
 /// the rest angle theta0 [rad], damping c [N m s/rad]. A servo is a stiffness whose rest angle is moved.
 ///
-/// T is linear in theta. Over a step of dt it is taken at its end, or at the middle angle (theta0 + theta1) / 2, where
-/// its work T (theta1 - theta0) is exactly what k (theta - theta0)^2 / 2 loses, less what the damper takes: that of the
-/// midpoint rule is a discrete gradient [Gonzalez 1996, J. Nonlinear Sci. 6]. Where frames that a plane lets turn by x
-/// and y are measured by their Cayley vectors 2 tan(x / 2), T is scaled so that its work is still that:
+/// T is linear in theta. A step of dt uses the angle at its end, or the middle angle (theta0 + theta1) / 2. With the
+/// middle angle the work T (theta1 - theta0) is exactly the loss of k (theta - theta0)^2 / 2, minus the dissipation of
+/// the damper. The force of the midpoint rule is therefore a discrete gradient [Gonzalez 1996, J. Nonlinear Sci. 6]. In
+/// a plane, frames that turn by x and y are measured by their Cayley vectors 2 tan(x / 2). T is then scaled by s to
+/// keep this work:
 ///   T (x - y) = T s (2 tan(x / 2) - 2 tan(y / 2)).
 
 #include <cmath>

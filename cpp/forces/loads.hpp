@@ -1,14 +1,14 @@
 #pragma once
-/// Loads that a user puts on: forces, moments, distributed loads, dead or following their edge, and pressure.
+/// Loads of the user: forces, moments, distributed loads, dead or following their edge, and pressure.
 ///
-/// A moment M does the work M . (t x dt + t dpsi) on an edge, so it is a pair of nodal forces and a torque
-/// on theta; on a frame it is J(w)^T M, and on what turns about a hinge's axis a of it M . a on the hinge too. In space
-/// neither has a symmetric Jacobian; in a plane both do. One that follows turns with the edge or frame that it acts on,
-/// dM = dphi x M with dphi that frame's turn.
+/// A moment M does the work M . (t x dt + t dpsi) on an edge, so it is a pair of nodal forces and a torque on theta. On
+/// a frame it is J(w)^T M. On the turning part of a hinge with axis a it also adds M . a to the hinge. In space the
+/// Jacobians are not symmetric; in a plane they are. A following moment turns with its edge or frame, dM = dphi x M,
+/// where dphi is the rotation of the frame.
 ///
-/// A pressure p n pushes an edge e by p n x e, half of it on either node: per present length p, normal to the edge and
-/// to n. Along a closed rod that is minus the gradient of p times the area that it goes round about n, so that the
-/// Jacobian is symmetric; the ends of an open one leave an antisymmetric part.
+/// A pressure p n pushes an edge e by p n x e, half of it on either node. The force per present length is p, normal to
+/// the edge and to n. Along a closed rod the force is minus the gradient of p times the area that the rod encloses
+/// about n, so the Jacobian is symmetric. The ends of an open rod leave an antisymmetric part.
 
 #include "elasticity/elements.hpp"
 

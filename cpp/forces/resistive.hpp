@@ -20,8 +20,9 @@ struct ResistiveCoefficients {
 /// rod is too thick for either.
 ResistiveCoefficients resistive_coefficients(double radius, double length, double wavelength);
 
-/// Minus the force on an edge's nodes, each half of it, over a step in which they move by `change` within `duration`;
-/// its derivative with respect to where they end is exact, and not symmetric, for the tangent there acts.
+/// Minus the force on an edge's nodes, half of it on each, over a step in which they move by `change` within
+/// `duration`. The derivative by their positions at the end is exact. It is not symmetric, because the force depends on
+/// the tangent at the end.
 struct ResistiveEdge {
   int dimension;            ///< 3, or 2 in a plane
   double along, across;     ///< resistance of half the edge [N s / m]

@@ -1,20 +1,21 @@
 #pragma once
 /// A ring that a rod passes through: it holds the rod across, and lets it slide.
 ///
-/// The rod is the smooth curve c of geometry/rod_spline.hpp. It passes the ring, at p, where it is nearest,
+/// The rod is the smooth curve c of geometry/rod_spline.hpp. Its nearest point to the ring at p is its place in the
+/// ring,
 ///   r = c - p,   r . c' = 0,   so that with the nodes   D da = -(c' . dc + r . dc').
 /// The ring has the energy
-///   E = k r . r / 2 + k u^2 / 2,   u = s0 - fed - slip - s,
-/// the second part where something holds the rod along itself: friction, or a drive that feeds it; fed is the length at
-/// rest that has gone towards the end of the rod since it passed the ring at s0. By node i, of weights w_i in c and
-/// w_i' in c',
+///   E = k r . r / 2 + k u^2 / 2,   u = s0 - fed - slip - s.
+/// The second part exists only if friction, or a drive that feeds the rod, holds the rod along itself. `fed` is the
+/// rest length that has moved towards the end of the rod since the rod passed the ring at s0. On node i, with weights
+/// w_i in c and w_i' in c', the force is minus
 ///   dE/dx_i = k w_i r + T (s' / D) (w_i c' + w_i' r),   T = k u,
-/// since a makes the first part least: frictionless, the force is across the rod. E knows nothing of the ring's axes,
-/// so that the forces have no moment about p.
+/// because the first part of E is minimal with respect to a. Without friction the force is perpendicular to the rod. E
+/// does not depend on the axes of the ring, so the forces have no moment about p.
 ///
-/// T pulls the rod back by P = T s' |c'| / D (T itself, where the rod is not stretched). Friction bears
-/// |P| <= mu k |r| [Coulomb], a drive its force limit. Beyond it slip follows, so that P is at the limit (return
-/// mapping, as in forces/hand.hpp).
+/// T pulls the rod back by P = T s' |c'| / D (by T itself if the rod is not stretched). Friction holds up to
+/// |P| = mu k |r| [Coulomb], and a drive up to its force limit. Beyond the limit the slip grows so that P stays at the
+/// limit (return mapping, as in forces/hand.hpp).
 
 #include <cmath>
 

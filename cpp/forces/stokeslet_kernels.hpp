@@ -4,11 +4,12 @@
 ///
 /// A force per length f on the segment from a to b, linear from f_a to f_b, moves the fluid at x by
 ///   8 pi mu u(x) = integral of [(1/R + eps^2 / R^3) f + (f . r) r / R^3] ds,  R^2 = r^2 + eps^2,  r = x - y(s)
-/// [Cortez 2018, J. Comput. Phys. 375, eq. 3-4]. With e the segment's direction, r = p + w e and p normal to e, w runs
-/// from w0 = (x - a) . e down to w1 = w0 - L, R^2 = w^2 + D^2 with D^2 = p^2 + eps^2, and of w^m / R^n
+/// [Cortez 2018, J. Comput. Phys. 375, eq. 3-4]. Let e be the segment's direction, and r = p + w e with p normal to e.
+/// Then w runs from w0 = (x - a) . e down to w1 = w0 - L, and R^2 = w^2 + D^2 with D^2 = p^2 + eps^2. The integrals of
+/// w^m / R^n are J for n = 1 and K for n = 3:
 ///   J0 = 2 atanh(L / (R0 + R1)),  J1 = R0 - R1,  K0 = (w0/R0 - w1/R1) / D^2,  K1 = 1/R1 - 1/R0,
-///   K2 = J0 - D^2 K0,  K3 = J1 + D^2 (1/R0 - 1/R1)
-/// are the integrals, J for n = 1, K for n = 3. The parts that f_a and f_b have follow from those of m and m + 1.
+///   K2 = J0 - D^2 K0,  K3 = J1 + D^2 (1/R0 - 1/R1).
+/// The contributions of f_a and f_b follow from those of m and m + 1.
 
 #include <cstddef>
 

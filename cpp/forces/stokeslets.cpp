@@ -22,8 +22,8 @@ constexpr double kFinest = 1.0 / 3.0;
 
 std::size_t at(std::ptrdiff_t i) { return static_cast<std::size_t>(i); }
 
-/// Modified Bessel function of the second kind, of order 0 or 1: the integral of exp(-x cosh t) cosh(order t) over t >
-/// 0, by the trapezoidal rule, whose error falls faster than any power of its step.
+/// Modified Bessel function of the second kind, of order 0 or 1: the integral of exp(-x cosh t) cosh(order t) over
+/// positive t. The error of the trapezoidal rule falls faster than any power of its step.
 double bessel_k(int order, double x) {
   constexpr double kStep = 0.1;
   double sum = 0.5 * std::exp(-x);
@@ -31,7 +31,7 @@ double bessel_k(int order, double x) {
   return kStep * sum;
 }
 
-/// Per length and viscosity, across a line, to waves of wavenumber 1 / regularization.
+/// Resistance per length and viscosity, across a line, to waves of wavenumber 1 / regularization.
 double smooth_resistance() { return 8.0 * std::numbers::pi / (2.0 * bessel_k(0, 1.0) + 2.0 * bessel_k(1, 1.0)); }
 
 }  // namespace

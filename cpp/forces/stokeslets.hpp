@@ -1,15 +1,15 @@
 #pragma once
 /// The force of a viscous fluid on slender rods that move each other through it.
 ///
-/// Regularized Stokeslet segments [Cortez 2018, J. Comput. Phys. 375]: the fluid moves as a force per length on the
-/// centrelines makes it move, linear along each edge, and nodes move with it. With f_j the force per length at node j
-/// and w_j its length (half of its edges), that is 8 pi mu v_i = sum of M_ij f_j. The forces on nodes are w_j f_j, so
-/// their mobility is B_ij = M_ij / w_j: by reciprocity it is symmetric but for what its quadrature leaves, and what is
-/// solved here is A = (B + B^T) / 2, which is positive definite: rods never gain energy from a fluid at rest, and what
-/// one rod does to another, that does to it. The change is of the order of the quadrature.
+/// Regularized Stokeslet segments [Cortez 2018, J. Comput. Phys. 375]: a force per length on the centrelines, linear
+/// along each edge, moves the fluid, and nodes move with the fluid. With f_j the force per length at node j and w_j its
+/// length (half of its edges), 8 pi mu v_i = sum of M_ij f_j. The forces on nodes are w_j f_j, so their mobility is
+/// B_ij = M_ij / w_j. By reciprocity B is symmetric, up to the error of its quadrature. The solver uses A = (B + B^T) /
+/// 2, which is positive definite; the change is of the order of the quadrature error. Rods therefore never gain energy
+/// from a fluid at rest, and two rods act on each other equally.
 ///
-/// Without inertia the fluid answers at once: force = -8 pi mu A^-1 v, with A at given positions. Spin about tangents
-/// meets no resistance.
+/// Without inertia the fluid responds at once: force = -8 pi mu A^-1 v, with A at given positions. The spin about
+/// tangents meets no resistance.
 
 #include <vector>
 
@@ -18,31 +18,33 @@
 
 namespace withe {
 
-/// Resistance per length and viscosity to waves of wavenumber k along an infinite line: the smaller mobility is that
-/// along it or across it, 8 pi / min(4 K0(x), 2 K0(x) + 2 x K1(x)), x = k times the regularization, K modified Bessel
-/// functions; from the transform of the kernel in stokeslet_kernels.hpp.
+/// Resistance per length and viscosity to waves of wavenumber k along an infinite line. It comes from the smaller of
+/// the mobilities along and across the line: 8 pi / min(4 K0(x), 2 K0(x) + 2 x K1(x)). Here x is k times the
+/// regularization, and K0, K1 are modified Bessel functions. The formula follows from the transform of the kernel in
+/// stokeslet_kernels.hpp.
 double wave_resistance(double x);
 
-/// Refuses a regularization that is not positive, or of more than three edges; std::invalid_argument says why.
+/// Throws std::invalid_argument for a regularization that is not positive, or longer than three edges.
 void check_regularization(const Model& model, double regularization);
 
 class StokesletFluid {
  public:
   explicit StokesletFluid(const Model& model);
 
-  /// Force per viscosity, -8 pi A^-1 v, on the nodes at q that move with `velocity`; both per unknown. False where no
-  /// solution was found.
+  /// Force per viscosity, -8 pi A^-1 v, on the nodes at q that move with `velocity`; both per unknown. Returns false if
+  /// the solution fails.
   bool solve(const VectorX& q, const VectorX& velocity, VectorX& force);
-  /// Length over which a point force is spread [m]; another one forgets earlier solutions.
+  /// Length over which a point force is spread [m]. Setting another length discards earlier solutions.
   double regularization() const { return memory_.regularization; }
   void set_regularization(double regularization);
-  /// Factor by which the local drag must grow, where rods nearly touch and move against each other, so that the
-  /// resistance is at most `limit` times that and the inertia, mass over viscosity and step (per node) [m]. Looked for
-  /// once in a while, at the positions of the last solution; a power of sqrt(2), or 1.
+  /// Factor by which the local drag must grow if rods nearly touch and move against each other. The fluid's resistance
+  /// is then at most `limit` times the sum of local drag and inertia. `inertia` is mass over viscosity and time step
+  /// (per node) [m]. The factor is 1 or a power of sqrt(2). It is updated occasionally, at the positions of the last
+  /// solution.
   double excess(const VectorX& inertia, double limit);
-  /// A drag that couples neighbours only and is no smaller than the fluid's on any motion of a rod, but for a quarter
-  /// at its ends [N s / m]: that of waves of wavenumber 1 / regularization across, and for shorter ones, up to two
-  /// edges long, what they meet more.
+  /// A drag that couples neighbours only. It is at least the fluid's drag for any motion of a rod, except for a quarter
+  /// at its ends [N s / m]. It is the drag of transverse waves of wavenumber 1 / regularization, plus the excess of
+  /// shorter waves, down to two edges.
   void set_local_drag(double viscosity, MassMatrix& drag) const;
   /// A at q, three rows a node [1 / m]: 8 pi mu times velocity per force.
   Eigen::MatrixXd mobility(const VectorX& q);

@@ -62,8 +62,8 @@ Carried carried_by(const Segment& segment, int end, const Pull<width>& pull) {
   return out;
 }
 
-/// Pairs of edges that follow each other along a rod, whatever holds it between them, or bend against each other as
-/// those of rods in a row do; and the signs of their tangents on that way.
+/// Pairs of neighbouring edges, and the signs of their tangents in this order. Edges are neighbours if they follow each
+/// other along a rod, with or without a support between them, or if a stencil of rods in a row joins them.
 using Neighbours = std::map<std::pair<int, int>, std::pair<double, double>>;
 
 Neighbours neighbours_of(const Model& model) {

@@ -1,24 +1,25 @@
 #pragma once
-/// A tendon runs without friction through guides on rods and has the same tension T [N] all along [Rucker and Webster
-/// 2011, IEEE Trans. Robot. 27]. A guide is at p = x + r with r = a d1 + b d2, x a place on an edge and (a, b) [m] an
-/// offset along the edge's material directors; at a rod's end that is rigid with a joint or a clamp it is on that. The
-/// tendon's forces are minus the gradient of T L, with its length L, a sum over pieces from one guide to the next:
-///   L = |p' - p|,   straight; or, between neighbours of one rod, with r = r' - r, s = t + t', p = s . r, B = p / |s|,
+/// A tendon runs without friction through guides on rods and has one tension T [N] [Rucker and Webster 2011, IEEE
+/// Trans. Robot. 27]. A guide is at p = x + r with r = a d1 + b d2, where x is a place on an edge and (a, b) [m] an
+/// offset along the edge's material directors. At a rod's end that is rigid with a joint or a clamp, the guide is on
+/// that joint or clamp. The tendon's forces are minus the gradient of T L. Its length L is a sum over pieces from one
+/// guide to the next. A straight piece has L = |p' - p|. A piece between neighbours of one rod has
 ///   L^2 = (l + A)^2 + r^2 - B^2,   A = 4 B / 3 - p / 6,
-/// l from the middle of an edge to that of the next, or to the wall: half of each edge, but 5/12 at a frame and 7/12 on
-/// the other side of that edge, as `Model::half_share` has it, for so do edges turn. That is what a tendon beside the
-/// smooth rod has there: where edges turn by phi towards it, A is -h phi but for phi^5, B the chord -2 h sin(phi / 2),
-/// and r^2 - B^2 is what twist and winding add. p' - p would be shorter by l phi^2 / 8, no less than h phi on coarse
-/// meshes.
+/// with r = r' - r, s = t + t', p = s . r and B = p / |s|. The length l reaches from the middle of an edge to the
+/// middle of the next edge, or to the wall. It is half of each edge, but 5/12 at a frame and 7/12 on the other side of
+/// that edge, as in `Model::half_share`, because edges turn in these shares. A tendon beside the smooth rod has this
+/// length. For edges that turn by phi towards the tendon, A is -h phi up to phi^5, and B is the chord -2 h sin(phi /
+/// 2). r^2 - B^2 is the contribution of twist and winding. The distance p' - p would be shorter by l phi^2 / 8, which
+/// on coarse meshes is as large as h phi.
 ///
-/// Forces are those of a step between two configurations, as means (of A, B, p, 1 / |s|, vectors, L), which for both
-/// the same are the gradient. With a = l + A, b = 4 a / 3 - B and m = b / |s| - a / 6,
+/// The forces of a step use means over both configurations (of A, B, p, 1 / |s|, vectors, L). For two equal
+/// configurations they are the gradient. With a = l + A, b = 4 a / 3 - B and m = b / |s| - a / 6, the forces
 ///   on arms -+ (T / L) (r + m s),   on tangents (T / L) (m r - b p s / (|s| |s0| |s1|)),   along edges (T / L) a / 2
-/// are a discrete gradient, whose work is T times what the length changes by; straight, T D / L on arms. Moments are in
-/// balance, and in energy-momentum steps what carries vectors makes of its moment what works just that over its finite
-/// turn, see `MovingEdge` and `HingeArm`.
+/// are a discrete gradient: their work is T times the change of the length. For a straight piece the force is T D / L
+/// on arms. Moments are in balance. In energy-momentum steps, an edge or frame turns its moment into forces that do
+/// exactly this work over its finite rotation; see `MovingEdge` and `HingeArm`.
 ///
-/// What carries a vector v with a force f on it has the moment m = v x f, and
+/// An edge or frame with a vector v, on which a force f acts, has the moment m = v x f, and
 ///   d^2 (v . f) = (f . w)(v . w) - (f . v) |w|^2 + m . d(w)
 /// as it turns by w. An edge turns by w = t x de / l + t (d theta + spin . de), so that
 ///   m . d(w) = - 2 (m . (t x de)) (t . de) / l^2 + (m - (m . t) t) . de (d theta + spin . de) / l
@@ -28,7 +29,7 @@
 
 namespace withe {
 
-/// Two edges that share no node have most unknowns.
+/// Two edges without a common node have the most unknowns.
 constexpr int kTendonUnknowns = 14;
 using TendonLocal = LocalOf<kTendonUnknowns>;
 

@@ -9,8 +9,9 @@
 
 namespace withe {
 
-/// Coordinates of what carries the guides: of each the vector and the angle of its edge, or the Cayley vector of its
-/// frame and its hinge's angle, in a plane that of the frame; and, of a straight piece, where its place moves.
+/// Coordinates of the two seats of a segment. An edge has its vector and its angle. A frame has its Cayley vector and
+/// the angle of its hinge; in a plane, the angle of the frame. A straight segment also has the displacements of its
+/// places.
 constexpr int kTurns = 4, kSmooth = 2 * kTurns, kStraight = kSmooth + 6;
 
 template <int width>
@@ -218,8 +219,8 @@ struct Changes {
   }
 };
 
-/// Forces of a tension on arms (the second's; the first has the opposite), on tangents and on l,
-/// over a step from one segment to another, or at one where both are the same; and their derivatives by the second.
+/// Forces of a tension on arms (that of the second seat; the first has the opposite), on tangents and on l. They act
+/// over a step from one segment to another, or at one segment if both are equal. Derivatives are by the second segment.
 template <int width>
 struct Pull {
   Vector3 g = Vector3::Zero(), y = Vector3::Zero();

@@ -1,11 +1,11 @@
 #pragma once
-/// The arithmetic of band factorisations without exchanges, by the instruction set in use: A = L U, the diagonal of U
-/// one, row after row [Crout's order; Golub and Van Loan 2013, sec. 3.2.9]. Of a symmetric matrix L^T = D U, and half
-/// of the work is left. Raw pointers only: the kernels behind share no code with the rest.
+/// The arithmetic of band factorisations without exchanges, for the instruction set in use: A = L U, with a unit
+/// diagonal of U, row by row [Crout's order; Golub and Van Loan 2013, sec. 3.2.9]. For a symmetric matrix L^T = D U,
+/// which halves the work. Raw pointers only: the kernels behind share no code with the rest.
 ///
-/// A row is complete in registers before it is stored. Rows lie `stride` numbers apart, column 0 of row 0 at the
-/// pointer, so that packs of columns begin at multiples of their length in every row, and each is read as it was last
-/// written: a read across two that are on their way to memory waits for both.
+/// A row is complete in registers before it is stored. Rows lie `stride` numbers apart, with column 0 of row 0 at the
+/// pointer. Packs of columns therefore begin at multiples of their length in every row, and each is read as it was last
+/// written. A read across two packs that are still on their way to memory would wait for both.
 
 #include <cstddef>
 

@@ -1,8 +1,8 @@
 // Derivatives of elastic and viscous forces by stiffnesses, natural strains, viscous times and the start of the step.
 //
-// Forces are sums of k (s - n) g over strains s with gradients g, and of kv r g, kv = k tau / h, with r the strain's
-// change from the start: s - s0 under backward Euler, (s1 - s0) / 2 under the midpoint rules. Everything but g is a
-// number, so what multiplies rows^T is (s - n) times `along` = rows^T g, and so on.
+// Forces are sums of k (s - n) g over strains s with gradients g, and of kv r g with kv = k tau / h. Here r is the
+// change of the strain since the start: s - s0 under backward Euler, (s1 - s0) / 2 under the midpoint rules. All
+// factors except g are numbers. The product with rows^T is therefore (s - n) times `along` = rows^T g, and so on.
 
 #include "geometry/rotation.hpp"
 #include "steps/strain_adjoint.hpp"

@@ -172,8 +172,8 @@ double ElasticForces::dissipated(const StepProblem& problem, const StepData& dat
   return work;
 }
 
-/// Viscosity kv / h (s - s0) acts on the mean strain s of a step, h half of its length, and so by half of what the
-/// strain changes by: what it takes is kv / (2 h) (s1 - s0)^2.
+/// Viscosity kv / h (s - s0) acts on the mean strain s of a step, where h is half the length of the step. It therefore
+/// acts on half of the change of the strain, and dissipates kv / (2 h) (s1 - s0)^2.
 double ElasticForces::discrete_dissipation(const StepProblem& problem, const StepData& data) {
   const Model& model = problem.model;
   const ElasticCoefficients& viscous = problem.viscous;
@@ -241,8 +241,8 @@ void ElasticForces::add_discrete_gradient(const StepProblem& problem, StepData& 
   data.elastic_rows = data.gradient.head(model.dof_count);
 }
 
-/// Under the midpoint rules the rate of a strain s is that between the ends, (s1 - s0) / dt, where the matrix has that
-/// of the middle: k g g^T for k g g1^T, g and g1 the gradients of s in the middle and at the end.
+/// Under the midpoint rules the rate of a strain s is the difference of the ends, (s1 - s0) / dt. The matrix contains
+/// k g g^T in place of k g g1^T, where g and g1 are the gradients of s in the middle and at the end.
 void ElasticForces::add_rate_slopes(const StepProblem& problem, StepData& data, const Assembler& assembler,
                                     std::span<double> values) const {
   const Model& model = problem.model;

@@ -1,15 +1,19 @@
 // The force of a viscous fluid.
 //
-// Stokeslets: the force of the fluid is F(v) = -R v, with R dense. With velocities v* guessed before the step and u
-// those of the step, D (v* - u) - R v* acts, D a local drag: at u = v* that is F, and what it leaves is (D - R) (u -
-// v*), of the order of the scheme where v* is. On modes that neither mass nor stiffness hold back, u = (1 - R / D) v*
-// under backward Euler, where v* is the last u: stable for R up to 2 D, and beyond where mass over the step or
-// stiffness times it is as great. Under the midpoint rules, where v* is extrapolated from the last two, the roots of
-// x^2 = (1 - R / D) (2 x - 1) stay in the unit circle for R up to 4/3 D (stiffness does not help a velocity that
-// changes sign each step). D is as great as R along single rods; rods that nearly touch resist each other more, and
-// D grows where mass over the step is too small for that. The midpoint rules then take the last u for v*, which is
-// stable for R up to 2 D whatever the stiffness, but of first order: extrapolated, slow motions that meet a tenth of D
-// would grow.
+// Stokeslets: the force of the fluid is F(v) = -R v, with R dense. Let v* be velocities guessed before the step, u the
+// velocities of the step, and D a local drag. The step uses D (v* - u) - R v*. At u = v* this is F, and the remainder
+// (D - R) (u - v*) has the order of v*.
+//
+// Stability matters for modes that neither mass nor stiffness resists.
+//
+// - Backward Euler: v* is the last u, so u = (1 - R / D) v*. This is stable for R up to 2 D, and beyond if mass over
+//   the step, or stiffness times the step, is as large.
+// - Midpoint rules: v* is extrapolated from the last two velocities. The roots of x^2 = (1 - R / D) (2 x - 1) stay in
+//   the unit circle for R up to 4/3 D. Stiffness does not help, because the velocity changes sign each step.
+//
+// D is as large as R along single rods. Rods that nearly touch have more resistance, and D grows where mass over the
+// step is too small for that. The midpoint rules then use the last u for v*, which is stable for R up to 2 D at any
+// stiffness, but of first order. With extrapolation, slow motions with a resistance of a tenth of D would grow.
 
 #include "steps/fluid_forces.hpp"
 

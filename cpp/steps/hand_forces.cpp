@@ -76,8 +76,8 @@ SupportPose HandForces::end_pose(const StepProblem& problem, int support) const 
   return end.empty() ? SupportPose{start.position, start.rotation} : end[at(support)];
 }
 
-/// In an energy-momentum step u and G are the means of both ends: with w the Cayley vector of the hand's turn, u1 - u0
-/// = G^T (dx - dp - w x (x - p)), so that the work of -f is what K u . u / 2 changes by.
+/// In an energy-momentum step u and G are the means of both ends. With w the Cayley vector of the hand's rotation,
+/// u1 - u0 = G^T (dx - dp - w x (x - p)). The work of -f is therefore the change of K u . u / 2.
 HandForces::Piece HandForces::piece(const StepProblem& problem, const StepData& data, int element) const {
   const Held& held = held_[at(element)];
   const Support& support = model_.supports[at(held.support)];

@@ -100,8 +100,9 @@ void HandForces::add_planar_moment_adjoint(const StepProblem& problem, const Ste
                      adjoint.coefficients.hand_stiffness);
 }
 
-/// The moment m on the edge over an energy-momentum step: b . m is what its rows make of b x e on its vector, e that in
-/// the middle, and of b . t on its angle; see MovingEdge. The hand feels the opposite moment.
+/// Adjoint of the moment m on the edge over an energy-momentum step. The product b . m follows from the rows of m. One
+/// part comes from b x e on the vector of the edge, with e in the middle of the step, and the other from b . t on its
+/// angle; see MovingEdge. The hand receives the opposite moment.
 void HandForces::add_discrete_moment_adjoint(const StepProblem& problem, const StepData& data, int element,
                                              const Vector3& by_moment, DiscreteAdjoint& discrete, StepAdjoint& adjoint,
                                              VectorX& by_z) const {

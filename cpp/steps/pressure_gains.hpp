@@ -1,9 +1,9 @@
 #pragma once
-/// Energy that backward Euler steps add where edges are under pressure.
+/// Energy that backward Euler steps add where edges are under compression.
 ///
-/// The forces of a step are those at its end, so that it takes energy from all that is convex. An edge under pressure
-/// is not: as it turns by an angle a it gives way by l0 (1 - cos a), over which its force -n at the end of the step
-/// works more than the energy that the edge gives, by n l0 (1 - cos a).
+/// The forces of a step are those at its end, so a step takes energy from every convex potential. The potential of an
+/// edge under compression is not convex. As the edge turns by an angle a it yields by l0 (1 - cos a). Over this length
+/// its force -n at the end of the step does n l0 (1 - cos a) more work than the edge loses energy.
 
 #include "assembly/assembler.hpp"
 #include "steps/step_problem.hpp"
@@ -13,7 +13,7 @@ namespace withe {
 /// Growth of kinetic and elastic energy beyond the work of forces [J], per connected component, and scratch.
 struct PressureGains {
   VectorX gains;
-  VectorX taken;  ///< from the motion of what is free, |v1 - v0|^2 / 2
+  VectorX taken;  ///< |v1 - v0|^2 / 2 of free unknowns, the energy that the step removes
   VectorX change, momentum;
 };
 

@@ -18,8 +18,8 @@ inline Angles half_angles(const Model& model, int h) {
   return model.planar() ? Angles{} : Angles{1, {3, 0}, {model.half[at(h)].edge, 0}};
 }
 
-/// A turn of what is attached to a half stencil's frame, by a rotation vector in the axes of the drawn scene, in those
-/// of a configuration with unknowns q: through the frame's turn and its hinge's.
+/// Matrix that maps a rotation of a half stencil's attached part, as a rotation vector in the axes of the drawn scene,
+/// to the axes of a configuration with unknowns q. It includes the rotation of the frame and of its hinge.
 inline Matrix3 attached_axes(const Model& model, const Configuration& c, const VectorX& q, int h) {
   if (model.planar()) return Matrix3::Identity();
   const FrameStencil& half = model.half[at(h)];

@@ -1,11 +1,11 @@
 #pragma once
-/// Force of a ring over one step, see forces/ring.hpp, with its derivatives by the nodes around it.
+/// Force of a ring over one step, see forces/ring.hpp, and its derivatives by the nodes around the ring.
 ///
-/// In an energy-momentum step forces are those in the middle z, and along the displacements d_i of nodes relative to
-/// the ring besides, b |w_i| d_i, so that their work is what the energy changes by [Gonzalez 1996, J. Nonlinear Sci. 6,
-/// section 3]:
+/// An energy-momentum step uses the forces F_i at the middle z, plus forces b |w_i| d_i along the displacements d_i of
+/// nodes relative to the ring. The factor b makes their work equal to the change of the energy [Gonzalez 1996,
+/// J. Nonlinear Sci. 6, section 3]:
 ///   b sum |w_i| d_i . d_i = k (r0 + r1) / 2 . (r1 - r0) - T (s1 - s0) - sum F_i . d_i,
-/// with T of the mean of u at both ends.
+/// where T comes from the mean of u at both ends.
 
 #include <limits>
 

@@ -10,7 +10,7 @@ namespace withe {
 /// One row per hand: along and about its axes.
 using MatrixX6 = Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::RowMajor>;
 
-/// Derivatives of a scalar by the coefficients that the equations of a step are made of.
+/// Derivatives of a scalar by the coefficients of a step's equations.
 struct CoefficientAdjoint {
   VectorX stretch_stiffness, stretch_time;  ///< per edge: by EA [1/N] and by viscous time [1/s]
   VectorX stretch_natural;                  ///< per edge, by the natural strain
@@ -23,18 +23,19 @@ struct CoefficientAdjoint {
   VectorX spring_stiffness, spring_rest_length, spring_damping;            ///< per spring
   VectorX joint_stiffness, joint_rest_angle, joint_damping, joint_moment;  ///< per revolute joint
   VectorX tendon_tension;                                                  ///< per tendon
-  VectorX edge_mass;                          ///< of contacts, by line density times length
-  double gravity_size = 0;                    ///< of contacts, by that of gravity [s^2/m]
+  VectorX edge_mass;                          ///< by line density times length, in contacts
+  double gravity_size = 0;                    ///< by the magnitude of gravity, in contacts [s^2/m]
   double fluid_viscosity = 0;                 ///< [1/(Pa s)]
   double friction = 0, slip_tolerance = 0;    ///< of the scene [-], [s/m]
   MatrixX3 obstacle_friction, pair_friction;  ///< per obstacle, per pair of bodies [-]
   VectorX obstacle_rolling;                   ///< per obstacle [-]
   MatrixX6 hand_stiffness;                    ///< per support, see `HandDescription` [m/N], [rad/(N m)]
   VectorX hand_limit;                         ///< per support [1/N]
-  std::vector<MatrixX2> natural_curvature;    ///< per rod and stencil, by the smooth one, where it is read out [m]
-  VectorX rest_length;  ///< per edge, by that in the axial strain, in loads along rods, and where it is read out [1/m]
-  /// By rotation vectors [1/rad], in the axes of the drawn scene: per half stencil, by how what is attached to its
-  /// frame is turned there; per edge, by its frame as it was drawn, as far as nothing above follows from that.
+  std::vector<MatrixX2> natural_curvature;    ///< per rod and stencil, by the smooth curvature, through read-outs [m]
+  VectorX rest_length;  ///< per edge, through axial strain, loads along rods and read-outs [1/m]
+  /// Derivatives by rotation vectors in the axes of the drawn scene [1/rad]. `attachment` is per half stencil, by the
+  /// rotation of the part that is attached to its frame. `edge_turn` is per edge, by its frame in the drawing, without
+  /// the effects through the members above.
   MatrixX3 attachment, edge_turn;
   MatrixX2 planar_components;  ///< per rod, by `Model::planar_components`
 

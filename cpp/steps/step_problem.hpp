@@ -1,5 +1,5 @@
 #pragma once
-/// The problem that one step must solve, as a value, and what an evaluation of it finds.
+/// The problem that one step must solve, as a value, and the results of its evaluation.
 ///
 /// Every implicit scheme solves for an inner configuration z over an interval h:
 ///   M ((z - q0) / h^2 - v0 / h) + grad V(z) + D (z - q0) / h - f = 0,
@@ -7,8 +7,8 @@
 /// over half the step, then extrapolated). Statics is the same without mass. The energy-momentum scheme
 /// replaces grad V by a discrete gradient between q0 and q1 = 2 z - q0:
 ///   stretching: EA (eps0 + eps1) / 2 (e0 + e1) / (|e0| + |e1|)   [Simo, Tarnow and Doblare 1995];
-///   bending, twisting: moments whose work is what the energy changes by, see elasticity/discrete_gradient.hpp;
-///   surfaces that press: along the mean of the ways between them, see contact/pressing.cpp.
+///   bending, twisting: moments with the exact work, see elasticity/discrete_gradient.hpp; contact: along the mean of
+///   the vectors between surfaces, see contact/pressing.cpp.
 
 #include "contact/contact_linearisation.hpp"
 #include "elasticity/discrete_elements.hpp"
@@ -79,8 +79,8 @@ struct RoundingBounds {
   double reach = 0;     ///< greatest coordinate [m]
 };
 
-/// Derivatives of what an edge's inertia about itself adds to the rows of its head (three) and its angle: by the edge's
-/// vector and angle at z, and by its vector, angle and rate at the start.
+/// Derivatives of the inertia of an edge about itself, in the rows of its head (three) and its angle. They are by the
+/// edge's vector and angle at z, and by its vector, angle and rate at the start.
 struct TurningSlopes {
   static constexpr int kUnknowns = 9;
   double by[4][kUnknowns];

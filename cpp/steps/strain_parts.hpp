@@ -10,16 +10,16 @@
 
 namespace withe {
 
-/// Splits the stiffness into sum k g g^T over the strains of all stencils and the angles of all joints, g their
-/// gradients, and what is left where their stiffnesses are taken away but their forces are kept.
+/// Splits the stiffness into a sum and a remainder. The sum is k g g^T over the strains of all stencils and the angles
+/// of all joints, with g their gradients. The remainder has these stiffnesses removed, but keeps their forces.
 class StrainParts {
  public:
   StrainParts(const Equations& system, const State& state, const Configuration& configuration);
 
-  /// Entries of g, a row per strain; and k.
+  /// Entries of g, with one row per strain, and k.
   const std::vector<Eigen::Triplet<double>>& gradients() const { return gradients_; }
   const std::vector<double>& stiffnesses() const { return stiffnesses_; }
-  /// With stiffnesses next to nothing, and natural strains for which forces are what they were.
+  /// Coefficients with negligible stiffnesses, and natural strains that keep the forces unchanged.
   const ElasticCoefficients& without() const { return without_; }
 
  private:

@@ -65,9 +65,9 @@ struct NumberSlopes {
 
 /// The couple I omega (e - e0) x e / (h l^3) and the torque's part.
 ///
-/// Both lie along x = s x e: the couple by -I omega l0 / (h l^3), the spin by -1 / G. What follows vectors is a turn of
-/// x and a change of its factor: [a] + x g^T by the vector at z, [b] + x k^T by that at the start, a along s and b
-/// along e.
+/// Both lie along x = s x e, with the factor -I omega l0 / (h l^3) for the couple and -1 / G for the spin. Their
+/// derivatives contain a rotation of x and a change of its factor: [a] + x g^T by the vector at z, and [b] + x k^T by
+/// the vector at the start. The vector a is along s, and b along e.
 void set_euler_slopes(const TurningStep& step, TurningSlopes& out) {
   const Vec3d& e = step.edge;
   const double l = std::sqrt(dot(e, e)), l0 = std::sqrt(dot(step.start, step.start));
