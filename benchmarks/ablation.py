@@ -1,13 +1,12 @@
-"""What each heuristic of Newton's method saves: switched off alone, over groups of scenes.
+"""Saving of each heuristic of Newton's method: it is switched off alone, over groups of scenes.
 
     python benchmarks/ablation.py [--quick] [--groups impacts knots] [--heuristics reuse_across_steps]
 
-Counted are evaluations of the residual and factorisations, which do not depend on what else runs on the machine; the
-cost of a run is their sum, a factorisation (with the matrix that it takes) being worth `FACTORISATION` evaluations
-(with the solve that follows). Ratios are geometric means over the scenes of a group that end with the heuristic and
-without.
-A heuristic is worth its lines where the cost grows by 5 % without it, or scenes are lost. A scene is lost where a step
-fails, or its cost exceeds `MOST` times that of all heuristics together.
+The benchmark counts evaluations of the residual and factorisations, which do not depend on other processes. The cost of
+a run is their weighted sum. One factorisation with its matrix counts as `FACTORISATION` evaluations with the following
+solve. Ratios are geometric means over the scenes of a group that end both with and without the heuristic. A heuristic
+is worth its code if the cost grows by 5 % without it, or if scenes are lost. A scene is lost if a step fails, or if its
+cost exceeds `MOST` times the cost with all heuristics.
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
-"""Forces and moments of a result summed again, in NumPy, from positions and directors alone.
+"""Independent sum of the forces and moments of a result, in NumPy, from positions and directors alone.
 
-It shares no code with the engine, and goes another way: where the engine differentiates energies by unknowns, here each
-stencil gives its two edges a moment (the derivative of its energy by a turn of one frame, by complex steps), each edge
-hands the moment across it to its nodes as a couple, and the moment along it must vanish. Straight drawn, open rods with
-walls at one or both ends; midpoint and backward Euler steps that were not cut.
+The sum shares no code with the engine, and uses another method. The engine differentiates energies by unknowns. Here
+each stencil applies a moment to its two edges, the derivative of its energy by the rotation of one frame (by complex
+steps). Each edge passes the transverse part of the moment to its nodes as a couple, and the axial part must vanish. The
+cases are straight drawn, open rods with walls at one or both ends, and midpoint and backward Euler steps that were not
+subdivided.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ _EPS = float(np.finfo(float).eps)
 
 @dataclass(frozen=True, eq=False)
 class Look:
-    """What a simulation shows: positions [m], velocities [m/s], directors (edges, 3, 3), spins [rad/s]."""
+    """State of a simulation: positions [m], velocities [m/s], directors (edges, 3, 3), spins [rad/s]."""
 
     positions: FloatArray
     velocities: FloatArray
@@ -172,7 +173,7 @@ class _Sum:
             self._along(along, where)
 
         if case.nodes > 2:
-            # Of the bending of an edge at a wall, a twelfth is carried by the next stencil.
+            # The next stencil carries a twelfth of the bending of an edge at a wall.
             carrying = np.full(case.nodes - 2, self._edge)
             carrying[0] += self._edge / 12
             if case.both_ends:
@@ -218,7 +219,7 @@ class _Sum:
         return moment
 
     def add_inertia(self, moved: FloatArray, before: Look, h: float) -> None:
-        """Of nodes, in a step over h from `before`."""
+        """Add the inertia of nodes, in a step over h from `before`."""
         case = self._case
         acceleration = (moved / h - before.velocities) / h
         self._on_nodes(-self._mass[:, None] * acceleration, slice(None))
@@ -231,7 +232,7 @@ class _Sum:
         return 1000.0 * math.pi * self._case.radius**4 / 2 * self._edge
 
     def add_spin(self, moved: FloatArray, before: Look, h: float, turned: FloatArray) -> None:
-        """Of edges that spin and turn, to where they are at the end: torque and couple."""
+        """Add torque and couple of edges that spin and turn, in their positions at the end."""
         torque = self._rotary * (turned / h - before.spins) / h
         self._along(-torque, slice(None))
         turning = np.cross(np.diff(moved, axis=0) / h, self._t)
@@ -239,7 +240,7 @@ class _Sum:
         self._pair(-couple - torque[:, None] * self._spin)
 
     def add_mean_spin(self, before: Look, tangents: FloatArray, h: float, turned: FloatArray) -> None:
-        """The same of midpoint steps: the moment I (w1 t1 - w0 t0) / dt, on edges where they are in the middle."""
+        """Add the mean spin of midpoint steps: the moment I (w1 t1 - w0 t0) / dt, on edges in mid-step positions."""
         after = 2.0 * turned / h - before.spins
         gain = after[:, None] * tangents - before.spins[:, None] * before.directors[:, 2]
         moment = self._rotary / (2.0 * h) * gain

@@ -1,30 +1,33 @@
-"""What free scenes keep: momentum, angular momentum and energy, whatever the scheme, the step and the scene.
+"""Conservation of momentum, angular momentum and energy in free scenes, for all schemes and several steps.
 
     python benchmarks/conservation.py [--quick] [--cases COUNT] [--tight]
 
-Fifty drawn scenes (a rod, joined rods, a ring, a rod that springs into a curl, rods that meet; in a plane and in space;
-viscous and not) fly freely for 1,000 steps of 1/1000, 1/100, 1/20 and 1/5 of their slowest elastic period, by every
-implicit integrator that takes them, at default options. Written down is the greatest change along the way of
+Fifty drawn scenes fly freely for 1,000 steps of 1/1000, 1/100, 1/20 and 1/5 of their slowest elastic period. Every
+implicit integrator that accepts a scene runs it, at default options. The scenes are a rod, joined rods, a ring, a rod
+that springs into a curl, and rods that meet; in a plane and in space; with and without viscosity. The benchmark records
+the greatest change during the run of
 
 - linear momentum, over sqrt(2 T m), T the kinetic energy at the start, m the mass;
 - angular momentum about the origin, over the same times the greatest distance of a node from the origin;
-- the energy balance, stored + dissipated - work, over what there is at the start;
-- how much of what was dissipated came back, which viscosity never gives.
+- the energy balance, stored + dissipated - work, over the energy at the start;
+- the dissipated energy that came back, which is zero for viscosity.
 
-Thirty drawn robots (three rods from a clamp or a pin, in rigid, pinned and revolute joints with springs, with tendons)
-fall from rest for 20 s, in steps of 5, 1 and 0.25 ms, by the default integrator and by fourth order. Nothing takes
-energy from them, and none may change by more than 1e-5 of the greatest kinetic energy.
+Thirty drawn robots fall from rest for 20 s, in steps of 5, 1 and 0.25 ms, by the default integrator and by fourth
+order. A robot has three rods from a clamp or a pin, with rigid, pinned and revolute joints, springs and tendons.
+Nothing dissipates energy there, and no energy balance may change by more than 1e-5 of the greatest kinetic energy.
 
-Momenta are read by `simulation.momentum()`. That the instrument is right is shown by what theory knows to the last
-digit: the midpoint rule keeps angular momentum in a plane, and in a torque-free step of backward Euler it changes by
-dt times the sum of v1 x (M v0), the mass matrix M made here. Of driven rods, the work of a support is its mean force
-times its way and its mean moment times its turn, and impulses of supports are what momenta change by: exactly while
-what they hold goes on evenly, else to second order, since what they hold has inertia too, and velocities at the ends of
-steps whose mean is not quite its way over the time (twice that less the last one would ring for ever). In space a
+`simulation.momentum()` reads momenta. Two exact results of theory verify this read-out. The midpoint rule conserves
+angular momentum in a plane. A torque-free step of backward Euler changes it by dt times the sum of v1 x (M v0), where
+this file computes the mass matrix M.
+
+For driven rods, the work of a support is its mean force times its displacement, plus its mean moment times its
+rotation. The impulses of supports equal the changes of momenta. Both are exact while the held part moves uniformly, and
+otherwise of second order. The held part has inertia too, and the mean of its velocities at the ends of a step is not
+quite its displacement over the time step. (Twice the mean minus the last velocity would oscillate for ever.) In space a
 midpoint step turns by its Cayley vector, and energy-momentum steps in a plane have moments that do the work over the
-angle: there either book is of second order.
+angle. The balances are of second order there.
 
---tight solves every step to rounding, which tells what a scheme loses from what the solver's tolerances leave.
+--tight solves every step to rounding, which separates errors of a scheme from those of the solver's tolerances.
 """
 
 from __future__ import annotations
@@ -112,7 +115,7 @@ def worst_of(flights: list[Flight], name: str) -> float:
 
 
 def energy_off(flight: Flight) -> float:
-    """What the energy goal of a scheme looks at."""
+    """Return the energy error that the goal of a scheme bounds."""
     conserves = flight.integrator in ("energy_momentum", "fourth_order")
     return max(flight.gained, flight.lost) if conserves else flight.gained
 
@@ -291,7 +294,7 @@ def plot(flights: list[Flight]) -> None:
 
 
 def figure(value: float) -> str:
-    """Of a table."""
+    """Format a number for a table."""
     return "-" if math.isnan(value) else f"{value:.1e}"
 
 
@@ -313,13 +316,13 @@ def add_tables(report: Report, flights: list[Flight]) -> None:
 
 
 def add_goals(report: Report, flights: list[Flight]) -> None:
-    """What is asked of every flight."""
+    """Add the goals of all flights."""
     for integrator in INTEGRATORS:
         own = [flight for flight in flights if flight.integrator == integrator]
         report.goal(f"{integrator}: linear momentum", worst_of(own, "linear"), 1e-9, at_least=False)
-        if integrator != "backward_euler":  # which loses it by its nature, at first order in the step
+        if integrator != "backward_euler":  # it loses angular momentum at first order in the step
             report.goal(f"{integrator}: angular momentum", worst_of(own, "angular"), 1e-9, at_least=False)
-        if integrator != "backward_euler":  # whose forces act at the end of a way, and work a little otherwise along it
+        if integrator != "backward_euler":  # its forces act at the end of a step, and their work differs slightly
             report.goal(f"{integrator}: dissipated comes back", worst_of(own, "fed"), 1e-9, at_least=False)
         if integrator == "implicit_midpoint":  # plain, and so without a bound: it warns
             continue

@@ -68,7 +68,7 @@ class Case:
 
     @cached_property
     def period(self) -> float:
-        """Of the slowest elastic mode of the scene as it is drawn [s]."""
+        """Period of the slowest elastic mode of the scene as drawn [s]."""
         simulation = self._scene().build(planar=self.flat or None)
         count = len(simulation.linearise().mass)
         frequencies = simulation.linearise().frequencies(count)

@@ -141,7 +141,7 @@ def pile(rods: int) -> withe.Simulation:
 
 
 def piles(report: Report, quick: bool) -> None:
-    """How a step of piles that settle grows with the number of rods, on the whole and but for linear solves."""
+    """Measure the time of a step of settling piles by the number of rods, in total and without linear solves."""
     counts, fall, steps = ((10, 20), 1, 1) if quick else ((250, 500, 1000), 20, 100)
     rows, seconds, rest = [], [], []
     for count in counts:

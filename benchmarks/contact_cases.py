@@ -60,13 +60,13 @@ class ContactCase:
 
     @property
     def period(self) -> float:
-        """Of the slowest bending of a free rod [s]."""
+        """Period of the slowest bending mode of a free rod [s]."""
         stiffness = self.youngs_modulus * math.pi * self.radius**4 / 4.0
         return 2.0 * math.pi / 22.373 * self.length**2 * math.sqrt(1000.0 * math.pi * self.radius**2 / stiffness)
 
     @property
     def time_step(self) -> float:
-        """[s]."""
+        """Time step [s]."""
         return 0.002 * self.coarseness * self.period
 
 

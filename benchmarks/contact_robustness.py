@@ -6,8 +6,8 @@ A case is accepted when its 60 steps end within 10 s (processor time) with defau
 - no surfaces are deeper in each other than a twentieth of a radius;
 - the energy, less what supports have put in, has not grown by more than 1 % of the greatest;
 - every number is finite.
-A named error is not accepted, but is no defect. A knot cannot be pulled as far as its grips are asked to go: there an
-error is accepted where nothing else was wrong until then, once the grips have come to where it is tight.
+A named error is not accepted, but is no defect. There is one exception. A knot cannot be pulled as far as its grips are
+told to go. An error is accepted there if the grips have reached the tight knot, and nothing else was wrong before.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ TIGHT = (45.0, 80.0)
 
 @dataclass
 class Verdict:
-    """What became of a case: `reason` is empty where it was accepted."""
+    """Result of a case: `reason` is empty if it was accepted."""
 
     number: int
     reason: str = ""

@@ -91,7 +91,7 @@ def _friction(report: Report, quick: bool) -> None:
 
 
 def _stretch(found: Feasibility, tests: tuple[str, ...]) -> float:
-    """How much of a pattern fails one of some tests [mm]; stretches that fail two count once."""
+    """Length of a pattern that fails at least one of some tests [mm]."""
     s = found.arc_length
     fails = np.zeros(len(s), bool)
     for slip in found.slips:

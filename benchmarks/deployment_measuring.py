@@ -1,4 +1,4 @@
-"""What planners of noisy trials know of their cables: measured from rendered pictures."""
+"""Properties of cables as planners of noisy trials know them: measured from rendered pictures."""
 
 from __future__ import annotations
 

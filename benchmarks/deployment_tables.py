@@ -3,14 +3,15 @@
 python benchmarks/deployment_tables.py [--quick] [--whole] [--cables 2] [--patterns circle ...] [--trials 0] [--resume]
                                        [--known] [--refine]
 
-By default cable 2 alone, which takes some 10 minutes on two cores; --whole takes cables 1 to 3 and three noisy trials
-of each cell: with --ways placed exact network intuitive half an hour, with "optimised" an hour. Runs go side by side,
-one a core. Each is printed, and written to out/benchmarks/deployment_tables.jsonl, as it ends. Ctrl-C makes the tables
-of what there is; --resume goes on after that. Cables are laid quasi-statically, but for the intuitive way and noisy
-trials, at 2.5 cm/s in steps of 20 ms: an upright cable buckles, falls and swings, and no row of equilibria follows it.
-In noisy trials the planner knows the cable by a picture of its loop. Errors are those of (9.11), point by point: the
-distance of each point of the cable from its place on the pattern.
-The way "network" needs torch, and is left out without it.
+By default the benchmark runs cable 2 alone, in some 10 minutes on two cores. --whole runs cables 1 to 3 and three noisy
+trials of each cell. It takes half an hour with --ways placed exact network intuitive, and an hour with "optimised".
+Runs are parallel, one per core. Each run is printed, and appended to out/benchmarks/deployment_tables.jsonl, when it
+ends. After Ctrl-C the tables contain the finished runs, and --resume runs the rest.
+
+Cables are laid quasi-statically. The intuitive way and noisy trials run dynamically instead, at 2.5 cm/s in steps of
+20 ms: an upright cable buckles, falls and swings, and no sequence of equilibria follows it. In noisy trials the planner
+measures the cable by a picture of its loop. Errors are those of (9.11), point by point: the distance of each point of
+the cable from its place on the pattern. The way "network" needs torch, and is skipped without it.
 """
 
 from __future__ import annotations
@@ -86,7 +87,7 @@ class Run:
 
     @property
     def key(self) -> Key:
-        """What was laid how, but for noise."""
+        """Pattern, cable, friction and way of a run, without noise."""
         return self.pattern, self.cable, self.friction, self.way
 
     @property
@@ -96,7 +97,7 @@ class Run:
 
     @property
     def balanced(self) -> bool:
-        """Whether the engine found equilibria."""
+        """True if the engine found equilibria."""
         return bool(np.isfinite(self.error))
 
     def of(self, found: Deployment) -> Run:
@@ -128,7 +129,7 @@ class Cell:
 
     @property
     def foretold(self) -> bool:
-        """Whether tests of feasibility say where it slips."""
+        """True if tests of feasibility predict the slips."""
         return self.run.way in ("exact", "network", "least_friction")
 
     @property
@@ -173,7 +174,7 @@ class Cell:
         return f"{self.run.error:.2f} ± {self.run.std:.2f}{noisy}"
 
     def nearest(self) -> str:
-        """As text, from the nearest point of what was given."""
+        """Format the error from the nearest point of the given pattern."""
         if not self.run.balanced:
             return "none"
         return f"{self.run.nearest_error:.2f} ± {self.run.nearest_std:.2f}"
@@ -264,9 +265,9 @@ def tables(report: Report, cells: dict[Key, Cell], ways: tuple[str, ...]) -> Non
         (*header, *ways, "will slip", "published: intuitive, optimal"),
         rows,
     )
-    report.table("The same, from the nearest point of what was given [mm]", (*header, *ways), nearest)
+    report.table("Distance from the nearest point of the given pattern [mm]", (*header, *ways), nearest)
     report.table(
-        f"What slips where the mean is above {LARGE:g} mm, and the tests that say so",
+        f"Parts that slip where the mean is above {LARGE:g} mm, and the tests that predict it",
         (*header, "way", "mean", "stretch [mm]", "slips by", "tests"),
         slipped,
     )
@@ -277,7 +278,7 @@ def tables(report: Report, cells: dict[Key, Cell], ways: tuple[str, ...]) -> Non
 
 
 def goals(report: Report, cells: dict[Key, Cell]) -> None:
-    """What the ways of laying are to reach beside each other."""
+    """Add the goals that compare the ways of laying."""
     error = {key: cell.run.error for key, cell in cells.items()}
     keys = [key for key in dict.fromkeys(key[:3] for key in cells) if (*key, "exact") in cells]
 

@@ -41,7 +41,7 @@ SHOWN = 7.0  # [Lgb] of a hanging cable in a picture
 
 
 def placed(letter: str, way: str, seed: int, noise: float, nodes: int = NODES) -> tuple[bool, str]:
-    """Whether every post was passed on its right side, and how many were."""
+    """Return True if the cable passed every post on its right side, and the number of passed posts."""
     static = noise == 0.0 and way != "intuitive"
     known = measured(Cable.dlo(5), seed, bent=way == "optimised") if noise else None
     found = place_cable.laid(letter, way, nodes, known=known, seed=seed, noise=noise, static=static)
@@ -49,7 +49,7 @@ def placed(letter: str, way: str, seed: int, noise: float, nodes: int = NODES) -
 
 
 def measured(cable: Cable, seed: int, *, bent: bool) -> Cable:
-    """What a planner knows of the cable of a trial: its loop's height, and how its end hangs aside, from two sides."""
+    """Return a cable as its planner measures it: by the height of its loop and the curl of its end, from two sides."""
     true = trial_cable(cable, seed)
     random = np.random.default_rng((seed, 1))
     read = LOOP_HEIGHT * true.gravito_bending_length + RULER * random.normal()
@@ -73,7 +73,7 @@ class Knots:
         self._picks: dict[str, tuple] = {}
 
     def tied(self, name: str, way: str, seed: int, noise: float) -> tuple[bool, str]:
-        """Whether the knot is there in the end, and how many moves found no cable."""
+        """Return True if the knot exists at the end, and the number of moves that found no cable."""
         plans, steps = tie_knot.TYING[name](way)
         if name not in self._picks:
             rehearsed = tie_knot.TYING[name]("exact")
@@ -86,7 +86,7 @@ class Knots:
 
 @dataclass(frozen=True)
 class Tried:
-    """What came of one trial, as a line of a file; that of seed 0 is without noise."""
+    """Result of one trial, as a line of a file; seed 0 has no noise."""
 
     use: str
     way: str
@@ -101,7 +101,7 @@ class Tried:
 
 
 def tried(knots: Knots, use: str, way: str, seed: int) -> Tried:
-    """Whether it succeeds, and what it came to."""
+    """Run one trial, and return its success and result."""
     attempt = knots.tied if use in tie_knot.TYING else partial(placed, nodes=knots.nodes)
     try:
         success, words = attempt(use, way, seed, 1.0 if seed else 0.0)

@@ -13,7 +13,7 @@ __all__ = ["KnotRun", "largest_stable_step"]
 
 
 class _System(elastica.BaseSystemCollection, elastica.Constraints, elastica.Contact):
-    """What the scene needs: grips and contact."""
+    """A system with grips and contact."""
 
 
 class _Grips(elastica.ConstraintBase):
@@ -27,13 +27,13 @@ class _Grips(elastica.ConstraintBase):
         self._turned = [rod.director_collection[:, :, element].copy() for _, element, _ in self._ends]
 
     def constrain_values(self, system: elastica.CosseratRod, time: np.float64) -> None:
-        """Where the grips are."""
+        """Set the positions of the grips."""
         for (nodes, element, velocity), at, turned in zip(self._ends, self._at, self._turned, strict=True):
             system.position_collection[:, nodes] = at + time * velocity[:, None]
             system.director_collection[:, :, element] = turned
 
     def constrain_rates(self, system: elastica.CosseratRod, time: np.float64) -> None:
-        """How fast they go."""
+        """Set the velocities of the grips."""
         for nodes, element, velocity in self._ends:
             system.velocity_collection[:, nodes] = velocity[:, None]
             system.omega_collection[:, element] = 0.0
@@ -96,7 +96,7 @@ class KnotRun:
         return (time.thread_time() - start) / steps
 
     def sound(self) -> bool:
-        """Whether it has not blown up: no edge twice as long as it was, or half."""
+        """True if the run has not diverged: no edge has doubled or halved its length."""
         with np.errstate(all="ignore"):
             stretch = self.rod.lengths / self.rod.rest_lengths
         return bool(np.all(np.abs(stretch - 1.25) < 0.75))

@@ -17,7 +17,7 @@ SLIP_TOLERANCE = 1e-3  # [m/s]
 
 
 class _System(elastica.BaseSystemCollection, elastica.Forcing, elastica.Contact):
-    """What the scene needs: gravity, the push, and contact."""
+    """A system with gravity, the push, and contact."""
 
 
 class PushRun:
@@ -88,5 +88,5 @@ class PushRun:
 
     @property
     def kinetic_energy(self) -> float:
-        """Of the nodes [J]."""
+        """Kinetic energy of the nodes [J]."""
         return float(0.5 * np.sum(self.rod.mass * self.rod.velocity_collection**2))

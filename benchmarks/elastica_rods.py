@@ -1,7 +1,7 @@
 """The same beams and helices in PyElastica, set up as its documentation says, without damping and callbacks.
 
-Two clamps: its own, which holds the first element and so shortens the rod by half an element, and the same with the
-wall moved to the middle of that element, by a first node half an element behind it.
+There are two clamps. PyElastica's own clamp holds the first element, and so shortens the rod by half an element. The
+other clamp moves the wall to the middle of that element, by a first node half an element behind it.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ __all__ = ["ElasticaRun", "frames_along", "largest_stable_step", "version"]
 
 
 class _System(elastica.BaseSystemCollection, elastica.Constraints, elastica.Forcing):
-    """What a scene needs: clamps and gravity."""
+    """A system with clamps and gravity."""
 
 
 def version() -> str:
-    """Of PyElastica and numba."""
+    """Versions of PyElastica and numba."""
     from importlib.metadata import version as of
 
     return f"PyElastica {of('pyelastica')}, numba {of('numba')}"

@@ -1,8 +1,8 @@
 """A sheet of paper folded in PyElastica by the poses of a file: its own rod, plane and friction.
 
-The sheet is a rod with the bending stiffness and the weight of the sheet. So that steps need not be shorter than they
-are it stretches and shears a hundred times as easily as paper, which is still hardly at all, and its elements resist
-being turned as thin plates as wide as they are long would: neither matters to so slow a motion.
+The sheet is a rod with the bending stiffness and the weight of the sheet. Two changes allow longer steps, and neither
+matters to so slow a motion. The rod stretches and shears a hundred times as easily as paper, which is still hardly at
+all. The rotary inertia of its elements is that of thin square plates.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ ROUND = 5e-3  # radius with which a rod is made, before it gets what a sheet has
 class _System(
     elastica.BaseSystemCollection, elastica.Constraints, elastica.Forcing, elastica.Contact, elastica.Damping
 ):
-    """What the scene needs: the jaw, gravity, the table, and damping of what rings."""
+    """A system with the jaw, gravity, the table, and damping of oscillations."""
 
 
 @dataclass(frozen=True)
@@ -94,13 +94,13 @@ class _Jaw(elastica.ConstraintBase):
         return self._scratch
 
     def constrain_values(self, system: elastica.CosseratRod, time: np.float64) -> None:
-        """Where the jaw is."""
+        """Set the position of the jaw."""
         positions, directors, _, _ = self._at(time)
         system.position_collection[:, : self._held + 1] = positions
         system.director_collection[:, :, : self._held] = directors
 
     def constrain_rates(self, system: elastica.CosseratRod, time: np.float64) -> None:
-        """How fast it goes."""
+        """Set the velocity of the jaw."""
         _, _, velocities, turning = self._at(time)
         system.velocity_collection[:, : self._held + 1] = velocities
         system.omega_collection[:, : self._held] = turning

@@ -271,7 +271,7 @@ def replace_invalid(pose: Elastica, there: np.ndarray) -> Elastica:
 
 
 def poses_of_jaw(plan: folding.FoldPlan) -> np.ndarray:
-    """Where a plan has the jaw's inner edge [m]: x from where that lay, z."""
+    """Path of the jaw's inner edge in a plan [m]: x from its position in the flat sheet, z."""
     depth, angle = plan.jaw.depth, plan.angles
     x = plan.poses[:, 0] + depth * np.cos(angle) - depth
     return np.stack([x, plan.poses[:, 2] - depth * np.sin(angle)], axis=1)

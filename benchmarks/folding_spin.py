@@ -1,10 +1,10 @@
-"""How far creases of wide and narrow sheets are turned, half folds, beside table 7.3 of the dissertation.
+"""Rotation of creases of wide and narrow sheets in half folds, beside table 7.3 of the dissertation.
 
 python benchmarks/folding_spin.py [--quick] [--trials 3]
 
-A sheet is two strips joined at their ends whose friction on the table differs (`WideSheet`), by a standard deviation of
-10 % to either side; the rest of the noise is that of the other trials. What snaps is not measured: its mean is that of
-the rest.
+A sheet is two strips joined at their ends (`WideSheet`). Their friction on the table differs, by a standard deviation
+of 10 % to either side. The rest of the noise is that of the other trials. Sheets that snap are not measured, and the
+mean is over the others.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ class Turned:
 
 
 def cases() -> Iterator[Case]:
-    """Of the table, line by line."""
+    """Yield the cases of the table, line by line."""
     for paper, friction in TABLES:
         for width in WIDTHS:
             for way in WAYS:

@@ -74,13 +74,13 @@ def trial_of(key: Key, seed: int, sheet: dict) -> folding.Trial:
 
 
 def name_of(key: Key) -> str:
-    """Of a trial."""
+    """Name of a trial."""
     return ", ".join(map(str, key))
 
 
 @dataclass(frozen=True)
 class Folded:
-    """What came of one, as a line of a file."""
+    """Result of one trial, as a line of a file."""
 
     case: str
     friction: float
@@ -176,7 +176,7 @@ def row(folds: list[Folded], count: int) -> tuple[str, ...]:
 
 
 def infeasible(fold: Folded) -> bool:
-    """Whether the planner said that no way bears the sheet's uncertainty, or that there is none."""
+    """True if the planner found no way, or none within the uncertainty of the sheet."""
     return fold.blocked is not None or (fold.failure or "").startswith("no plan: no path")
 
 

@@ -2,17 +2,20 @@
 
     python benchmarks/friction_precision.py [--quick]
 
-A block of mass m that a force F pushes for a time t over a floor with friction mu has the kinetic energy
-(F - mu m g)^2 t^2 / (2 m), and none up to the limit F = mu m g: (6.2) of Andrew Choi's doctoral dissertation
-(University of California, Los Angeles), the source here. Error is the greatest relative one over seven forces from
-5 % above the limit; four below it show what energy a rod has that should stick.
-Both sides choose nodes and steps freely, up to a tenth of the push, and have their own law of slip, regularised below
-1 mm/s. Ours acts where surfaces touch, and so bends the rod; "on centrelines" it is the source's and PyElastica's.
-Time is processor time of one push of 1.5 s on one thread, without build and recording; runs are interleaved and
-medians taken. PyElastica runs without damping and callbacks, numba warmed up, at its largest step that stays within
-half of (6.2), and at 0.9, 0.8 and 0.5 of it. Speed grows evenly, so that whatever is stable gets it right: PyElastica,
-whose rod does not deform here, to rounding. This compares the largest steps, and what they cost. The source reports
-0.036 s a push, and 0.169 s for PyElastica: 4.7 times as long.
+A force F pushes a block of mass m for a time t over a floor with friction mu. Above the limit F = mu m g the block
+gains the kinetic energy (F - mu m g)^2 t^2 / (2 m), and none below. This is (6.2) of Andrew Choi's doctoral
+dissertation (University of California, Los Angeles), the source here. The error is the greatest relative error over
+seven forces from 5 % above the limit. Four forces below the limit show the energy of a rod that should stick.
+
+Both simulators choose nodes and steps freely, up to a tenth of the push, and have their own friction law, regularised
+below 1 mm/s. Friction of withe acts on the surface, and so bends the rod. The rows "on centrelines" use the law of the
+source and PyElastica. Time is processor time of one push of 1.5 s on one thread, without build and recording. Runs are
+interleaved, and the table shows medians. PyElastica runs without damping and callbacks, after numba has compiled. It
+uses the largest step within half of (6.2), and 0.9, 0.8 and 0.5 of that step.
+
+Speed grows linearly, so every stable step is accurate; for PyElastica, whose rod does not deform here, to rounding. The
+benchmark therefore compares the largest steps and their cost. The source reports 0.036 s per push, and 0.169 s for
+PyElastica, which is 4.7 times as long.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What gradients cost: of an equilibrium beside its Newton iterations, of a run beside the run.
+"""Cost of gradients: of an equilibrium relative to its Newton iterations, and of a run relative to the run.
 
 python benchmarks/gradients.py [--quick]
 """

@@ -1,4 +1,4 @@
-"""What the stress tests share: cases judged one by one, and what became of them as tables.
+"""Shared parts of the stress tests: cases judged one by one, and tables of the results.
 
 A case has a `number`; so has a verdict, with `reason`, empty where the case was accepted, and `detail`.
 """

@@ -2,9 +2,10 @@
 
     python benchmarks/limits.py [withe | elastica]
 
-computes them anew (some minutes; of one side only, where it is named) and writes ``benchmarks/data/limits.npz``:
-for every case the displacement of the tip at even times, and how far two extrapolations from different meshes are
-apart. The two limits differ, because the rods of PyElastica shear and turn with inertia, and ours do neither.
+This computes the limits again (in some minutes; only for the named side, if any) and writes
+``benchmarks/data/limits.npz``. For every case the file holds the displacement of the tip at equidistant times, and the
+difference of two extrapolations from different meshes. The two limits differ, because the rods of PyElastica have
+shear and rotary inertia, and the rods of withe have neither.
 """
 
 from __future__ import annotations

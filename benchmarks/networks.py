@@ -1,4 +1,4 @@
-"""What comparisons of networks with exact solutions share."""
+"""Shared parts of the comparisons of networks with exact solutions."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def torch_is_there() -> bool:
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Of torch."""
+    """Run torch on one thread."""
     import torch
 
     threads = torch.get_num_threads()

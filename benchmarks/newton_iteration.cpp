@@ -77,7 +77,7 @@ void newton_iteration(benchmark::State& run, bool planar) {
       benchmark::Counter(1e-6 * nodes, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
 }
 
-/// Of this thread [s]: like the benchmarks' own, it does not count what else the machine does.
+/// Processor time of this thread [s], which does not count other processes.
 double processor_time() {
   timespec now{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);

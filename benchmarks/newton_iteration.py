@@ -27,7 +27,7 @@ def _lapack_version(library: ctypes.CDLL, symbol: str) -> str:
 
 
 def _lapacks() -> dict[str, tuple[Path, str, str]]:
-    """What there is, by label: the file, the name of dpbsv in it, and its version."""
+    """Return the available LAPACK libraries by label: the file, the name of dpbsv in it, and its version."""
     found = {}
     reference = [path for folder in SYSTEM for path in (folder / "lapack").glob("liblapack.so.3")]
     own = [path for folder in SYSTEM for path in folder.glob("openblas*/libopenblas.so.0")]

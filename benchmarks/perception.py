@@ -2,10 +2,10 @@
 
     python benchmarks/perception.py [--quick] [--first-seed N]
 
-Labelled photographs are read from WITHE_DATA/mbest and left out, with a word, where they are missing. Synthetic
-scenes come from seeds that nothing was tuned on. Speed is a ratio to one 3 x 3 distance transform of OpenCV in the
-same run (d), medians of interleaved runs, so that it means the same on another machine; on a busy one the fastest
-runs, printed beside, say more.
+Labelled photographs are read from WITHE_DATA/mbest. If they are missing, the benchmark prints a note and skips them.
+Synthetic scenes come from seeds that were not used for tuning. Speed is a ratio to one 3 x 3 distance transform of
+OpenCV in the same run (d), by medians of interleaved runs, so that it is comparable between machines. On a busy machine
+the fastest runs, printed beside, are more reliable.
 """
 
 import argparse
@@ -100,7 +100,7 @@ def photographs(folder):
 
 
 def synthetic(count, scale, first_seed):
-    """How many scenes of every kind are found right."""
+    """Print the share of correct scenes of every kind."""
     print(f"Synthetic masks, {count} a case, scale {scale:g}")
     for case in CASES:
         right = touching = tips = 0
@@ -126,7 +126,7 @@ def order_of_self_crossings(count, first_seed):
         if len(tracing.crossings) != 1 or len(tracing) != 1:
             continue
         crossing, true = tracing.crossings[0], scene.crossings[0]
-        # Whether the upper strand is nearer to the start, in a direction that both lines share.
+        # True if the upper strand is nearer to the start, in the common direction of both lines.
         ours = tracing.centrelines[0]
         same = np.hypot(*(ours[0] - scene.centrelines[0][0])) < np.hypot(*(ours[-1] - scene.centrelines[0][0]))
         first = (crossing.over[1] < crossing.under[1]) == same
@@ -136,7 +136,7 @@ def order_of_self_crossings(count, first_seed):
 
 
 def metres():
-    """How far a scene seen by a tilted camera comes back from the truth."""
+    """Print the error of a scene that a tilted camera sees."""
     angle = np.radians(30)
     tilt = np.array([[1, 0, 0], [0, np.cos(angle), -np.sin(angle)], [0, np.sin(angle), np.cos(angle)]])
     camera = Camera(

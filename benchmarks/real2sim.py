@@ -1,4 +1,4 @@
-"""What a camera saw, explained: the soft limbs of the dissertation's section 6.4.2, and made data whose truth is known.
+"""Fits to camera data: the soft limbs of the dissertation's section 6.4.2, and synthetic data with known truth.
 
 python benchmarks/real2sim.py [--quick]
 """
@@ -99,7 +99,7 @@ def _arm(nodes: int) -> withe.Simulation:
 
 
 def _errors(report: Report, seeds: int) -> None:
-    """Whether covariances tell the size of errors: a curvature of each of two frames, and a modulus that both share."""
+    """Compare covariances with true errors: a curvature of each of two frames, and a modulus that both share."""
     truth, camera = np.array([0.0, 4.0, 1e6]), _camera()
     fine, exact = _arm(121), []
     for curvature in truth[:2]:

@@ -1,4 +1,4 @@
-"""What every benchmark shares: how it times, what it prints, and the JSON file that it leaves.
+"""Shared parts of all benchmarks: timing, printed tables, and the JSON file with the results.
 
 ``out/benchmarks/NAME.json`` holds machine, compiler, command, date, every figure with its spread, and `goals`: a list
 of ``{name, value, target, met}``.
@@ -104,7 +104,7 @@ def once(action: Callable[[], object]) -> float:
 
 
 def processor_seconds(call: Callable[[], object], repeats: int) -> float:
-    """Of all threads, in the fastest of some runs, for the machine may be busy."""
+    """Processor time of all threads, in the fastest of some runs, because the machine may be busy."""
     seconds = []
     for _ in range(repeats):
         start = time.process_time()

@@ -88,7 +88,7 @@ def converged_tips(kind: type[Arm], seed: int, count: int = ACTIONS, fine: int =
 
 
 def references_agree(kind: type[Arm], seed: int, count: int = ACTIONS) -> bool:
-    """Whether runs in short steps and in half as short ones come to the same."""
+    """True if runs in short steps and in half as long steps agree."""
     return _apart(converged_tips(kind, seed, count), converged_tips(kind, seed, count, FINE // 2)) < AGREE
 
 

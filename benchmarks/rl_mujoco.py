@@ -1,8 +1,8 @@
 """The free arm of the learning tasks in MuJoCo: its rods (1D flexes), many at once by its batches.
 
-MuJoCo takes a rod's natural curvature from its reference configuration, which bends of actions therefore lead: every
-update moves where bodies are drawn and their joints' zeros alike, so that nothing else moves, and sets how much the
-nodes of that configuration turn. Edges are held at their lengths by constraints, as a rod of MuJoCo has them.
+MuJoCo takes the natural curvature of a rod from its reference configuration, so actions change this configuration.
+Every update moves the drawn bodies and the zeros of their joints together, so that the state does not move. It also
+sets the rotations of the nodes in the reference. Constraints keep the lengths of edges, as usual for a rod of MuJoCo.
 """
 
 from __future__ import annotations

@@ -77,7 +77,7 @@ class ElasticaArm:
         self._system.add_forcing_to(self.rod).using(elastica.GravityForces, acc_gravity=np.array([0.0, 0.0, -gravity]))
         self._system.dampen(self.rod).using(
             elastica.AnalyticalLinearDamper,
-            # Of nodes [kg/s], not of a mass or a length: a node goes by exp(-constant / mass t).
+            # Damping of nodes [kg/s], not per mass or length: the velocity decays as exp(-constant / mass t).
             translational_damping_constant=drag * self.rod.mass / (DENSITY * _AREA),
             rotational_damping_constant=0.0,
             time_step=float(self._time_step),
@@ -150,6 +150,6 @@ def steps_a_second(time_step: float, actions: np.ndarray) -> float:
 
 
 def many_steps_a_second(time_step: float, actions: np.ndarray, processes: int) -> float:
-    """Of as many processes as there are processors, side by side: the sum of what each manages."""
+    """Steps per second of as many parallel processes as there are processors, summed over processes."""
     with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
         return sum(pool.map(steps_a_second, [time_step] * processes, [actions] * processes))

@@ -80,7 +80,7 @@ def throughput(report: Report, quick: bool, shown: object) -> dict[tuple[str, in
 
 
 def share_of_solving(report: Report, quick: bool) -> None:
-    """What a single environment's step is, apart from assembly and solve."""
+    """Measure the parts of a single environment's step apart from assembly and solve."""
     import time
 
     env = withe.learning.Environment(rl_arms.FreeArm())

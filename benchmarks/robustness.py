@@ -32,7 +32,7 @@ LIMIT = 5.0  # [s]
 
 @dataclass
 class Verdict:
-    """What became of a case: `reason` is empty where it was accepted, `balanced` whether forces were summed again."""
+    """Result of a case: `reason` is empty if it was accepted, `balanced` is true if its forces were summed again."""
 
     number: int
     reason: str = ""
@@ -160,7 +160,7 @@ def _static(case: StressCase, verdict: Verdict) -> list[np.ndarray]:
         if verdict.seconds > LIMIT:
             raise _RejectedError("slow", f"{verdict.seconds:.1f} s, {found.iterations} iterations")
         _check_finite(simulation)
-        # Whether a planar scene would fall over sideways is not asked.
+        # A planar scene need not be stable against motion out of the plane.
         if not found.stable and not (simulation.plan.planar and simulation.linearise().stability == "stable"):
             raise _RejectedError("unstable equilibrium", f"after {found.iterations} iterations")
         _judge_balance(balance.static_residual(case, simulation, moment), verdict)
@@ -206,7 +206,7 @@ def _apart(case: StressCase, a: np.ndarray, b: np.ndarray) -> float:
 
 
 def _usable(case: StressCase) -> str:
-    """What is wrong with a world after a named error; empty where nothing is."""
+    """Return the defect of a world after a named error; empty if there is none."""
     simulation = build(case)
     try:
         with _clock(3 * LIMIT):

@@ -138,7 +138,7 @@ def integrators() -> tuple[str, ...]:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Where the tip was.
+    """Motion of the tip.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What it takes to set a number of a rod of 1,000 nodes that touches a floor and itself, Python's call included.
+"""Cost of setting a parameter of a rod of 1,000 nodes that touches a floor and itself, with the Python call.
 
 python benchmarks/settings.py [--quick]
 """
@@ -33,7 +33,7 @@ def _simulation() -> withe.Simulation:
 
 
 def _settings(simulation: withe.Simulation) -> dict[str, Callable[[int], object]]:
-    """What sets another value each time, by its name."""
+    """Return functions that set another value each time, by their names."""
     random = np.random.default_rng(1)
     curvatures, moduli = random.normal(size=(7, NODES - 2, 2)), 1e6 * (1.0 + random.random((7, NODES - 1)))
     arm = "arm"

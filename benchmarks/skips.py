@@ -1,4 +1,4 @@
-"""What each skip of the plan saves: the same scene by the general path and by the one that the engine chooses.
+"""Saving of each skip of the plan: the same scene by the general path and by the path that the engine chooses.
 
     python benchmarks/skips.py [--quick]
 

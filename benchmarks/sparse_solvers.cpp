@@ -1,6 +1,6 @@
-// Factorising the matrix of a Newton iteration, and solving with it once, where rods are joined or touch: our sparse
-// LDL^T beside Eigen's SimplicialLDLT and CHOLMOD, each with its own approximate minimum degree, found beforehand; and
-// conjugate gradients on piles that have settled.
+// Time to factorise the matrix of a Newton iteration, and to solve with it once, for rods that are joined or touch. The
+// benchmark compares our sparse LDL^T with Eigen's SimplicialLDLT and CHOLMOD. Each uses its own approximate minimum
+// degree ordering, computed beforehand. It also runs conjugate gradients on settled piles.
 
 #include <benchmark/benchmark.h>
 
@@ -100,7 +100,7 @@ struct Problem : BenchmarkProblem {
   }
 };
 
-/// Of the last evaluation.
+/// Lower triangle of the matrix of the last evaluation.
 Eigen::SparseMatrix<double> lower_triangle(BenchmarkProblem& p) {
   const SparsityPattern& pattern = p.equations.assembler().pattern();
   LinearSolver& solver = p.solver();
@@ -205,7 +205,7 @@ struct Settled : BenchmarkProblem {
   }
 };
 
-/// What couples unknowns of one rod that are no farther apart than the stencils' band.
+/// Solver of the couplings within single rods that lie inside the band of the stencils.
 std::unique_ptr<LinearSolver> bands_of_rods(const Settled& p) {
   constexpr int kHalfBandwidth = 10;
   const int unknowns = p.model.dof_count / static_cast<int>(p.model.description.rods.size());

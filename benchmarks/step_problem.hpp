@@ -1,5 +1,5 @@
 #pragma once
-/// What the benchmarks in C++ set up: a scene and the equations of one of its steps.
+/// Setup of the benchmarks in C++: a scene and the equations of one of its steps.
 
 #include "integrators/newton.hpp"
 

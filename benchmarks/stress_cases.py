@@ -1,7 +1,7 @@
 """Scenes of the stress test: drawn by number from a fixed seed, each with one violent event or more.
 
-Young's modulus, radius, slenderness, nodes and step are drawn evenly in their logarithms over the whole range that the
-package promises to bear; the event is scaled by the rod's own stiffness, so that all of them bend and none is trivial.
+Young's modulus, radius, slenderness, nodes and step are drawn uniformly in their logarithms, over the whole range that
+the package supports. The event is scaled by the stiffness of the rod, so that all rods bend and no case is trivial.
 """
 
 from __future__ import annotations
@@ -41,8 +41,9 @@ class StressCase:
     method : str
         Integrator; "error-controlled" is the default one with a tolerance of a thousandth of the length.
     event : str
-        What happens: a sudden load, a clamp that jumps, actuation that flips sign, strong natural curvature of a
-        straight rod ("curl"), a rod drawn strongly curved that is straight by nature or gets a load, sudden weight.
+        Kind of the event: a sudden load, a clamp that jumps, actuation that flips sign, or sudden weight. "curl" is a
+        strong natural curvature of a straight rod. A rod drawn with strong curvature is straight by nature or gets a
+        load.
     youngs_modulus : float [Pa]
     radius : float [m]
     length : float [m]
@@ -94,7 +95,7 @@ class StressCase:
 
     @property
     def period(self) -> float:
-        """Of the slowest mode: bending, and swinging where there is weight [s]."""
+        """Period of the slowest mode, for bending and, with weight, swinging [s]."""
         factor = 22.373 if self.both_ends else 3.516
         square = factor**2 * self.stiffness / (self.line_density * self.length**4) + 1.44 * self.gravity / self.length
         return 2 * math.pi / math.sqrt(square)
@@ -223,7 +224,7 @@ def _jump(case: StressCase, moment: int) -> np.ndarray:
 
 
 def events(case: StressCase, simulation: withe.Simulation, moment: int) -> None:
-    """What happens before the first step (moment 0) and halfway (moment 1)."""
+    """Apply the event before the first step (moment 0) and halfway (moment 1)."""
     if case.event in ("load", "drawn curl"):
         simulation.set("load", force=tuple(load_of(case, moment)[1]))
     elif case.event == "jump":

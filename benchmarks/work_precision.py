@@ -2,13 +2,14 @@
 
     python benchmarks/work_precision.py [--quick] [--case "helix a"]
 
-With --case the others stay as the file of figures has them. Error is the RMS over time of the tip's distance from
-the method's own limit in space and time (`limits.py`), over the RMS of that motion; both sides choose nodes and
-steps freely, and a run that is off by more than half the motion counts for nobody. Time is processor time of one
-run on one thread, without recording; runs are interleaved and medians taken. PyElastica runs without damping and
-callbacks, numba warmed up, with n = 25 to 400 elements, at its largest stable step and half of it, with its own
-clamp and with its wall moved by half an element. Where one of its runs takes more than 2 s, five times 2 s are
-measured and scaled by steps (marked *).
+With --case, the other cases keep the values in the file of figures. The error is the RMS over time of the tip's
+distance from the method's own limit in space and time (`limits.py`), over the RMS of that motion. Both simulators
+choose nodes and steps freely. A run whose error exceeds half of the motion does not count. Time is processor time of
+one run on one thread, without recording. Runs are interleaved, and the table shows medians.
+
+PyElastica runs without damping and callbacks, after numba has compiled, with n = 25 to 400 elements. It uses its
+largest stable step and half of it, with its own clamp and with its wall moved by half an element. If one of its runs
+takes more than 2 s, five times 2 s are measured and scaled by steps (marked *).
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ class Point:
 
     @property
     def theirs(self) -> bool:
-        """Whether it is PyElastica's."""
+        """True if the method is PyElastica's."""
         return self.method.startswith("PyElastica")
 
     def as_json(self) -> dict:
@@ -101,7 +102,7 @@ def _their_points(case: Case, quick: bool) -> list[Point]:
 
 
 def _stable_step(case: Case, edges: int) -> float:
-    """Of Verlet, from what a build with too long a step would say; planned at once for all runs."""
+    """Return the stable step of Verlet, from the plan of a build; planned at once for all runs."""
     from rods_in_motion import simulation
 
     plan = simulation(case, edges, integrator="verlet", time_step=1e-9).plan
@@ -139,7 +140,7 @@ def _their_motion(case: Case, point: Point, duration: float):
         return ElasticaRun(case, point.edges, duration, point.step, moved_wall=moved).record()
     fraction = point.step
     largest = largest_stable_step(case, point.edges, moved_wall=moved)
-    # What survives a short run may still end badly in a long one.
+        # A step that survives a short run may still fail in a long run.
     for shrink in (1.0, 0.93, 0.8, 0.6):
         point.step = fraction * shrink * largest
         motion = ElasticaRun(case, point.edges, duration, point.step, moved_wall=moved).record()

@@ -6,8 +6,9 @@
     python tools/prose_lint.py FILE ...            # these files
 
 BASE is by default the commit where this branch left the published main branch, or the commit before this one. The exit
-status is 1 if there is a finding. Code in backticks, doctests, fenced blocks and strings that contain Python is not
-prose. Each cell of an aligned table is a text of its own.
+status is 1 if there is a finding. Generated files are not checked: the stub of the compiled module, and
+benchmarks/README.md, which quotes the output of runs. Code in backticks, doctests, fenced blocks and strings that
+contain Python is not prose. Each cell of an aligned table is a text of its own.
 
 Findings:
 
@@ -35,7 +36,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 SUFFIXES = {".py", ".cpp", ".hpp", ".md"}
-EXCLUDED = re.compile(r"python/withe/_core\.pyi|tests/data/|tools/licenses/")
+EXCLUDED = re.compile(r"python/withe/_core\.pyi|benchmarks/README\.md|tests/data/|tools/licenses/")
 MAX_WORDS = 35
 MIN_MESSAGE_WORDS = 4  # a shorter string literal is a name or a key
 
