@@ -1,8 +1,8 @@
 """A hand picks a rope off the floor in its middle, carries it aside and lets go.
 
-The rope lies straight. The hand takes 2 cm of it, lifts, carries, lowers and opens: all of it in one path. What is
-checked is that grasp and release leave the energy as it is, that the hand carries the part of the weight that the floor
-does not, and that in the end the rope rests again, on the floor.
+The rope lies straight. One path leads the hand: it takes 2 cm of the rope, lifts, carries, lowers and opens. The
+example checks three things. Grasp and release do not change the energy. The hand carries the part of the weight that
+the floor does not. In the end the rope rests on the floor again.
 
 Writes out/carry_rope.png.
 """

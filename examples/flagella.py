@@ -5,10 +5,10 @@ segments every flagellum stirs the fluid around the others, and they wind around
 resistive-force theory none knows of the others: each does exactly what its neighbour does, and they stay as far apart
 as they were. Both are checked. Writes out/flagella.png.
 
-How contact is handled once they bundle is compared in flagella_contact.py. At 15 turns a minute,
-`--count 3 --rate 1.5708 --duration 60 --step 1e-2`, three flagella first touch after 49.6 s. Choi's dissertation,
-section 5.6, says 15 rad/s, at which they touch within seconds; but its table 5.1 has 6.04e5 iterations at 3.01 a step
-of 1 ms with contact, in 250 s: contact began after 49.3 s there.
+flagella_contact.py compares two treatments of contact once the flagella bundle. At 15 turns a minute (`--count 3 --rate
+1.5708 --duration 60 --step 1e-2`), three flagella first touch after 49.6 s. Choi's dissertation, section 5.6, states
+15 rad/s, at which they touch within seconds. Its table 5.1, however, has 6.04e5 iterations at 3.01 per step of 1 ms
+with contact, in 250 s. Contact therefore began after 49.3 s there.
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
 """Flagella in a bundle, under two energies of contact from the same state: IMCv2, which is finite, and a barrier.
 
-The comparison of section 5.6.2 of Choi's dissertation, and its friction example, 5.6.3: steps of 1 ms at 15 rad/s from
-states in which the flagella touch, made by 9 s of turning and more under the barrier, which keeps surfaces apart, and
-kept in out/. Printed are iterations and processor time a step, with the fluid and without what its Stokeslets take, and
-the mean distance of the same nodes over the radius, (5.18). Fails when that exceeds 0.05, or flagella never touch.
+This repeats the comparison of section 5.6.2 of Choi's dissertation, and its friction example, 5.6.3. Steps of 1 ms at
+15 rad/s start from states in which the flagella touch. These states are made by 9 s of turning and more under the
+barrier, which keeps surfaces apart, and are stored in out/. The example prints iterations and processor time per step,
+with the fluid and without the time of its Stokeslets. It also prints the mean distance of equal nodes over the radius,
+(5.18). It fails if that distance exceeds 0.05, or if flagella never touch.
 
 `--full` runs from the drawn shape for 250 s as the source did, for its tables 5.1 and 5.2: hours; `--duration` shortens
 it. Only steps with a contact count there, as in the source. Writes out/flagella_contact.png.

@@ -101,7 +101,7 @@ class Controller:
 
 
 def tip_of_state(arm: withe.Simulation, size: int) -> np.ndarray:
-    """How the tip moves with each number of the state, shape (3, size)."""
+    """Derivative of the tip by each component of the state, shape (3, size)."""
     start, small = arm.positions("arm")[-1], 1e-6
     out = np.zeros((3, size))
     for column in range(size):

@@ -5,9 +5,9 @@ Some arms go on for a short horizon under the policy. The run of each is differe
 
     L = sum_k sqrt(d_k^2 + e^2),    d_k from the tip to the target after control step k, e = 3 cm,
 
-by every action a_k of the horizon. The policy's weights then take a step of Adam down sum_k dL/da_k . pi(o_k), with
-observations o_k as they were seen: what an action changes in later observations is left out, and what comes after the
-horizon too. Both make the gradient cheap and calm, and cost foresight beyond the horizon.
+by every action a_k of the horizon. The policy's weights then take a step of Adam down sum_k dL/da_k . pi(o_k), with the
+observations o_k as recorded. The effect of an action on later observations is ignored, and so is everything beyond the
+horizon. Both make the gradient cheap and less noisy, at the cost of foresight beyond the horizon.
 
 python examples/follow_by_gradients.py [STEPS] [SEED] [FOLDER]; 300,000 control steps by default.
 """

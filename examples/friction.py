@@ -1,10 +1,10 @@
 """A rod at rest on a floor is pushed along itself, with 44 forces: it sticks, or slides as a block does.
 
-A block of mass m that a force F pushes for a time t over a floor with friction mu has the kinetic energy
-(F - mu m g)^2 t^2 / (2 m), and none up to F = mu m g = 3.92 N. The rod is that of section 6.3.3 of Choi's dissertation.
-Friction is regularised, as there. Anchors, the default, give by a twentieth of the distance tolerance before they slip:
-a block that is pushed all at once gathers some 8 mm/s on the way, 4 % of the energy of the slowest one here.
-Fails when one that should stick has more than 0.0001 J, or one that slides is more than 1 % off.
+A force F pushes a block of mass m for a time t over a floor with friction mu. Above F = mu m g = 3.92 N the block gains
+the kinetic energy (F - mu m g)^2 t^2 / (2 m), and none below. The rod is that of section 6.3.3 of Choi's dissertation.
+Friction is regularised, as there. Anchors, the default, would yield by a twentieth of the distance tolerance before
+they slip. A block under a sudden force gains some 8 mm/s on this way, which is 4 % of the energy of the slowest block
+here. The example fails if a rod that should stick has more than 0.0001 J, or a sliding rod is more than 1 % off.
 
 Writes out/friction.png.
 """

@@ -1,17 +1,18 @@
-"""Granny and reef knots in one rod, the bottom of their loop held, their ends pulled apart: the reef knot pulls harder.
+"""Granny and reef knots in one rod: the bottom of the loop is held, the ends are pulled, and the reef knot pulls
+harder.
 
-The scene of section 5.8 of Choi's dissertation: mean pull over 13 s at three coefficients of friction, over 6.4 s at
-four moduli. Its 10 cm/s for each grip would put them 2.6 m apart, in a rod of 1 m; here it is 1 cm/s. Knots are drawn
-with their tails sideways, brought to rest without friction, and then clamped at the bottom as they lie, so that a pull
-begins with nothing that its time step could change. Fails when the reef knot does not pull harder by more than twice
-what half the step changes.
+The scene is that of section 5.8 of Choi's dissertation: the mean pull over 13 s at three coefficients of friction, and
+over 6.4 s at four moduli. The source moves each grip at 10 cm/s, which would put the grips 2.6 m apart in a rod of 1 m.
+Here the speed is 1 cm/s. The knots are drawn with their tails sideways, brought to rest without friction, and then
+clamped at the bottom as they lie. The result then does not depend on the time step at the start. The example fails if
+the pull of the reef knot does not exceed that of the granny knot by twice the change for half the step.
 
-Both knots are equal to themselves turned by half a turn, and this equilibrium is unstable: the tails press the loops
-down, which would rather lean over. Rounding seeds that, and it grows at a rate that goes with the square root of the
-modulus: soft knots are closed before it shows, stiff ones lean over early and then pull harder. So the mean pull F h^2
-/ B does depend on the modulus here, as in the source, though quasi-static pulls cannot. Knots that lean from the start,
-by a nudge while they come to rest, pull at 1.8e6 and 1.8e7 Pa alike, which is checked too (to 5 %); but then the granny
-knot pulls a little harder: which knot does is no matter of the knot alone.
+Both knots are symmetric under half a turn, and the symmetric equilibrium is unstable: the tails press the loops down,
+and the loops lean over. Rounding starts this motion, which grows at a rate proportional to the square root of the
+modulus. Soft knots are closed before they lean. Stiff knots lean over early and then pull harder. The mean pull
+F h^2 / B therefore depends on the modulus here, as in the source. Quasi-static pulls would not depend on it. Knots that
+lean from the start, by a nudge while they come to rest, pull equally at 1.8e6 and 1.8e7 Pa; the example checks this to
+5 %. In that case the granny knot pulls a little harder: the order of the knots depends on more than the knot.
 
 Takes three minutes. Writes out/granny_reef.png and a picture of each knot.
 """
@@ -61,7 +62,7 @@ def bending(modulus: float) -> float:
 
 
 def pace(modulus: float) -> float:
-    """How much faster such a rod moves than one of the source's modulus."""
+    """Speed of such a rod relative to a rod with the modulus of the source."""
     return float(np.sqrt(modulus / MODULUS))
 
 

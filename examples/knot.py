@@ -41,7 +41,7 @@ TOLERANCE, ENERGY_TOLERANCE = 0.06, 0.03
 
 
 class Way(NamedTuple):
-    """What was measured as the grips went from one distance to another."""
+    """Measurements while the grips moved from one distance to another."""
 
     shortening: np.ndarray  # e / h
     force: np.ndarray  # F h^2 / B

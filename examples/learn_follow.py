@@ -30,7 +30,7 @@ class Aimed(withe.learning.Follow):
     """Follow, where the learner is told besides how its target lies from the tip, as through a lens within 0.1 m."""
 
     def observe(self, robots: withe.Batch) -> np.ndarray:
-        """Of each robot, shape (n, 79)."""
+        """Observations of each robot, shape (n, 79)."""
         seen = super().observe(robots)
         apart = seen[:, 70:73] - seen[:, 27:30]
         return np.hstack([seen, np.tanh(apart / 0.1)])
@@ -51,7 +51,7 @@ def discounted_return(choose: Any, episodes: int = 16, seed: int = 1000, task: A
 
 
 class Curve:
-    """How good a policy is while it learns, by steps and time of all processors; the latest is kept in a file."""
+    """Score of a policy while it learns, by steps and time of all processors; the latest policy is stored in a file."""
 
     def __init__(self, folder: Path, between: int = BETWEEN, task: Any = None) -> None:
         self.folder, self.between, self.task, self.rows = folder, between, task, []

@@ -48,7 +48,7 @@ def jawed(n: int, shortening: float) -> float:
 
 
 class Pull(NamedTuple):
-    """What was measured on the way, and how the knot lay at some e / h."""
+    """Measurements during the pull, and shapes of the knot at some e / h."""
 
     shortening: np.ndarray  # e / h
     force: np.ndarray  # F h^2 / B

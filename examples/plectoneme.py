@@ -1,8 +1,9 @@
 """A twisted rod under tension winds up about itself: its helices against the theory of plectonemes.
 
-The ends of a rod are held so that it keeps its link, and pulled with a force F. Two of its strands wind about each
-other; R is half their distance, B the bending stiffness. Clauvelin, Audoly and Neukirch (2009) find the angle of the
-strands to their common axis, the twisting moment and the contact force per length of strand from F R^2 / B alone:
+Supports hold the ends of a rod so that it keeps its link, and pull it with a force F. Two of its strands wind about
+each other, at a distance of 2 R. The bending stiffness is B. From F R^2 / B alone, Clauvelin, Audoly and Neukirch
+(2009) find the angle a of the strands to their common axis, the twisting moment M, and the contact force p per length
+of strand:
 
     F R^2 / B = sin^3 a (cos a tan 2a - sin(a) / 2),   M R / B = (2 / sin 2a) (sin^4(a) / 2 + F R^2 / B),
     p R^3 / B = F R^2 / B - sin^4(a) / 2.
@@ -47,7 +48,7 @@ def theory(angle: float | np.ndarray) -> Plectoneme:
 
 
 def theory_at(force: float) -> Plectoneme:
-    """What belongs to a force F R^2 / B: it grows with the angle, which is found by halving."""
+    """Plectoneme of a force F R^2 / B. The force increases with the angle, so bisection finds the angle."""
     low, high = 0.0, 0.7
     for _ in range(60):
         middle = 0.5 * (low + high)
@@ -105,7 +106,7 @@ def wind(force: float, turns: int, edge: float) -> tuple[withe.Simulation, withe
 
 
 def measure(simulation: withe.Simulation, rod: withe.Rod) -> tuple[Plectoneme, float]:
-    """What the middle two fifths of a plectoneme are like, and half the distance of its strands [m]."""
+    """Properties of the middle two fifths of a plectoneme, and half the distance of its strands [m]."""
     contacts = simulation.contacts()
     middle = contacts["point"].mean(axis=0)
     axis = np.linalg.svd(contacts["point"] - middle)[2][0]

@@ -1,9 +1,9 @@
 """A jaw that yields folds a sheet of paper over and presses its edge down, though it comes 2 mm too low.
 
 The sheet is A4, planar, and touches the table and itself with friction. A rigid jaw that is led below the table could
-go nowhere: that is an error. This one holds the edge by springs, and slips at a force limit. What is checked is that it
-presses with its stiffness times how much too low it is, and with its limit in the end, and that the table bears the
-sheet's weight and what the jaw presses with.
+not move, which is an error. This jaw holds the edge by springs, and slips at a force limit. The example checks two
+forces. The jaw presses with its stiffness times its depth below the table, and in the end with its limit. The table
+carries the weight of the sheet and the force of the jaw.
 
 Writes out/press_sheet.png.
 """
@@ -55,14 +55,14 @@ def scene_of(edges: int) -> tuple[withe.Scene, withe.Rod]:
 
 
 def way(t: float) -> tuple[float, float]:
-    """Of the sheet's outer edge along half a circle: angle [rad], and how much lower it is led than that [m]."""
+    """Path of the sheet's outer edge along half a circle: its angle [rad], and how far it is led below that [m]."""
     share = np.clip(t / FOLDING, 0.0, 1.0)
     lower = np.clip((t - FOLDING) / LOWERING, 0.0, 1.0)
     return float(np.pi * (share - np.sin(2.0 * np.pi * share) / (2.0 * np.pi))), float(LOW * lower)
 
 
 def pose(t: float, middle: np.ndarray, axes: np.ndarray, off: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    """Of the jaw, or of what is `off` its middle across the sheet [m]."""
+    """Pose of the jaw, or of a point at a distance `off` from its middle across the sheet [m]."""
     angle, lower = way(t)
     reach = 0.25 * LENGTH
     cosine, sine = np.cos(angle), np.sin(angle)

@@ -106,7 +106,7 @@ def build() -> tuple[withe.Simulation, list[Leg]]:
 
 
 def gait(steps: int) -> list[tuple[float, int, Callable[[withe.Simulation, Leg], None]]]:
-    """What happens: the time, the legs (even or odd ones) and a function of the simulation and each of them."""
+    """Events of the gait: the time, the legs (even or odd), and a function of the simulation and each of them."""
 
     def bend(forward: float, up: float, over: float) -> Callable[[withe.Simulation, Leg], None]:
         return lambda simulation, leg: simulation.set(leg.rod, natural_curvature=leg.curvature(forward, up), over=over)

@@ -83,7 +83,7 @@ def swing(simulation: withe.Simulation, servo: withe.Joint, parts: list[tuple[fl
 
 
 def deflection(record: withe.Record) -> np.ndarray:
-    """Of the tip from where it would stand at a right angle, across the arm [m]."""
+    """Deflection of the tip from its place at a right angle, across the arm [m]."""
     return np.asarray(record.positions("arm")[:, -1, 0])
 
 

@@ -62,7 +62,7 @@ def crawl(
 
 
 def draw(shapes: np.ndarray, speeds: np.ndarray, path: Path) -> None:
-    """Where the snake was, from above, and how fast it went."""
+    """Draw the positions of the snake from above, and its speed."""
     import matplotlib
 
     matplotlib.use("Agg")

@@ -1,4 +1,4 @@
-"""What a camera saw of a robot of two soft limbs, explained: its camera, and how its muscles bend it over time.
+"""Fit of camera data of a robot of two soft limbs: its camera, and how its muscles bend it over time.
 
 Two silicone limbs, one after the other, are bent by wires of a shape-memory alloy; a camera follows nine tags on them
 [Pacheco Garcia et al. 2023]. Half of the 169 frames calibrate the camera with the robot's own shapes. Then two numbers

@@ -5,10 +5,10 @@ steps of backward Euler of 1 ms, as a viscosity of E x 1 ms would. Here the mate
 rule adds none, so that steps can be halved. Backward Euler at 1 ms leaves nodes a limb's length elsewhere after the
 impact. Without viscosity, steps of 0.1 and 0.05 ms part at the second impact, by 3 % of a limb.
 
-Fails when half the step, or twice the edges, moves a node by more than 2 % of a limb at any time, when the top is more
-than 1 mm from where the public code has it before the floor acts, or when the spider does not come to rest. The fall
-that is its own mirror image is unstable: what a top 1e-9 m aside changes grows e times in 0.23 s, so there not nodes
-are compared but kinetic and elastic energy. Writes out/spider.png and out/spider_plot.png.
+The example fails in three cases. Half the step, or twice the edges, moves a node by more than 2 % of a limb at any
+time. The top is more than 1 mm from its position in the public code before the floor acts. The spider does not come to
+rest. The mirror-symmetric fall is unstable: a deviation of the top by 1e-9 m grows e times in 0.23 s. For this fall the
+example compares kinetic and elastic energy, not nodes. Writes out/spider.png and out/spider_plot.png.
 """
 
 from __future__ import annotations

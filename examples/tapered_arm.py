@@ -100,11 +100,11 @@ class Design:
         self._last: tuple[bytes, tuple[Held, Held]] = (b"", ())
 
     def radii(self, design: np.ndarray) -> np.ndarray:
-        """Of all edges [m]."""
+        """Radii of all edges [m]."""
         return 1e-3 * self.basis @ design[:-1]
 
     def arms(self, design: np.ndarray) -> tuple[Held, Held]:
-        """Without and with the weight."""
+        """Build the arm without and with the weight."""
         if self._last[0] != design.tobytes():
             radii, moment = self.radii(design), 1e-3 * design[-1]
             self._last = design.tobytes(), (hold(radii, moment, 0.0), hold(radii, moment, WEIGHT))
@@ -136,7 +136,7 @@ class Design:
         return value, self.by_design(gradient(loaded, down) - gradient(free, down))
 
     def mass(self, design: np.ndarray) -> tuple[float, np.ndarray]:
-        """Of the arm [g]."""
+        """Mass of the arm [g]."""
         radii, edge = self.radii(design), 1e3 * DENSITY * np.pi * LENGTH / EDGES
         return edge * float(np.sum(radii**2)), self.by_design(np.append(2.0 * edge * radii, 0.0))
 

@@ -5,11 +5,11 @@ controls u. They are found by L-BFGS-B, within what the muscles can do, for the 
 
     J(u) = sum_i |x_tip(t_i) - p_i|^2 / a^2 + w sum_k |u_k - u_(k-1)|^2,
 
-with points p_i, times t_i and the accuracy a that is worth as much as the second term, which prefers smooth controls.
-The run is differentiable, so that J has derivatives by the value of every call that set a curvature while it went,
-after one way back (the adjoint method), through contact with the floor too: it is of a given stiffness and without
-friction. Fails when the tip misses a point, when derivatives are not those of differences, or when the arm never left
-the floor to come back to it.
+with points p_i, times t_i, and an accuracy a that is worth as much as the second term, which prefers smooth controls.
+The run is differentiable. One backward pass (the adjoint method) gives the derivative of J by the value of every call
+that set a curvature during the run. It passes through contact with the floor too, which has a given stiffness and no
+friction. The example fails if the tip misses a point, if derivatives differ from finite differences, or if the arm does
+not leave the floor and come back.
 
 Writes out/throwing_tip.png.
 """

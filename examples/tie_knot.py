@@ -46,7 +46,7 @@ def arc(centre: float, radius: float, first: float, last: float) -> list[tuple[f
 
 
 def laid(number: int, pattern: Pattern, way: str) -> LayPlan:
-    """Of a cable of the dissertation, over itself where it crosses."""
+    """Plan for a cable of the dissertation that crosses over itself."""
     return plan(Cable.dlo(number), pattern, way, crossings="over", tail=TAIL)
 
 
@@ -106,7 +106,7 @@ def joined(centrelines: tuple[np.ndarray, ...]) -> tuple[np.ndarray, bool]:
 
 
 def is_tied(name: str, found: Tying) -> bool:
-    """Whether that knot is there in the end."""
+    """True if the final cables form that knot."""
     curve, closed = joined(found.centrelines)
     polynomial, signature = KNOTS[name]
     seen = withe.knots.alexander_polynomial(curve, closed=closed).tolist()

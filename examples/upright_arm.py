@@ -1,10 +1,10 @@
 """An arm that is too slender to stand is kept upright by its muscles: LQR from the Jacobian of a step.
 
-An upright column of bending stiffness B and weight w per length buckles under it beyond l^3 = 7.837 B / w (Greenhill
-1881). This one is 1.37 times as long. Its lower half has a muscle, whose natural curvature is all that a
-linear-quadratic regulator may change, once in a time step; x' = A x + B u of a step comes from `step_jacobian`, the
-state from `state_difference`. A force pushes at the tip. Fails when the arm falls with the regulator, stands without,
-or when the step's growing mode is not that of the linearised equations.
+An upright column of bending stiffness B and weight w per length buckles under its weight beyond l^3 = 7.837 B / w
+(Greenhill 1881). This column is 1.37 times as long. Its lower half has a muscle. A linear-quadratic regulator changes
+only the natural curvature of this muscle, once per time step. `step_jacobian` gives x' = A x + B u of a step, and
+`state_difference` gives the state x. A force pushes at the tip. The example fails if the arm falls with the regulator
+or stands without it, or if the growing mode of the step is not that of the linearised equations.
 
 Writes out/upright_arm.png.
 """
@@ -71,7 +71,7 @@ def regulator(simulation: withe.Simulation, shape: np.ndarray) -> tuple[np.ndarr
     """A, B and the gain of u = -K x about the present state."""
     A, by_stencil = (m.toarray() for m in simulation.step_jacobian([(simulation["arm"], "natural_curvature")]))
     B = by_stencil @ shape.reshape(-1, 1)
-    # What counts are displacements of nodes, 1 for a tenth of the length, and curvature, 1 for a quarter turn.
+    # The cost weighs displacements of nodes (1 for a tenth of the length) and curvature (1 for a quarter turn).
     C = simulation.linearise().displacement / (0.1 * LENGTH)
     unknowns = len(A) // 2
     Q = np.zeros_like(A)

@@ -1,7 +1,7 @@
 """Build a wheel that runs without root or compiler, check what it carries, and try it in a clean environment.
 
-KLU, AMD, COLAMD and BTF travel inside as shared libraries; a wheel with a library that is partly GPL or that
-drags in BLAS or Fortran is refused, and so is one that needs a newer glibc than 2.34.
+KLU, AMD, COLAMD and BTF travel inside as shared libraries. Three kinds of wheels are refused: a wheel with a library
+that is partly GPL, one that needs BLAS or Fortran, and one that needs a newer glibc than 2.34.
 """
 
 import platform

@@ -1,4 +1,4 @@
-// Where stencils' numbers go: bands stay bands, scatter agrees with a dense sum, supports are projected out.
+// Places of stencils' numbers: bands stay bands, scatter agrees with a dense sum, supports are projected out.
 
 #include <gtest/gtest.h>
 

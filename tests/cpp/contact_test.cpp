@@ -1,4 +1,4 @@
-// What touches what, against brute force. The oracles:
+// Touching pairs, against brute force. The oracles:
 //   - closest points: the least of |p - q|^2 plus the small weights over a fine grid of both parameters;
 //   - overlaps of boxes: every pair, one by one;
 //   - what touches, and how far an iterate may go: every pair of edges, along the way too, without memory of others.
@@ -235,8 +235,8 @@ struct Walk {
     return kept;
   }
 
-  /// A way is cut where surfaces come near, or after a hundred steps past what stays apart: the farthest that bodies
-  /// have come towards each other by then is a hundred times how near they were, beyond the least distance.
+  /// An iterate is shortened where surfaces come near, or after a hundred steps past surfaces that stay apart. By then
+  /// the approach of two bodies is at most a hundred times their initial distance beyond the least distance.
   void expect_nothing_passes(const VectorX& change, double kept) const {
     const auto distance = [&](const ContactPair& pair, double share) {
       return apart(bodies, pair, q + share * change).centrelines;
@@ -302,7 +302,7 @@ TEST(Candidates, FindWhatTouchesAndHowFarItMayGoAsBruteForceDoesWhateverCameBefo
   EXPECT_GT(touching, 100);
 }
 
-/// What a step asks of contact, as bits.
+/// Results that a step needs from contact, as bits.
 std::vector<double> answers(Contact& contact, const VectorX& q, const VectorX& change) {
   std::vector<double> out{contact.allowed(q, change)};
   contact.update(q + out[0] * change);
@@ -373,7 +373,8 @@ TEST(Contact, ReadOutsChangeNoBitOfWhatFollows) {
   EXPECT_GT(touching, 100);
 }
 
-/// Of a distance by three heights, over a way in which the directions at both ends do works that differ by `apart`.
+/// Share of a distance by three heights, over a motion for which the directions at both ends do works that differ by
+/// `apart`.
 StartShare share_of(double apart, double nearer) {
   const double way[3] = {-1e-4, -2e-4, -1e-4}, first[3] = {0.1, 0.8, 0.1};
   const double last[3] = {0.1 + 1e-3, 0.8 - 0.5e-3 + 0.5e4 * apart, 0.1};

@@ -116,7 +116,7 @@ void random_touch(RandomNumbers& random, Other other, FrictionLaw law, bool plan
   else
     place(random, other, planar, c, x);
   press(c);
-  // How near it is says whether it presses.
+  // The distance decides if the curve presses.
   if (curved(other)) c.pair.radius_a = 0.3 + curve_distance(c.pair.piece, c.obstacle, x).distance - c.pair.radius_b;
   f.pair = &c.pair;
   f.obstacle = other == Other::rod ? nullptr : &c.obstacle;

@@ -1,8 +1,8 @@
 #pragma once
-/// The one derivative check. The claimed derivative J of f at x is compared with central differences
-/// (f(x + h e_i) - f(x - h e_i)) / 2h over three decades of the increment h. The difference must fall at second
-/// order in h until rounding stops it, and its best must be below 1e-7 of the greatest entry of J. A wrong term
-/// shows as a difference that stops falling, whatever its size.
+/// The one derivative check. It compares the claimed derivative J of f at x with central differences (f(x + h e_i) -
+/// f(x - h e_i)) / 2h over three decades of the increment h. The difference must fall at second order in h until
+/// rounding stops it. Its smallest value must be below 1e-7 of the greatest entry of J. A wrong term of any
+/// size shows as a difference that stops falling.
 
 #include <gtest/gtest.h>
 

@@ -51,8 +51,8 @@ struct Step {
     const BendTwistEnergy e = kind == Kind::bend ? bend_energy_of(k, at_q, i) : half_energy_of(k, at_q, i);
     return e.bend + e.twist;
   }
-  /// What the forces do their work over: of an angle 2 tan(D / 2), and of an edge's that by how much of the mean of its
-  /// tangents lies along it in the middle; of a frame its Cayley vector.
+  /// Displacements over which the forces do their work. For an angle this is 2 tan(D / 2). For an edge's angle it is
+  /// divided by the part of the mean tangent along the middle tangent. For a frame it is its Cayley vector.
   VectorX way() const {
     VectorX out = change;
     const auto turn = [&](int dof) { return 2.0 * std::tan(0.5 * change(dof)); };
@@ -83,7 +83,7 @@ TEST(DiscreteElements, DoTheWorkThatTheEnergyChangesBy) {
         }
         const double e0 = step.energy(kind, i, step.start), e1 = step.energy(kind, i, step.end);
         if (!c.model.planar() && kind != Kind::stretch) {
-          // Of forces that direct transport makes of torques, torque times spin, there is no work in a step.
+          // Direct transport makes forces of torques (torque times spin), which do no work in a step.
           const auto without = [&](int edge, int tail, int head, int angle) {
             for (int x = 0; x < 3; ++x) {
               const double f = local.gradient[angle] * step.middle.edge[at(edge)].spin[x];

@@ -159,9 +159,9 @@ double straight_drag(int nodes, double regularization, const Vector3& velocity) 
 }
 
 TEST(Stokeslets, AStraightRodHasTheDragOfASlenderCylinder) {
-  // F = 2 pi mu L U (1/s + .80685/s^2 + .82854/s^3) along it, 4 pi mu L U (1/s - .19315/s^2 + .21484/s^3) across it,
-  // s = ln(L/a) [Keller and Rubinow 1976]; what is left is of the order of 1/s^4,
-  // and a / L for the ends, which the blobs round.
+  // F = 2 pi mu L U (1/s + 0.80685/s^2 + 0.82854/s^3) along it, 4 pi mu L U (1/s - 0.19315/s^2 + 0.21484/s^3) across
+  // it. Here s = ln(L/a) [Keller and Rubinow 1976]. The remaining error is of the order of 1/s^4, plus a / L for the
+  // ends, which the blobs round.
   for (double slenderness : {100.0, 1000.0}) {
     const double s = std::log(slenderness), radius = 1.0 / slenderness;
     const double along = 0.25 * (1.0 / s + 0.80685 / (s * s) + 0.82854 / (s * s * s));

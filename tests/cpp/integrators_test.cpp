@@ -288,8 +288,8 @@ TEST(Equations, MatrixWithRotaryInertiaIsExactWhereNothingMovesYet) {
   }
 }
 
-/// Rows of frames are moments in energy-momentum steps, and derivatives of the energy by a Cayley vector else: where
-/// nothing has moved yet they are the same, and turn by half of what frames turn against them.
+/// Rows of frames are moments in energy-momentum steps, and otherwise derivatives of the energy by a Cayley vector. If
+/// nothing has moved yet, both agree, but their Jacobians differ by a rotation of half of the frame's rotation.
 VectorX half_turned(const Model& model, const VectorX& force, const VectorX& x) {
   VectorX out = VectorX::Zero(x.size());
   for (int dof : model.frame_dof)

@@ -196,7 +196,7 @@ struct ContactStep {
   Contact contact;
 };
 
-/// What all contacts do at c.q, and its derivative.
+/// Sum of all contact forces at c.q, and its derivative.
 struct ContactSum {
   VectorX gradient;
   MatrixX hessian;
@@ -347,7 +347,7 @@ std::array<double, kContactUnknowns> forces_of_pair(const Case& c) {
   return sum;
 }
 
-/// What all contacts take over the step to c.q, pressing included [J].
+/// Work of all contacts over the step to c.q, pressing included [J].
 double work_of_contact(const Case& c) {
   ContactStep step(c);
   const Contact& contact = step.contact;

@@ -1,4 +1,4 @@
-// What `build` decides: planes, stencils, joints, layout of the unknowns, natural shapes, masses.
+// Decisions of `build`: planes, stencils, joints, layout of the unknowns, natural shapes, masses.
 
 #include <gtest/gtest.h>
 

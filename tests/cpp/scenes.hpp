@@ -22,7 +22,7 @@ inline Matrix3 smallest_rotation(const Vector3& from, const Vector3& to) {
   return rotation_exp(std::atan2(normal.norm(), from.dot(to)) * normal.normalized());
 }
 
-/// What a rod is made of, the same along its length.
+/// Properties of a rod, constant along its length.
 struct RodMaterial {
   double stretch = 30.0;                  ///< EA [N]
   double bend1 = 1.0, bend2 = 0.7;        ///< EI1, EI2 [N m^2]
@@ -133,8 +133,8 @@ inline MatrixX3 arc(int nodes, double radius = 1.5) {
   return points;
 }
 
-/// Edges of length one in the xz plane whose neighbours turn by `turn` to and fro, each pair about an axis that
-/// is tilted a little, so that the chain is not planar, unless `planar` says so.
+/// Edges of length one in the xz plane whose neighbours turn by `turn` in alternating directions. Each pair turns about
+/// a slightly tilted axis, so that the chain is not planar, unless `planar` is true.
 inline MatrixX3 zigzag(int nodes, double turn, bool planar = false) {
   MatrixX3 points(nodes, 3);
   Vector3 x = Vector3::Zero(), t(1.0, 0.0, 0.0), axis(0.0, 1.0, 0.0);

@@ -1,4 +1,4 @@
-// What must not allocate: solvers after the first factorisation.
+// Code that must not allocate: solvers after the first factorisation.
 
 #include <gtest/gtest.h>
 

@@ -113,8 +113,9 @@ TEST(HandForces, WrenchIsWhatTheRodFeels) {
     for (const Case& c : all_cases(limit)) expect_wrench_is_felt(c, StepRule::statics);
 }
 
-/// A step of a scene whose hands have other poses, slips and stiffness, by numbers in a row: per hand how its start is
-/// displaced and turned, how its end is, six stiffnesses and the limit, over their own; then slips.
+/// A step of a scene whose hands have other poses, slips and stiffness, given by numbers in a row. Each hand has the
+/// displacement and rotation of its start, and of its end, six stiffnesses and the limit, relative to its own. The
+/// slips follow.
 struct Varied {
   Varied(const Case& of, StepRule under, const VectorX& numbers) : c(of), rule(under) {
     Eigen::Index next = 0;
@@ -158,7 +159,7 @@ struct Varied {
       for (const Vector3& slip : hand.slip) out.insert(out.end(), {slip.x(), slip.y(), slip.z()});
     return Eigen::Map<const VectorX>(out.data(), static_cast<Eigen::Index>(out.size()));
   }
-  /// What the adjoint says of the numbers.
+  /// Derivatives of the adjoint by the numbers.
   VectorX gradient(const StepAdjoint& by) const {
     VectorX out(size(c));
     Eigen::Index next = 0;

@@ -22,7 +22,7 @@ using testing::MatrixX;
 using testing::RandomNumbers;
 using testing::SceneBuilder;
 
-/// What holds the rod along itself, beside nothing: a drive, one that slips, and friction.
+/// Means that hold the rod along itself, or nothing: a drive, a drive that slips, and friction.
 enum class Along { nothing, drive, slipping_drive, friction };
 
 /// Two rings on a rod, that the rod has moved from and within.

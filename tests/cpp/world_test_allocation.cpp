@@ -163,9 +163,9 @@ TEST(Step, OnAFloorDoesNotAllocateAfterWarmUp) {
     }
 }
 
-/// Where contacts come and go, the vectors that hold them grow when there are more than ever before: each of them once,
-/// at most, as long as there are not twice as many. And the more pairs of edges have touched, the fewer are left for
-/// which the matrix has no room yet; what goes with it is new then.
+/// If contacts come and go, their vectors grow when there are more contacts than ever before. Each vector grows at most
+/// once while the number has not doubled. The more pairs of edges have touched, the fewer pairs are left without a
+/// place in the matrix; such a pair allocates too.
 constexpr std::size_t kVectors = 19;
 
 TEST(Step, WithContactsThatComeAndGoAllocatesForMoreThanEverOnly) {

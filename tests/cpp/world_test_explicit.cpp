@@ -16,7 +16,7 @@ TEST(Verlet, RefusesAStepAboveTheStableOne) {
   EXPECT_GT(fine.plan().stable_step, 5e-5);
 }
 
-/// What no explicit step needs is skipped where nothing drags; a drag too small to count asks for all of it.
+/// Explicit steps without drag skip some work. A negligible drag forces the general path.
 TEST(Verlet, WithoutDragTakesTheSameStepsAsTheGeneralPath) {
   SceneBuilder joint = testing::tee(JointForm::frame, false, testing::rubber());
   joint.scene.gravity = Vector3(0, 0, -1.0);
@@ -38,7 +38,7 @@ TEST(Verlet, WithoutDragTakesTheSameStepsAsTheGeneralPath) {
   }
 }
 
-/// Where an arm is after a fiftieth of a second, and what its energy balance is off by.
+/// Position of an arm after a fiftieth of a second, and the error of its energy balance.
 std::pair<MatrixX3, double> swing(double dt, bool follower) {
   SceneBuilder builder = testing::hanging_arm();
   builder.load(LoadKind::force, {0, 11}, Vector3::Zero(), follower);

@@ -197,7 +197,8 @@ TEST(Snapshot, RemembersThatAWorldLeftItsPlane) {
   expect_same_continuation(scene, Integrator::implicit_midpoint, [](World& w) { w.step(4); }, leave, "plane to leave");
 }
 
-/// What is prescribed is asked for within a step, which may have to be taken back to a start in the plane.
+/// A callback prescribes motion within a step. If the motion leaves the plane, the step returns to a start in the
+/// plane.
 TEST(Snapshot, OfAWorldThatLeavesItsPlaneWithinAStep) {
   const SceneDescription scene = testing::cantilever(21).scene;
   for (Integrator integrator : {Integrator::backward_euler, Integrator::implicit_midpoint, Integrator::energy_momentum,

@@ -19,7 +19,7 @@ SheetProblem::Path solved(double x, double z, double tip_moment = 0.0) {
   return data.path;
 }
 
-/// Of a square folded over its diagonal, the corner held: to the middle and on.
+/// Width of a square that is folded over its diagonal, held at the corner: up to the middle and beyond.
 SheetWidth diamond() { return {{0.0, 2.5, 6.5}, {0.1, 1.0, 0.0}}; }
 
 TEST(RungeKutta, IsOfEighthOrderOnAPendulum) {
