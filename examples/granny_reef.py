@@ -1,5 +1,4 @@
-"""Granny and reef knots in one rod: the bottom of the loop is held, the ends are pulled, and the reef knot pulls
-harder.
+"""Granny and reef knots in one rod, whose bottom is held and whose ends are pulled: the reef knot pulls harder.
 
 The scene is that of section 5.8 of Choi's dissertation: the mean pull over 13 s at three coefficients of friction, and
 over 6.4 s at four moduli. The source moves each grip at 10 cm/s, which would put the grips 2.6 m apart in a rod of 1 m.

@@ -1,14 +1,14 @@
 """A twisted rod under tension winds up about itself: its helices against the theory of plectonemes.
 
 Supports hold the ends of a rod so that it keeps its link, and pull it with a force F. Two of its strands wind about
-each other, at a distance of 2 R. The bending stiffness is B. From F R^2 / B alone, Clauvelin, Audoly and Neukirch
-(2009) find the angle a of the strands to their common axis, the twisting moment M, and the contact force p per length
-of strand:
+each other, at a distance of 2 R. The bending stiffness is B. The theory of Clauvelin, Audoly and Neukirch (2009)
+depends on F R^2 / B alone. It gives the angle a of the strands to their common axis, the twisting moment M, and the
+contact force p per length of strand:
 
     F R^2 / B = sin^3 a (cos a tan 2a - sin(a) / 2),   M R / B = (2 / sin 2a) (sin^4(a) / 2 + F R^2 / B),
     p R^3 / B = F R^2 / B - sin^4(a) / 2.
 
-Fails when the angle or the moment is more than 3 % off, or the contact force 5 %. What is measured lies between the
+Fails when the angle or the moment is more than 3 % off, or the contact force 5 %. The measured part lies between the
 ends of the plectoneme, where the theory holds. Writes out/plectoneme.png and out/plectoneme_plot.png.
 """
 

@@ -1,7 +1,7 @@
 """A motion known in closed form that answers to the read-outs of a Simulation, without an engine.
 
-Rod "arm" hangs from the origin and curls into an arc in the x-z plane, its curvature growing evenly in
-time; rod "hand" goes on where the arm ends, at a joint; rod "ring" is closed and rises at 0.1 m/s.
+Rod "arm" hangs from the origin and curls into an arc in the x-z plane, with a curvature that grows linearly in time.
+Rod "hand" continues at the end of the arm, at a joint. Rod "ring" is closed and rises at 0.1 m/s.
 """
 
 from __future__ import annotations

@@ -75,7 +75,7 @@ def lines_seen(shapes, noise, seed):
 
 
 def distances(shapes, truth):
-    """Of nodes from where they truly are, (times, nodes) [m]."""
+    """Distances of nodes from their true positions, (times, nodes) [m]."""
     at, of = (np.linspace(0.0, 1.0, each.shape[1]) for each in (shapes, truth))
     true = np.array([[np.interp(at, of, column) for column in shape.T] for shape in truth]).transpose(0, 2, 1)
     return np.linalg.norm(shapes - true, axis=2)

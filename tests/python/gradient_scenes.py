@@ -55,7 +55,7 @@ class Drawn:
         self.simulation = scene.build(integrator=integrator, planar=planar or None, **TIGHT, **options)
 
     def vectors(self, random, count):
-        """Of so many nodes, in the plane of a planar scene."""
+        """Random vectors of so many nodes, in the plane of a planar scene."""
         out = random.normal(size=(count, 3))
         if self.planar:
             out[:, 1] = 0.0

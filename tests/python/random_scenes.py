@@ -68,7 +68,7 @@ class SpringsJacobian:
 
 
 class Interrupting:
-    """What a user's Ctrl-C looks like from inside a callback, at its call of a number."""
+    """Callback that raises, at its call of a given number, the exception of a user's Ctrl-C."""
 
     def __init__(self, at):
         self.left = at

@@ -125,7 +125,7 @@ def path(simulation, r):
 
 
 def interrupted_path(simulation, r):
-    """What a callback raises ends the step; the path is taken off again."""
+    """An exception in a callback ends the step; then remove the path again."""
     interrupt = Interrupting(r.randint(1, 3))
     simulation.move("clamp", path=lambda t: interrupt(t) or (0.0, 0.0, 0.1))
     try:
@@ -242,7 +242,7 @@ def go(simulation, seed, count, read=False):
 
 
 def state(simulation):
-    """What must agree to the bit, as (name, bytes)."""
+    """Return all values that must agree to the bit, as (name, bytes)."""
     parts = [("time", np.float64(simulation.time)), ("positions", simulation.positions())]
     parts += [("velocities", simulation.velocities())]
     for rod in simulation.rods:
@@ -322,10 +322,10 @@ def sequence(number, counted, folder):
 
 
 def attempt(number):
-    """What was counted in a sequence, and what went wrong."""
+    """Run a sequence, and return its counts and its failure."""
     faulthandler.enable()
     warnings.simplefilter("ignore")
-    print(f"sequence {number}", file=sys.stderr, flush=True)  # among the last ones is that which crashed
+    print(f"sequence {number}", file=sys.stderr, flush=True)  # after a crash, its sequence is among the last lines
     counted: collections.Counter[str] = collections.Counter()
     try:
         with tempfile.TemporaryDirectory() as folder:

@@ -1,4 +1,4 @@
-"""How well a tracing agrees with the truth of a synthetic scene."""
+"""Agreement of a tracing with the truth of a synthetic scene."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from scipy.optimize import linear_sum_assignment
 
 @dataclass
 class Score:
-    """What was found; distances in px, infinite where the count is wrong or the order is."""
+    """Result of a comparison; distances in px, infinite if the count or the order is wrong."""
 
     right: bool
     count: int

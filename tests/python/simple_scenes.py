@@ -48,7 +48,7 @@ def tripod(**build):
 
 
 def same_state(a: withe.Simulation, b: withe.Simulation) -> bool:
-    """Whether two simulations agree in every bit that can be read."""
+    """True if two simulations agree in every bit that can be read."""
     if a.time != b.time or a.snapshot() != b.snapshot():
         return False
     reads = [a.positions, b.positions], [a.velocities, b.velocities]

@@ -1,4 +1,4 @@
-"""What is assigned to a scene or a simulation acts, or is refused."""
+"""Assigning an attribute of a scene or a simulation acts, or raises."""
 
 import warnings
 

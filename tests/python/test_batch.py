@@ -15,7 +15,7 @@ LANES = 4
 
 
 def bends(step: int, count: int = LANES) -> np.ndarray:
-    """Of every lane and stencil, another at each step [1/m]."""
+    """Curvatures of every lane and stencil, different at each step [1/m]."""
     return 3.0 * np.random.default_rng(step).uniform(-1, 1, (count, 9, 2))
 
 

@@ -222,7 +222,7 @@ def test_a_page_shows_tables_and_goals_of_a_run():
 
 
 def test_conservation_is_measured_by_what_theory_knows():
-    """What backward Euler loses of angular momentum is known step by step; midpoint in a plane loses nothing."""
+    """Backward Euler loses a known angular momentum in each step; midpoint in a plane loses nothing."""
     from conservation import driven, euler_identity, midpoint_in_a_plane
 
     coarse, apart = euler_identity(steps=100)

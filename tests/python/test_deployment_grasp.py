@@ -80,7 +80,7 @@ def test_a_thick_rod_is_twisted_by_the_friction_at_its_surface(suspended, curvat
         turning = (moment - along * t) / bend + along / twist * t
         return np.concatenate([longer * t, np.cross(turning, r.T).T.ravel(), -longer * np.cross(t, n)])
 
-    # Of the floor, about the centreline at lift-off, some way behind which force_y acts.
+    # Couple of the floor about the centreline at lift-off; force_y acts some way behind.
     couple = np.cross([0.0, 0.0, -radius], force)
     couple += np.cross([-radius * np.sqrt(bend / twist), 0.0, 0.0], [0.0, force[1], 0.0])
     start = np.concatenate([np.zeros(3), np.eye(3).ravel(), [0.0, 0.0, -bend * curvature] - couple])

@@ -1,4 +1,4 @@
-"""How a cable that is bent by itself hangs, and what is read of that."""
+"""Shape of a hanging cable with natural curvature, and its measurement."""
 
 import numpy as np
 import pytest

@@ -20,7 +20,7 @@ def wave(height=0.03, count=300):
 
 @pytest.fixture(scope="module")
 def loop():
-    """Of a cable that is folded back over itself, x and z [Lgb].
+    """Shape of a cable that is folded back over itself, x and z [Lgb].
 
     theta'' = (R - s) cos(theta) / 2 from the floor to the layer below, where theta is back at pi and z at 0.
     """

@@ -345,7 +345,7 @@ def test_a_tail_that_would_cross_the_pattern_is_shortened_or_refused():
 @pytest.mark.parametrize("turns", [(90,), (90, -90), (180,)])
 @pytest.mark.parametrize("nodes", [301, 601])
 def test_a_tail_lies_straight_on_behind_a_pattern_that_ends_straight(turns, nodes):
-    """Where the last straight piece of what was given points to, by the jaw at the end."""
+    """The jaw lays the tail along the direction of the last straight piece of the input."""
     legs = [0.1] * (len(turns) + 1)
     pattern = Pattern.bends(np.radians(turns), [0.06] * len(turns), legs, nodes=nodes)
     motion = plan(CABLE, pattern)

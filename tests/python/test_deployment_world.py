@@ -62,7 +62,7 @@ def photographed(points, width, seed=2):
 
 
 def read_back(points):
-    """What perception makes of a picture of a cable that lies there."""
+    """Centreline that perception finds in a picture of the cable."""
     image, corner = photographed(points, 2.0 * CABLE.radius)
     (seen,) = trace(image).centrelines
     return corner + PIXEL * seen * [1.0, -1.0]
@@ -246,7 +246,7 @@ def test_a_held_end_stays_where_the_pattern_begins(arc):
 
 
 def test_a_cable_as_thick_as_a_hose_is_laid_as_exactly_for_its_size():
-    """What is ten times as large comes ten times as far off, for the jaw holds it as rigidly: it was led to
+    """A cable of ten times the size has ten times the error, because the jaw holds it as rigidly. It was led along
     another pattern."""
     errors = []
     for scale in (1.0, 10.0):

@@ -15,7 +15,7 @@ MODULES = [
 
 
 def words():
-    """What an example may take as given: an arm that hangs from a wall, far above a floor, with a load at its tip."""
+    """Names that an example may use: an arm that hangs from a wall, far above a floor, with a load at its tip."""
     scene = withe.Scene()
     # Viscous, as rubber is: without, it whips in modes that steps of 5 ms do not resolve, with a warning.
     rubber = withe.Material(youngs_modulus=1e6, density=1000.0, viscosity=2e3)

@@ -32,7 +32,7 @@ def test_the_edges_meet_though_the_sheet_slides(half):
     assert watched.failure is None
     assert abs(watched.error) < 1e-3
     assert len(watched.seen_slides) == 5
-    # What was seen last is where the sheet lay then; it has slid no farther than the crease is off.
+    # The last seen slide is that of the sheet at this time. The sheet slid no farther than the error of the crease.
     assert watched.seen_slides[-1] == pytest.approx(watched.slide, abs=5e-4)
 
 
@@ -75,7 +75,7 @@ def test_a_watched_way_plunges_where_its_last_part_would_slide_unseen():
     way = plan(paper, replans=5, uncertainty=(0.02, 0.3), progress=False)
     assert slow.plunges_at is None
     assert way.plunges_at is not None
-    # Of a sheet that has slid: where it lies when it is seen last, the edge comes down.
+    # For a sheet that has slid, the edge comes down at the place where the sheet was last seen.
     assert way.plunge_slide == pytest.approx(way.before_plunge().slide[-1], abs=1e-3)
     assert abs(fold(slow, sheet, progress=False).error) > 3e-3
     found = fold(way, sheet, progress=False)

@@ -29,7 +29,7 @@ LGB = (STIFFNESS / (2 * WEIGHT)) ** (1 / 3)
 
 
 def drop_of_rod(length, curl=0.0):
-    """Of its tip, extrapolated from two meshes, of a rod that bends down by itself by `curl` [1/m]."""
+    """Drop of the tip of a rod with a natural curvature `curl` [1/m], extrapolated from two meshes."""
     drops = []
     for nodes in (81, 161):
         scene = withe.Scene(gravity=(0, 0, -9.81))

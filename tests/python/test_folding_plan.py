@@ -16,7 +16,7 @@ from withe.folding.sheets import at_poses, forces_of
 
 
 def inner_edges(folded):
-    """Where a plan has the inner edge of the jaw, from its poses by the words of its docstring: x, z [m]."""
+    """Path of the inner edge of the jaw in a plan, from its poses as its docstring defines them: x, z [m]."""
     _, qy, _, qw = folded.poses[:, 3:].T
     along = np.stack([1 - 2 * qy**2, -2 * qy * qw], axis=1)  # x axis of the frame, in the plane of x and z
     return folded.poses[:, [0, 2]] + folded.jaw.depth * along
@@ -383,7 +383,7 @@ def test_bad_input_says_what_is_wrong(arguments, message):
 
 
 def test_the_planner_knows_no_simulated_sheet():
-    """What it says is checked by simulations, which it must not have seen."""
+    """Simulations check the plan, so the planner must not have seen them."""
     package = Path(withe.__file__).parent
     pending, seen = ["withe.folding.planning"], set()
     while pending:

@@ -47,7 +47,7 @@ def test_plans_that_have_been_used_are_pickled_and_copied(copied, paper, method)
 
 
 def same(first, second):
-    """Whether two plans, or what they are made of, are the same to the last digit."""
+    """True if two plans, or their parts, agree to the last digit."""
     if isinstance(first, np.ndarray):
         return first.dtype == second.dtype and np.array_equal(first, second, equal_nan=True)
     if hasattr(first, "__dataclass_fields__"):

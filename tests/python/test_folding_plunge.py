@@ -113,7 +113,7 @@ def test_where_nothing_bears_the_uncertainty_the_plan_says_so():
 
 
 def test_cardboard_is_folded_in_half_on_a_table_on_which_it_would_slide():
-    """Of ways that fold all sheets: one that slides less but misses some of them is no way."""
+    """The plunge must fold all sheets; a way with less slide that misses some of them is not allowed."""
     paper = replace(Paper.cardboard(), friction=0.3)
     with pytest.warns(UserWarning, match="the sheet slides"):
         slow = plan(paper, method="slip", grasp="free", curvature=4.0, ending="slow")

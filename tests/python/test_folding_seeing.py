@@ -1,4 +1,4 @@
-"""What cameras see of simulated sheets is read back: how stiff a strip is, where a sheet lies."""
+"""Measurements from pictures of simulated sheets: the stiffness of a strip, the position of a sheet."""
 
 from __future__ import annotations
 

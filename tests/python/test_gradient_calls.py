@@ -186,7 +186,7 @@ def test_gradient_by_the_ends_of_ramps_is_that_of_differences(integrator, viscos
     found = gradient_of(run, weights, [(arm, "natural_curvature")])
     by_calls = [next(iter(call.gradients.values())) for call in found.calls]
     check(run, weights, by_calls, order, size=1e-2)
-    # What the run began with acts as long as it has a part in the ramp.
+    # The initial value acts as long as it has a share in the ramp.
     start = sim.snapshot()
     sim.restore(run.start)
     way = np.outer(random.normal(size=len(now)), unit)

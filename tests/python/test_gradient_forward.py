@@ -10,7 +10,7 @@ STEP, COUNT = 2e-3, 6
 
 
 def nodes_of(simulation, readout):
-    """Of a state vector, what it moves (or speeds up) nodes by: (3 nodes, 2 unknowns); linear, so exact to rounding."""
+    """Displacements (or velocities) of nodes by a state vector: (3 nodes, 2 unknowns); linear, so exact to rounding."""
     start, size = simulation.snapshot(), len(simulation.state_difference(simulation.copy()))
     before, columns = getattr(simulation, readout)(), []
     for axis in np.eye(size):

@@ -45,7 +45,8 @@ def test_gradient_of_an_equilibrium_is_that_of_differences(planar, joint):
 @pytest.mark.parametrize("nodes", [9, 41, 401])
 @pytest.mark.parametrize("hangs", [False, True])
 def test_what_drives_the_spin_of_a_rod_that_is_free_to_has_no_gradient(nodes, hangs):
-    """Where it would spin to does not follow from what acts; rounding was answered. What does not drive it has one."""
+    """The angle to which the rod spins does not follow from the loads; the result was rounding error. Scalars that do
+    not drive the spin have a gradient."""
     rubber = withe.Material(youngs_modulus=1e6, poisson_ratio=0.4, density=1100.0)
     scene = withe.Scene()
     rod = scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0.05), nodes=nodes, radius=4e-3, material=rubber)

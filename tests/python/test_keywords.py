@@ -1,4 +1,4 @@
-"""What a call does not take is refused with what the user may have meant; what is right is left alone."""
+"""Wrong arguments of a call raise, with a suggestion of the argument that the user may have meant."""
 
 import copy
 import inspect

@@ -37,7 +37,7 @@ LATE = {
 
 
 def visible_rooms(cpp: Path) -> dict[str, set[str]]:
-    """What each room may see, from the DEPENDS of its target."""
+    """Rooms that each room may see, from the DEPENDS of its target."""
     rooms = {}
     for file in sorted(cpp.glob("*/CMakeLists.txt")):
         declared = re.search(r"withe_room\((\w+)\s+DEPENDS([^)]*)\)", file.read_text())

@@ -1,4 +1,4 @@
-"""What the package promises as a package: a light import, types, and wheels that carry only what they may."""
+"""Promises of the package: a light import, types, and wheels with allowed content only."""
 
 import importlib.metadata
 import importlib.util

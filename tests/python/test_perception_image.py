@@ -25,7 +25,7 @@ def picture(scene):
 
 
 def right_orders(scene, tracing):
-    """How many crossings of the scene are found with the right strand above, and of how many."""
+    """Number of the scene's crossings that are found with the right strand above, and number of all crossings."""
     right = 0
     for true in scene.crossings:
         found = min(tracing.crossings, key=lambda c: np.hypot(*(c.point - true.point)))
@@ -172,7 +172,7 @@ def test_bad_colour_ranges_are_refused(ranges, problem):
 @pytest.mark.parametrize("noise", [0, 4, 8])
 @pytest.mark.parametrize(("width", "height"), [(640, 480), (1920, 1080)])
 def test_a_thin_cable_is_found_in_a_noisy_picture(width, height, noise):
-    """Where one pixel in a thousand is cable, and the background's noise has the two likeliest classes."""
+    """One pixel in a thousand is cable, and Otsu's two likeliest classes are both noise of the background."""
     random = np.random.default_rng(noise)
     picture = np.full((height, width, 3), 235.0)
     columns = np.arange(80, 380)

@@ -1,4 +1,4 @@
-"""What a simulation does next follows from its state alone: random sequences, compared to the bit."""
+"""The next step of a simulation follows from its state alone: random sequences, compared to the bit."""
 
 import os
 import re

@@ -25,7 +25,7 @@ def arm(nodes=31, space=False, **options):
 
 
 def drawn(simulation, curvatures, places):
-    """Where places are, for natural curvatures one after the other, shape (frames, places, 3)."""
+    """Positions of places for a series of natural curvatures, shape (frames, places, 3)."""
     simulation = simulation.copy()
     tags = []
     for curvature in curvatures:

@@ -129,7 +129,7 @@ def test_nodes_along_a_curve_have_its_lengths_and_curvature():
     edges = part.without_arcs()
     assert np.allclose(edges.natural_curvature[:, 0], 0.4 / chord, rtol=1e-7)
     assert np.array_equal(edges.arcs, part.lengths)
-    # What is straight, or curved as told, has the length of its edges.
+    # A rod that is drawn straight, or has a given natural curvature, has arcs as long as its edges.
     for more in ({"natural": "straight"}, {"natural_curvature": (4.0, 0.0)}):
         assert np.array_equal(rod(points=curve, nodes=4, normal=(0, 0, 1), **more).arcs, part.lengths)
 

@@ -233,7 +233,7 @@ def test_a_simulation_goes_on_from_a_frame_of_a_record(tmp_path):
     simulation.step(50)
     other.step(50)
     assert np.allclose(other.positions(arm), simulation.positions(arm), rtol=0, atol=1e-5)
-    # Of the step, which a frame of a record knows nothing of.
+    # Tensions belong to the step, which a frame of a record does not contain.
     pull = simulation.tensions(arm)
     assert np.allclose(other.tensions(arm), pull, rtol=0, atol=1e-3 * np.abs(pull).max())
     other.restore(record, frame=2)

@@ -221,7 +221,7 @@ def test_convergence_errors_pickle():
     assert (again.time, again.step, again.rod, again.node, again.residual) == (1.0, 0.5, "arm", 3, 2.0)
 
 
-# What to try
+# Hints of errors
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""What comes and goes while a simulation runs: loads that are taken off again, friction that changes."""
+"""Changes of a running simulation: loads that are removed again, friction that changes."""
 
 import copy
 import pickle

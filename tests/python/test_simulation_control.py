@@ -1,4 +1,4 @@
-"""What may be changed while a simulation runs: natural shape and parameters."""
+"""Parameters that may change while a simulation runs: natural shape and others."""
 
 import numpy as np
 import pytest
@@ -208,7 +208,7 @@ def test_initial_velocities_are_those_of_the_nodes():
     assert np.array_equal(simulation.velocities(arm)[0], (0, 0, 0))  # stopped by its support
 
 
-# What cannot be set
+# Values that cannot be set
 
 
 def test_a_joint_that_is_to_be_set_says_how_to_drive_it():

@@ -254,7 +254,7 @@ def test_a_snapshot_without_friction_starts_a_scene_that_has_some():
     rough.set_velocities(rod, np.tile((0.1, 0.0, 0.0), (6, 1)))
     rough.run(0.1)
     assert np.abs(rough.velocities(rod)).max() < 1e-3
-    # What is set while running goes with the snapshot, and off with one from before.
+    # A snapshot contains the values that were set before it, and restoring it resets later ones.
     before = rough.snapshot()
     rough.set("floor 1", friction=0.2)
     after = rough.snapshot()

@@ -122,7 +122,7 @@ def test_at_an_equilibrium_the_jacobian_is_that_of_the_linear_equations(integrat
     A, B = sim.step_jacobian(["gravity"])
     expected = np.vstack([position, velocity])
     assert np.abs(weigh[:, None] * (A.toarray() - expected) / weigh).max() < 1e-10
-    # Of a force on a node, a forward solve.
+    # The derivative by a force on a node takes a forward solve.
     A, B = sim.step_jacobian([(sim["force"], "force")])
     node = sim.positions(sim["arm"]).shape[0] - 1
     at_tip = linear.displacement[3 * node : 3 * node + 3].T

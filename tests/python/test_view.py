@@ -241,7 +241,7 @@ def test_a_failure_of_ffmpeg_is_told(record, renderer, tmp_path):
         record.animate(tmp_path / "missing" / "arm.mp4", size=(160, 120), progress=False)
 
 
-# What is refused
+# Refused arguments
 
 
 @pytest.mark.parametrize(

@@ -32,7 +32,7 @@ def curved_record(radius):
 
 
 def silhouette(record, camera, path):
-    """How much of each pixel the rod covers: its colour is the only one."""
+    """Share of each pixel that the rod covers: its colour is the only one."""
     record.picture(path, camera=camera, size=SIZE)
     pixels = imread(path)[..., :3]
     strength = np.ptp(pixels, axis=2)

@@ -54,7 +54,7 @@ EXAMPLES = {
     "write_word.py": (["--nodes", "200", "--ways", "exact"], r"exact: ([.\d]+) mm off on the mean", 0.0, 2.5),
     "spider.py": (["--duration", "0.2"], r"half the step: no node moves by more than ([.\d]+)%", 0.0, 2.0),
 }
-# What is made smaller in a notebook, as the options of examples do, and with what.
+# Parts of notebooks that the test makes smaller, and their replacements.
 SMALLER = {"fold_a_sheet": ("for seed in range(40, 44)", "for seed in range(40, 41)")}
 
 

@@ -59,7 +59,7 @@ def turn(angle):
     arm(planar=False).move("wall", roll=angle, over=10.0)
 
 
-# What is given, the number that the warning names, and the slip.
+# The input, the number that the warning names, and the slip of the user.
 SLIPS = {
     "length": (lambda: arm(length=300.0), "300 m long at a radius of 5 mm", "millimetres"),
     "light": (lambda: arm(material(density=1.2)), r"density of rod 'arm' is 1\.2 kg/m\^3", r"g/cm\^3"),
