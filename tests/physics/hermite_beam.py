@@ -1,8 +1,9 @@
-"""A beam that bends and stretches far in a plane, of C1 elements and explicit steps: slow, and nothing like our rods.
+"""A beam with large bending and stretching in a plane, by C1 elements and explicit steps: slow, and unlike our rods.
 
-Hermite cubics for the centreline, its position and its slope at either end of an element [Shabana: Dynamics of
-multibody systems, chapter 7]; energy EA e^2 / 2 + B k^2 / 2 with k the turn of the tangent per undeformed length, no
-shear, no rotary inertia. Integrals by Gauss's rule, time by an eighth-order Runge-Kutta method.
+Hermite cubics describe the centreline by its position and slope at either end of an element [Shabana: Dynamics of
+multibody systems, chapter 7]. The energy is EA e^2 / 2 + B k^2 / 2, where k is the rotation of the tangent per
+undeformed length. There is neither shear nor rotary inertia. Integrals use Gauss's rule, and time an eighth-order
+Runge-Kutta method.
 """
 
 from __future__ import annotations

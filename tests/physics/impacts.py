@@ -50,7 +50,7 @@ class Impact:
 
     @property
     def even(self) -> bool:
-        """Whether all edges meet at once and as one, so that no vibration takes a share."""
+        """True if all edges meet at the same time, so that no vibration takes energy."""
         return self.lay == "parallel" and (self.on_floor or self.kind != "graze")
 
     def build(
@@ -116,10 +116,10 @@ def draw(number: int) -> Impact:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Of an impact, over the greatest kinetic energy on its way."""
+    """Result of an impact, relative to the greatest kinetic energy during it."""
 
-    gained: float  # by how much energy was above that at the start, at most
-    unbooked: float  # how far energy and what is booked as dissipated were off that, at most
+    gained: float  # greatest energy above that at the start
+    unbooked: float  # greatest error of energy plus dissipation
     lost: float  # energy at the end
     given_back: float  # speed at which centres of mass part, over that at which they came
     slid: float  # momentum along a floor, or all of two rods, over what there is: by how much it changed
@@ -147,7 +147,7 @@ def run(impact: Impact, integrator: Any, restitution: float = 1.0, gravity: bool
 
 
 def report(integrator: Any, impacts: list[Impact]) -> None:
-    """What an integrator makes of them."""
+    """Print the results of an integrator."""
     elastic = [run(impact, integrator) for impact in impacts]
     print(f"{integrator}, {len(impacts)} elastic impacts:")
     for what in ("gained", "unbooked", "lost", "slid"):
@@ -161,7 +161,7 @@ def report(integrator: Any, impacts: list[Impact]) -> None:
 
 
 def losses(impact: Impact, integrator: Any, steps: list[float]) -> np.ndarray:
-    """Of energy in one elastic impact, with steps over the least time of an impact."""
+    """Energy losses in one elastic impact, for steps relative to the shortest duration of an impact."""
     return np.array([run(replace(impact, time_step=step * impact.least_time), integrator).lost for step in steps])
 
 

@@ -14,8 +14,8 @@ from scipy.optimize import root
 class LoadedCurve:
     """A chain of rods in a plane, loaded at one place; limit loads by shooting.
 
-    x' = (1 + n.t / EA) cos theta, z' likewise, theta' = M + k0, M' = z' n_x - x' n_z, with the force
-    n on what lies before s constant but for the load, -P, at `loaded`.
+    The equations are x' = (1 + n.t / EA) cos theta, z' = (1 + n.t / EA) sin theta, theta' = M + k0 and M' = z' n_x - x'
+    n_z. The force n on the part before s is constant, except for the load -P at `loaded`.
     """
 
     pieces: tuple[tuple[float, float], ...]  # length and turn before it [rad], in order

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 
 def member_stiffness(vector: np.ndarray, stretch: float, bend: float, twist: float) -> np.ndarray:
-    """Of a member with a round section, in world axes: three displacements and three rotations at either end."""
+    """Stiffness of a round member, in world axes: three displacements and three rotations at either end."""
     length = float(np.linalg.norm(vector))
     along = np.outer(vector, vector) / length**2
     across = np.eye(3) - along

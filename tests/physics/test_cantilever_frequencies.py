@@ -100,9 +100,11 @@ def test_frequencies_of_free_and_pinned_beams_converge_faster_than_with_lumped_m
 
 
 def test_frequencies_of_a_cantilever_are_off_by_what_its_clamp_bends_too_far():
-    """Gregory's formula: with one correction at the wall the energy of bending is too large there by
-    (l^3 / 24) (M^2)'' / 2 B = l^3 M'(0)^2 / (24 B), and the frequency of a mode cosh - cos - s (sinh - sin) of wave
-    number b too low by its share s^2 b^2 l^3 / 6."""
+    """Gregory's formula: with one correction at the wall, the bending energy there is too large.
+
+    The excess is (l^3 / 24) (M^2)'' / 2 B = l^3 M'(0)^2 / (24 B). The frequency of a mode cosh - cos - s (sinh - sin)
+    with wave number b is therefore too low by the relative error s^2 b^2 l^3 / 6.
+    """
     edges = 40
     errors = frequencies(edges + 1) / EXACT - 1.0
     b = np.array(theory.CANTILEVER_ROOTS)

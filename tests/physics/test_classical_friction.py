@@ -32,8 +32,8 @@ THRESHOLD = np.degrees(np.arctan(FRICTION))
 def test_a_block_on_a_slope_slides_when_it_is_steeper_than_friction(beyond, friction_model):
     """Above the threshold with g (sin a - mu cos a); a thousandth of the angle to either side of it, it is told."""
     degrees = THRESHOLD * (1.0 + beyond)
-    # What it slides while it comes to press on the slope it loses within eight seconds; backward Euler is exact
-    # where it speeds up evenly.
+    # The block slides a little while it comes to press on the slope, and loses this way within eight seconds. Backward
+    # Euler is exact for constant acceleration.
     simulation, block, down = on_a_slope(
         degrees, FRICTION, True, friction_model, 5e-3, "backward_euler", slip_tolerance=1e-4
     )
@@ -173,7 +173,7 @@ def test_a_rope_wound_about_a_post_multiplies_its_tension(turns, bound):
 
 
 def grasped(friction_model, integrator):
-    """How far a cylinder sinks within ten seconds that four elastic fingers press on, and have lifted [m]."""
+    """Way by which a cylinder sinks in ten seconds, after four elastic fingers have gripped and lifted it [m]."""
     scene = withe.Scene()
     radius, thick = 8e-3, 3e-3
     foam = withe.Material(youngs_modulus=1e7, poisson_ratio=0.5, density=500.0, viscosity=2e3)
@@ -221,8 +221,10 @@ def gathered(force, tolerance):
 
 
 def test_a_block_that_is_pushed_at_once_gathers_the_speed_that_its_anchors_give_before_it_slides():
-    """On a spring that yields at mu m g, x = delta / 20 from where it rests, then as Coulomb says: that adds
-    sqrt((2 F - mu m g) x / m), less (F / mu m g - 1) g mu times how long it takes."""
+    """The block is on a spring that yields at mu m g, x = delta / 20 from its rest. Then it slides by Coulomb's law.
+
+    The spring adds the velocity sqrt((2 F - mu m g) x / m), minus (F / mu m g - 1) g mu times the time in the spring.
+    """
     for force in (4.121, 6.0):
         speeds = []
         for tolerance in (2e-3, 5e-4):
@@ -238,9 +240,11 @@ def test_a_block_that_is_pushed_at_once_gathers_the_speed_that_its_anchors_give_
 
 @pytest.mark.parametrize("time_step", [2e-3, 5e-4, 1e-4, 2e-5])
 def test_what_friction_takes_throws_no_rod_up(time_step):
-    """A rod that lies on two rails and is pushed along itself: what contact had yielded, 3 % of the radius as it was
-    drawn, pressed again so fast, on energy that friction had taken, that in short steps rails pressed up to thirty
-    times as hard as the rod weighs."""
+    """A rod lies on two rails and is pushed along itself.
+
+    The yielded depth of contact, 3 % of the radius as drawn, pressed again too fast, on energy that friction had
+    dissipated. In short steps, rails then pressed up to thirty times as hard as the weight of the rod.
+    """
     radius, length = 5e-3, 0.2
     scene = withe.Scene()
     rubber = withe.Material(youngs_modulus=1e9, poisson_ratio=0.4, density=1200.0)

@@ -13,7 +13,7 @@ UP = (0.0, 0.0, 1.0)
 
 
 def characteristic(ends):
-    """What vanishes at b L of a beam's modes; w = b^2 sqrt(B / rho A) [Euler; Timoshenko: Vibration problems]."""
+    """Function with zeros at b L of a beam's modes; w = b^2 sqrt(B / rho A) [Euler; Timoshenko: Vibration problems]."""
     return {
         "clamped-free": lambda b: np.cos(b) + 1.0 / np.cosh(b),
         "clamped-clamped": lambda b: np.cos(b) - 1.0 / np.cosh(b),
@@ -153,7 +153,7 @@ def test_a_hanging_cable_converges_to_bernoullis_frequencies():
 
 
 def decay_rate(mode, edges, steps, viscous_time=0.0, drag=0.0):
-    """Of a mode of a pinned beam, let go in its shape [1/s]."""
+    """Decay rate of a mode of a pinned beam that starts in its shape [1/s]."""
     frequency = (mode * np.pi) ** 2
     scene = rods.weightless()
     beam = rods.straight(scene, edges, stiffness=rods.stiffness(stretch=1e5, viscous_time=viscous_time), normal=UP)

@@ -43,7 +43,7 @@ def arch(edges):
     return scene, scene.pin(ring.node(edges // 2), free=(1, 0, 0))
 
 
-# How far the load sinks: few steps up to the limit, many about it.
+# Displacements of the load: few steps up to the limit, many around it.
 LEE_DROPS = np.concatenate([np.arange(0.05, 0.38, 0.05), np.arange(0.39, 0.435, 0.01)])
 ARCH_DROPS = np.concatenate([np.arange(0.1, 1.05, 0.1), np.arange(1.08, 1.21, 0.02)])
 
@@ -97,7 +97,7 @@ def test_a_narrow_cantilever_tips_over_sideways_at_prandtls_load_at_second_order
     print("lateral buckling:", errors)
     assert abs(errors[0]) < 3e-3
     assert abs(errors[2]) < 1e-4
-    # Of differences: what bends under the load carries 1.1e-5 more.
+    # Order of differences: bending under the load contributes a constant 1.1e-5.
     assert_order_at_least(np.diff(errors[1:]), 2.0, slack=0.2)
 
 

@@ -21,8 +21,8 @@ def missed(found, exact):
     return float(np.linalg.norm(np.subtract(found, exact)))
 
 
-# [Bathe and Bolourchi 1979]: an eighth of a circle of radius 100 with a square section of 1 x 1, E = 1e7, nu = 0; its
-# twisting stiffness is G (I1 + I2), as theirs is; the load is out of its plane.
+# [Bathe and Bolourchi 1979]: an eighth of a circle of radius 100 with a square section of 1 x 1, E = 1e7, nu = 0. The
+# twisting stiffness is G (I1 + I2), as in the source. The load is perpendicular to the plane.
 BEND_RADIUS, BEND_MODULUS, BEND_LOAD = 100.0, 1e7, 600.0
 BEND_STIFFNESS = {"stretch": BEND_MODULUS, "twist": BEND_MODULUS / 12.0}
 
@@ -105,7 +105,7 @@ def test_princeton_beam_bends_over_both_sides_of_its_section_as_in_theory(size, 
     errors = np.array([missed(tip, exact) for tip in tips]) / missed(exact, (PRINCETON_LENGTH, 0, 0))
     print(f"Princeton, {size} N at {degrees} degrees:", errors)
     assert errors[0] < 1e-3
-    # What the wall adds is of third order, and hides the second of a load along the width.
+    # The error of the wall is of third order, and hides the second order of a load along the width.
     assert_order_at_least(errors[1:], 2.0, slack=0.3)
 
 
@@ -245,7 +245,7 @@ def test_frames_give_way_as_by_the_stiffness_method(frame):
     errors = []
     for edges in (8, 16, 32):
         answers = []
-        # What is even in the load is no part of the linear answer.
+        # The even part in the load does not belong to the linear answer.
         for size in (1e-4, -1e-4):
             scene = rods.weightless()
             parts = [

@@ -99,7 +99,7 @@ def test_the_weight_of_a_hanging_arc_is_that_of_the_curve(integrator):
     scene.clamp(rod.start)
     simulation = scene.build(integrator=integrator, time_step=1e-8)
     simulation.step(1)
-    # Of the first edge half hangs on the wall from the start.
+    # Half of the first edge is carried by the wall from the start.
     falling = 2.0 * 2.5 * (1.0 - 0.5 / 12)
     assert simulation.reaction(rod.start).force[2] == pytest.approx(2.0 * 2.5 * 10.0 - falling * 10.0, rel=1e-3)
 

@@ -70,8 +70,10 @@ def test_spring_neither_feeds_an_oscillation_nor_takes_from_it(integrator, resol
 
 
 def test_spring_is_stable_for_backward_euler_up_to_its_bound():
-    """At the predicted end of a step the matrix has the determinant 1 - a and the trace 2 (1 - a), a = (w dt)^2: stable
-    for a < 4 / 3, or 4 / 9 where nodes go to and fro."""
+    """The matrix at the predicted end of a step has the determinant 1 - a and the trace 2 (1 - a), with a = (w dt)^2.
+
+    The step is stable for a < 4 / 3, or 4 / 9 for the mode in which nodes alternate.
+    """
     rod, simulation = oscillator("backward_euler", 0.6 / STIFF, spring=STIFF)
     simulation.step(100)
     assert abs(simulation.positions(rod)[1, 2]) < 1e-6

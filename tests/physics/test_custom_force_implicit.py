@@ -22,7 +22,7 @@ def bar(scene, start=(0, 0, 0), nodes=3, modulus=1e7):
 
 
 def consistent_mass():
-    """Of a bar of two edges, per direction."""
+    """Consistent mass of a bar of two edges, per direction."""
     return MASS / 12 * np.array([[2.0, 1, 0], [1, 4, 1], [0, 1, 2]])
 
 
@@ -196,8 +196,10 @@ def test_spring_between_rods_that_share_no_node_gives_their_frequency():
 
 @pytest.mark.parametrize("planar", [False, True])
 def test_moments_of_a_compass_needle_balance_its_weight(planar):
-    """A stiff bar on a pin, moment m t x B for a field along z, against its weight: m g L / 2 cos a = m B cos a would
-    hold at any angle, so the field is tilted."""
+    """A stiff bar on a pin, with a moment m t x B for a field along z, against its weight.
+
+    The balance m g L / 2 cos a = m B cos a would hold at any angle, so the field is tilted.
+    """
     strength = 3e-2  # N m
     field = np.array((0.3, 0.0, 1.0)) / np.hypot(0.3, 1.0)
     scene = withe.Scene()

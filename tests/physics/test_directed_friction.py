@@ -142,7 +142,10 @@ def test_a_worm_that_stretches_and_shortens_crawls_by_what_friction_differs():
 
 def snake_speed(length, amplitude, waves, period, forward, backward, across, points=200):
     """Mean velocity of the middle of a body of given curvature without inertia, for Coulomb friction along and across
-    it [Hu et al. 2009, PNAS 106, eq. 1-3; Guo and Mahadevan 2008, PNAS 105]: forces and moment add up to nothing."""
+    it.
+
+    The sums of forces and moments vanish [Hu et al. 2009, PNAS 106, eq. 1-3; Guo and Mahadevan 2008, PNAS 105].
+    """
     s = (np.arange(points) + 0.5) / points
 
     def shape(t):

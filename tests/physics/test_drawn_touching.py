@@ -78,7 +78,7 @@ def test_a_rod_that_is_drawn_on_a_floor_stays_there(modulus, gap, scheme):
 @pytest.mark.parametrize("modulus", MODULI)
 @pytest.mark.parametrize("turn", [0.0, 1.5])
 def test_rods_that_are_drawn_touching_without_gravity_stay(modulus, turn):
-    """What is left of the force, a millionth, is far below what bends them."""
+    """The remaining force, a millionth, is far below the forces that bend the rods."""
     scene, rods = pile(modulus, 0.0, turn, gravity=0.0, floor=False)
     simulation = scene.build(integrator="implicit_midpoint", time_step=1e-3)
     drawn = heights(simulation, rods)

@@ -345,7 +345,7 @@ def test_what_takes_hold_at_a_hinge_or_is_told_where_it_is_changes_nothing(plana
 @pytest.mark.parametrize("damping", [0.01, 1.0, 100.0])
 @pytest.mark.parametrize("planar", [True, False])
 def test_rate_and_torque_of_a_damped_joint_are_those_that_are_booked(planar, damping):
-    """Of a soft arm that falls; the mean over each step: c times the rate squared is what is lost."""
+    """A soft arm falls. The dissipation is c times the squared rate, as a mean over each step."""
     scene = withe.Scene()
     post = scene.add_rod(start=(-0.1, 0, 0), end=(0, 0, 0), nodes=3, **STIFF)
     arm = scene.add_rod(start=(0, 0, 0), end=(0.3, 0, 0), nodes=9, **SOFT)

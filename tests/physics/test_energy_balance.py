@@ -1,4 +1,4 @@
-"""What is stored, done from outside and dissipated adds up: total - work + dissipated stays what it was."""
+"""Stored, supplied and dissipated energy add up: total - work + dissipated is constant."""
 
 import numpy as np
 import pytest
@@ -115,7 +115,7 @@ def test_energy_of_fourth_order_steps_adds_up_to_solver_tolerance(what, planar):
 @pytest.mark.parametrize("model", ["anchored", "implicit"])
 @pytest.mark.parametrize("what", ["flat", "tilted", "rods"])
 def test_what_friction_takes_is_booked_however_short_the_steps(what, model, friction):
-    """What an anchor holds when surfaces part, or press too little for it, is lost, and was booked nowhere."""
+    """An anchor loses its energy when surfaces part or press too little, and this loss was not counted."""
     rubber = withe.Material(youngs_modulus=1e6, poisson_ratio=0.5, density=1100.0)
     for step in (4e-3, 1e-3, 2.5e-4):
         scene = withe.Scene(gravity=(0, 0, 0) if what == "rods" else (0, 0, -9.81))
@@ -174,7 +174,7 @@ def test_soft_helix_takes_long_steps_and_keeps_its_energy(step):
 
 @pytest.mark.parametrize("nodes", [51, 201, 801])
 def test_energy_momentum_steps_in_a_plane_take_few_iterations_on_fine_meshes(nodes):
-    """Where stencils hardly bend within a step, forces must not jump with how they do."""
+    """If stencils hardly bend within a step, forces must not jump with the sign of their bending."""
     scene = withe.Scene(gravity=(0.0, 0.0, -2.0))
     rubber = withe.Material(youngs_modulus=1e6, poisson_ratio=0.5, density=1000.0)
     rod = scene.add_rod(start=(0, 0, 0), end=(0.4, 0, 0), nodes=nodes, radius=0.01, material=rubber)
@@ -365,7 +365,7 @@ def test_a_stressed_rod_of_a_fine_mesh_falls_as_one_of_a_coarse_mesh_does(nodes,
 
 @pytest.mark.parametrize("step", [0.02 / 556, 5e-5, 1e-4])
 def test_what_contact_takes_closes_the_balance_however_short_the_steps(step):
-    """Of contacts that rest while others are hit, in steps that leave nothing to take."""
+    """Some contacts rest while others are hit, in steps without a loss."""
     scene = withe.Scene()
     rubber = withe.Material(youngs_modulus=2e6, poisson_ratio=0.5, density=1200.0)
     scene.add_rod(start=(-0.15, 0, 0.054), end=(0.15, 0, 0.054), nodes=31, radius=4e-3, material=rubber)

@@ -225,8 +225,11 @@ def turning_helix(edges, **fluid):
 
 
 def test_a_turning_helix_needs_the_torque_and_thrust_of_resistive_force_theory():
-    """Of a piece of a helix that turns at w, a its radius, angle p to the axis: v = w a, of which sin p along it:
-    torque per length a (c_n - (c_n - c_t) sin^2 p) v, thrust (c_n - c_t) sin p cos p v."""
+    """Torque and thrust per length of a helix of radius a that turns at w, with the angle p to its axis.
+
+    The velocity is v = w a, with the part sin p along the helix. The torque is a (c_n - (c_n - c_t) sin^2 p) v, and the
+    thrust is (c_n - c_t) sin p cos p v.
+    """
     logarithm = np.log(0.18 * TURN_LENGTH / THICKNESS)
     along, across = 2.0 * np.pi / logarithm, 4.0 * np.pi / (logarithm + 0.5)
     sine, cosine = 2.0 * np.pi * RADIUS / TURN_LENGTH, PITCH / TURN_LENGTH
@@ -309,7 +312,7 @@ def test_rods_almost_without_mass_are_stable_at_steps_far_above_mass_over_drag(i
 @pytest.mark.parametrize("density", [1.0, 1000.0])
 @pytest.mark.parametrize("integrator", ["backward_euler", "implicit_midpoint"])
 def test_light_rods_that_nearly_touch_move_together_and_steadily(integrator, density):
-    """What presses fluid out of a gap of a twentieth of the radius is resisted far more than what moves a rod alone."""
+    """Pressing fluid out of a gap of a twentieth of the radius meets far more resistance than moving a single rod."""
     scene = rods.weightless()
     rubber = withe.Material(youngs_modulus=3e6, poisson_ratio=0.5, density=density)
     scene.add_fluid(1.0, regularization=1.02e-3)

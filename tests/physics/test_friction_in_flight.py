@@ -35,7 +35,7 @@ def tumbling(number: int) -> tuple[withe.Scene, list[Any], np.random.Generator]:
 @pytest.mark.parametrize("model", ["anchored", "implicit"])
 @pytest.mark.parametrize("number", range(6))
 def test_friction_between_rods_in_flight_changes_no_momentum(number: int, model: Any, integrator: Any) -> None:
-    """What it does to one of two that rub it does to the other, about any point.
+    """Friction acts equally on both rubbing rods, about any point.
 
     It once acted where a step ends, and changed angular momentum at first order.
     """

@@ -10,9 +10,9 @@ from held_rods import SOFT, TIGHT, rope
 
 
 def deflection_beyond_what_holds(edges, hold, joint, planar):
-    """Of the end of a beam that one edge or more are held of, over that of a cantilever from the middle of the last.
+    """Deflection of a beam whose edges are held, relative to a cantilever from the middle of the last held edge.
 
-    A twig that weighs nothing is joined to the beam, `joint` nodes from where what is held ends.
+    A weightless twig is joined to the beam, `joint` nodes from the end of the held part.
     """
     scene, length, stiffness = withe.Scene(gravity=(0, 0, 0)), 1.0 / edges, rods.stiffness(stretch=1e6)
     beam = scene.add_rod(

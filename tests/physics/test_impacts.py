@@ -89,7 +89,7 @@ def test_rods_that_meet_keep_their_angular_momentum_in_midpoint_steps(number: in
 
 
 def grazed(kind, offset, step, integrator, speed=20.0):
-    """What a bat, or a ball in its place, does to a rod beside its way, in the rod's speed along it [m/s]."""
+    """Velocity that a bat, or a ball in its place, gives to a rod beside its path, along the path [m/s]."""
     thick = 5e-3
     scene = withe.Scene(gravity=(0, 0, 0))
     target = scene.add_rod(
@@ -173,10 +173,10 @@ def boxed(number: int, time_step: float, **contact: float) -> tuple[withe.Simula
 @pytest.mark.parametrize("contact", [{}, {"stiffness": 3e3}], ids=["", "stiffness"])
 @pytest.mark.parametrize("time_step", [5e-3, 1e-3])
 def test_elastic_rods_in_boxes_keep_their_energy_at_any_step(time_step: float, contact: dict[str, float]) -> None:
-    """Also where a rod turns or bends onto a wall in a step that it began on its way off.
+    """The loss is small even if a rod turns or bends onto a wall in a step that began on its way off.
 
-    In one box of a hundred a coarse step loses some percent: the curve of a rod turns on the wall so that no mean of
-    its directions at both ends does the work that contact gives.
+    In one box of a hundred a coarse step loses some percent. The curve of a rod then turns on the wall so far that no
+    mean of its directions at both ends does the work of contact.
     """
     lost = []
     for number in range(12):

@@ -1,5 +1,4 @@
-"""What has nothing to do with a rod changes nothing about it: other parts of the scene, a common motion, states that
-other rods are given."""
+"""A rod does not depend on unrelated changes: other parts of the scene, a common motion, the states of other rods."""
 
 from __future__ import annotations
 
@@ -84,7 +83,7 @@ CHANGES = {
 
 @pytest.mark.parametrize("change", CHANGES)
 def test_states_that_are_given_leave_contacts_alone(change: str) -> None:
-    """What a step has left of an impact goes on where the rod does."""
+    """The remainder of an impact continues while other rods get new states."""
     alone, changed = dropped(lambda _: None), dropped(CHANGES[change])
     print("given states:", change, changed / alone - 1.0)
     assert changed == pytest.approx(alone, rel=1e-4)

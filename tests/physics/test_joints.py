@@ -118,8 +118,11 @@ def test_a_follower_force_within_a_rod_acts_alike_whichever_end_the_rod_is_drawn
 
 @LOADS
 def test_t_joint_leaves_a_beam_as_stiff_as_it_was(load):
-    """But for the third power of the edge length: the frame's ends add l^3 / 24 (M m)'' each to the deflection, with
-    M m the square of the lever; of its third that is l^3 / 2."""
+    """The beam changes only at third order of the edge length: each end of the frame adds l^3 / 24 (M m)'' to the
+    deflection.
+
+    M m is the square of the lever, so the sum is l^3 / 2 relative to a third.
+    """
     light = 1e-3 * np.array(load)
     for edges in (40, 80):
         change = beam(edges, light, True, stub=5) - beam(edges, light, False)

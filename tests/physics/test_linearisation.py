@@ -128,7 +128,7 @@ def becks_column(load, nodes, planar=True, mass=0.0):
 
 
 def onset(says, low, high):
-    """Where what `says` finds stops being stable."""
+    """Value at which the result of `says` stops being stable."""
     for _ in range(16):
         middle = 0.5 * (low + high)
         if says(middle) == "stable":

@@ -78,7 +78,7 @@ def test_a_muscle_lifts_a_weight_by_its_strain_and_does_the_work_of_it():
 @pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum", "fourth_order", "verlet"])
 def test_a_sudden_natural_length_swings_to_twice_itself(integrator, planar):
     # A mass M at the end of a rod of mass m: w = x sqrt(EA / m), cot x = x M / m [Rao, Vibration of Continuous Systems,
-    # section 9.4]; the mesh's own error is of second order.
+    # section 9.4]. The error of the mesh is of second order.
     mass, strain = 50.0, 0.02
     x = brentq(lambda x: x * np.tan(x) - 1.0 / mass, 1e-3, 1.0)
     steps = 20000 if integrator == "verlet" else 2000

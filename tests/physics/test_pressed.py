@@ -1,4 +1,4 @@
-"""What is pressed by what does not yield, and what supports and floors bear."""
+"""Contact between parts that cannot yield, and reactions of supports and floors."""
 
 import numpy as np
 import pytest
@@ -166,7 +166,7 @@ def test_an_equilibrium_on_a_drum_or_a_rod_is_one(seed, friction):
 @pytest.mark.parametrize("integrator", ["static", "backward_euler", "implicit_midpoint"])
 @pytest.mark.parametrize("modulus", [1e6, 1e7])
 def test_surfaces_are_no_deeper_in_an_equilibrium_than_it_promises(integrator, modulus):
-    """What has yielded while a clamp pushed a short rod into a wall presses again, but for 2 % of the radius."""
+    """The depth that yielded while a clamp pushed a short rod into a wall presses again, up to 2 % of the radius."""
     scene = withe.Scene(gravity=(0, 0, 0))
     material = withe.Material(youngs_modulus=modulus, poisson_ratio=0.4, density=1100.0, viscosity=1e-3 * modulus)
     rod = scene.add_rod(start=(0, 0, 0), end=(0.02, 0, 0), nodes=5, radius=RADIUS, material=material)
@@ -183,7 +183,7 @@ def test_surfaces_are_no_deeper_in_an_equilibrium_than_it_promises(integrator, m
 
 
 def test_an_arc_onto_a_floor_goes_on_in_balance():
-    """What contact has yielded as a load grows is no reason to lose the path."""
+    """Yielding of contact under a growing load must not end the path."""
     scene = withe.Scene(gravity=(0, 0, 0))
     rubber = withe.Material(youngs_modulus=1e6, poisson_ratio=0.5, density=1000.0)
     arm = scene.add_rod(start=(0, 0, 0.04), end=(0.3, 0, 0.04), nodes=31, radius=4e-3, material=rubber)

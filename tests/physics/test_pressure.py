@@ -1,7 +1,8 @@
-"""Rings under pressure: where they buckle, and what the pressure's work is.
+"""Rings under pressure: the critical pressure, and the work of the pressure.
 
-Inextensible rings of radius R buckle into two lobes at p = 3 EI / R^3 under a pressure that stays normal to them, and
-at 4 EI / R^3 under loads that keep their directions [Levy 1884; Timoshenko and Gere 1961, section 7.3; Bodner 1958].
+Inextensible rings of radius R buckle into two lobes. The critical pressure is 3 EI / R^3 if the pressure stays normal
+to the ring. For loads of constant direction it is 4 EI / R^3 [Levy 1884; Timoshenko and Gere 1961, section 7.3;
+Bodner 1958].
 """
 
 import numpy as np

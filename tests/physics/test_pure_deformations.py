@@ -129,8 +129,11 @@ def test_clamp_that_turns_ten_times_winds_ten_turns():
 
 
 def bends_of_twisted_cantilever(twist):
-    """Under a load on its end, turns of the first edge and from each edge to the next of a round rod whose edges are
-    twisted by so much against each other, the curvatures that are read there, and what was warned of."""
+    """Bending of a round rod with twisted edges under a load on its end.
+
+    Return the rotations of the first edge and from each edge to the next, the curvatures as read there, and the
+    warnings. The edges are twisted against each other by `twist`.
+    """
     scene, bar = round_bar()
     scene.clamp(bar.start)
     scene.add_force(bar.end, (0.0, 0.0, -1e-6))

@@ -27,7 +27,7 @@ def falling(radius: float, height: float, time_step: float, integrator: Any, **f
 
 
 def rebound(radius: float, height: float, time_step: float, integrator: Any, **floor: Any) -> float:
-    """How high it comes again, over the height that it fell from; fails where energy comes from nowhere."""
+    """Height of the rebound relative to the height of the fall; fails if energy is created."""
     simulation, rod, fall = falling(radius, height, time_step, integrator, **floor)
     start = simulation.energy().total
     scale = simulation.energy().gravity - 9.81 * 1200.0 * np.pi * radius**2 * 25.0 * radius * radius
@@ -127,7 +127,7 @@ def head_on(time_step: float, restitution: float | None = None, **contact: Any) 
 
 
 def speeds(simulation: withe.Simulation) -> tuple[float, float]:
-    """Of both rods' centres of mass [m/s]."""
+    """Velocities of the centres of mass of both rods [m/s]."""
     return tuple(  # type: ignore[return-value]
         float((0.5 * (v[1:] + v[:-1])).mean()) for v in (simulation.velocities(rod)[:, 0] for rod in simulation.rods)
     )

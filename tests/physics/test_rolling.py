@@ -28,10 +28,11 @@ def rolling_ring(degrees: float, edges: int, step: float = 1e-3, **options: Any)
 
 
 def acceleration(degrees: float, edges: int, **options: Any) -> float:
-    """Over what it is for a hoop that rolls on its surface, g sin a / (1 + k), with k = I / m (R + r)^2.
+    """Acceleration over that of a hoop that rolls on its surface, g sin a / (1 + k), with k = I / m (R + r)^2.
 
-    The mass is that of straight edges, I = m R^2 (2 + cos f) / 3 with f the turn between two: it is greater by
-    k f^2 / (6 (1 + k)) than a round hoop's, second order in an edge's length.
+    The mass is that of straight edges, I = m R^2 (2 + cos f) / 3, where f is the angle between two edges. The
+    acceleration is therefore greater by k f^2 / (6 (1 + k)) than for a round hoop, which is of second order in the
+    length of an edge.
     """
     simulation, ring, down = rolling_ring(degrees, edges, **options)
     simulation.step(500)
@@ -102,8 +103,8 @@ def rolled(edges: int, step: float, friction: float, speed: float) -> tuple[NDAr
     ("edges", "step"), [(30, 5e-3), (60, 5e-3), (120, 1e-2), (120, 5e-3), (120, 1e-3), (240, 5e-3)]
 )
 def test_a_ring_that_rolls_on_a_level_floor_rolls_on(edges: int, step: float, friction: float) -> None:
-    """What one piece of its curve takes in coming onto the floor the piece that leaves it gives back. It begins with a
-    small jump: drawn as it just touches, it sinks in."""
+    """The energy of a piece of the curve that comes onto the floor equals that of a piece that leaves. The ring begins
+    with a small jump: it is drawn as it just touches, and sinks in."""
     speeds, lost = rolled(edges, step, friction, 0.2)
     assert np.all(np.abs(speeds - 1.0) < 0.01)
     assert speeds.max() < 1.0005
@@ -113,7 +114,7 @@ def test_a_ring_that_rolls_on_a_level_floor_rolls_on(edges: int, step: float, fr
 
 @pytest.mark.parametrize("edges", [60, 240, 480])
 def test_a_ring_rolls_on_slowly_on_fine_meshes_too(edges: int) -> None:
-    """Where it touches is a few pieces long. What it loses at first is what it sinks in by, m g p / 2 of m v^2."""
+    """The contact is a few pieces long. The initial loss is that of sinking in, m g p / 2 of m v^2."""
     speeds, _ = rolled(edges, 5e-3, 0.5, 0.05)
     assert speeds[0] > 0.9
     np.testing.assert_allclose(speeds[2:], speeds[1], rtol=5e-3)
@@ -150,7 +151,7 @@ def pulled_cable(edges: int, past: float) -> tuple[Any, Any, float]:
 
 
 def sliding_speed(past: float, straight: float, time: float) -> float:
-    """Of a cable with mass, by T' = mu (T - rho v^2) + rho a r along the rail."""
+    """Speed of a cable with mass, by T' = mu (T - rho v^2) + rho a r along the rail."""
     grown, reach, speed, way, step = np.exp(FRICTION * np.pi), RAIL + CABLE, 0.0, 0.0, time / 5000
     for _ in range(5000):
         driving = PULL * grown * (1.0 + past) - LINE * speed**2 - (PULL - LINE * speed**2) * grown

@@ -14,7 +14,7 @@ from rods import ring_on_slope
 G, THICK, LENGTH = 9.81, 5e-3, 0.2  # [m/s^2], [m]
 GRIP = 0.6
 STIFF = withe.Material(youngs_modulus=2e9, poisson_ratio=0.3, density=1200.0)
-# Of a solid cylinder, over its mass times its radius squared.
+# Moment of inertia of a solid cylinder, over its mass times its radius squared.
 CYLINDER = 0.5
 
 
@@ -39,7 +39,7 @@ def rod_on_slope(degrees: float, rolling: float, *, turn: float = 0.0, step: flo
 
 
 def speed_down(simulation: Any, rod: Any, down: NDArray[Any]) -> float:
-    """Of the middle of mass."""
+    """Velocity of the centre of mass along the slope."""
     return float(mean_by_mass(simulation.velocities(rod)) @ down)
 
 

@@ -148,7 +148,7 @@ def test_energy_momentum_steps_balance_energy_with_springs_and_dampers(planar, d
 def test_energy_balance_converges_with_springs(integrator):
     gains = []
     for part in (1, 2, 4):
-        # What dampers take from explicit steps is booked to first order, as viscosity is.
+        # The dissipation of dampers in explicit steps is known to first order, as that of viscosity.
         simulation = tumbling(integrator, 0.5 if integrator == "implicit_midpoint" else 0.0, step=1e-3 / part)
         before = balance(simulation)
         simulation.step(200 * part)

@@ -118,7 +118,7 @@ def test_a_plan_says_which_vibrations_steps_resolve(step):
     (note,) = [note for note in simulation.plan.notes if "resolve" in note]
     assert float(note.split("from ")[1].split(" Hz")[0]) == pytest.approx(first, rel=5e-3)
     (note,) = [note for note in simulation.plan.notes if "damps" in note]
-    # What a period of it loses, by stepping through one.
+    # Loss per period of this mode, by stepping through one period.
     angle = 2.0 * np.pi * first * step
     lost = 100.0 * (1.0 - abs(1.0 / (1.0 - 1j * angle)) ** (2.0 * np.pi / np.arctan(angle)))
     assert float(note.split("these modes by ")[1].split(" %")[0]) == pytest.approx(lost, rel=0.05)
@@ -141,7 +141,7 @@ def test_other_parts_of_a_scene_do_not_drown_what_swings_too_fast(beside, integr
 
 
 def dropped(step, slope=0.05, integrator="implicit_midpoint", restitution=1.0):
-    """How high the middle of a soft rod with viscosity comes after a fall of 50 mm, over that, and what was heard."""
+    """Rebound of the middle of a soft viscous rod after a fall of 50 mm, over that height, and the warnings."""
     scene = withe.Scene()
     rubber = withe.Material(youngs_modulus=2e6, poisson_ratio=0.5, density=1200.0, viscosity=2e3)
     ends = 0.2 * np.array([(0, 0, 0), (np.cos(slope), 0, np.sin(slope))]) + (0, 0, 0.05)

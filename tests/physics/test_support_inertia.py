@@ -37,7 +37,7 @@ def test_a_bar_on_a_pin_swings_with_its_moment_of_inertia(integrator, support, e
 
 @pytest.mark.parametrize("planar", [True, False])
 def test_a_support_that_moves_books_its_work_to_the_last_digit(planar):
-    """Of a stiff bar of few edges its pin is shaken: what it gives is the energy that is there."""
+    """A pin of a stiff bar with few edges is shaken: its work equals the energy of the bar."""
     scene = withe.Scene()
     bar = scene.add_rod(
         start=(0, 0, 0),
@@ -165,7 +165,7 @@ def test_reactions_of_a_held_edge_do_the_work_that_is_booked(integrator, planar)
 @pytest.mark.parametrize("hold", ["frame", "edge"])
 @pytest.mark.parametrize("nodes", [5, 21])
 def test_a_shaft_that_is_spun_up_asks_for_its_own_inertia(nodes, hold):
-    """What frames carry of edges' rotary inertia edges have no more."""
+    """Edges do not count the rotary inertia that frames carry for them."""
     scene = withe.Scene(gravity=(0, 0, 0))
     stiff = withe.Material(youngs_modulus=1e8, density=1000.0, viscosity=1e5)
     rod = scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=nodes, radius=0.01, material=stiff)

@@ -73,7 +73,7 @@ def test_a_straight_tendon_bends_a_rod_to_an_arc(planar, offset):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_what_a_motor_takes_in_of_a_straight_tendon_is_that_of_an_arc_on_any_mesh(seed):
-    """Of a section of least energy; half an edge at the free end counts as the arc that it is."""
+    """The section has least energy; half an edge at the free end counts as an arc."""
     random = np.random.default_rng([62, seed])
     bend, offset = random.uniform(2e-3, 8e-3, 2), random.uniform(-8e-3, 8e-3, 2)
     curvature = TENSION * offset / bend
@@ -102,8 +102,8 @@ def test_what_a_motor_takes_in_of_a_straight_tendon_is_that_of_an_arc_on_any_mes
 def test_a_tendon_bends_its_rod_until_nothing_of_it_is_left(planar, twigs):
     """A tendon of length L (1 - q), q = T h^2 / EI, leaves a stable arc of curvature q / h for every q below 1.
 
-    At a frame (a clamp, or a node where another rod is joined) an edge turns by 5/12 of an edge's turn and by 13/12 at
-    its other end, so that a piece of tendon as long as the edge would be used up at q = 12/13.
+    At a frame (a clamp, or a node with another rod joined) an edge turns by 5/12 of an edge's rotation, and by 13/12 at
+    its other end. A piece of tendon as long as the edge would therefore be used up at q = 12/13.
     """
     offset = 0.025
     soft = {"stiffness": rods.stiffness(bend=EI, twist=GJ, stretch=1e7), "line_density": 0.1, "radius": 5e-3}
@@ -142,7 +142,7 @@ def test_arcs_have_the_curvature_of_theory_to_fourth_order_in_the_turn_of_an_edg
 @pytest.mark.parametrize("place", ["start", "middle", "end"])
 @pytest.mark.parametrize("pulled", ["tendon", "moment", "follower"])
 def test_a_clamp_takes_hold_of_a_bent_rod_without_moving_it(pulled, place, planar):
-    """Where a moment acts, or a tendon ends, the half edge between is bent as the rod is, which takes nothing."""
+    """If a moment acts, or a tendon ends, the half edge in between is bent as the rod is, which costs nothing."""
     scene = rods.weightless()
     rod = arm(scene, 11)
     scene.clamp(rod.end if place == "start" else rod.start)

@@ -38,8 +38,10 @@ def test_a_column_stays_straight_on_request_with_a_falling_motion_for_every_eule
 @pytest.mark.parametrize("planar", [True, False])
 @pytest.mark.parametrize("humps", [1, 2, 3])
 def test_a_strut_between_clamps_stays_in_each_of_its_modes_on_request(humps, planar):
-    """With its ends held, the n-th mode of a clamped strut has n - 1 motions in its plane that lower the energy: one
-    hump is stable, an S has one, an M two [Maddocks 1984, Arch. Rational Mech. Anal. 85]."""
+    """The n-th mode of a strut between held ends has n - 1 motions in its plane that lower the energy.
+
+    One hump is stable, an S has one such motion, and an M has two [Maddocks 1984, Arch. Rational Mech. Anal. 85].
+    """
     x = np.linspace(0.0, 1.0, 81)
     shape = {
         1: 1.0 - np.cos(2.0 * np.pi * x),

@@ -149,12 +149,12 @@ def cantilever_mode(s: np.ndarray, n: int = 0) -> np.ndarray:
 
 
 def follower_column(load: float, frequency: complex, mass: float = 0.0) -> complex:
-    """What vanishes at frequencies w of a cantilever under a force that follows its end, with a mass there.
+    """Function with zeros at the frequencies w of a cantilever under a force that follows its end, with a mass there.
 
-    P L^2 / B, w L^2 sqrt(m / B), M / (m L). y'''' + P y'' = w^2 y, y = y' = 0 at the wall, and y'' = 0,
-    y''' = -M w^2 y at the tip, where the force has no part across the column [Beck 1952; Pflueger 1955]: with
-    y = A (cosh a s - cos b s) + C (sinh a s / a - sin b s / b), a^2, b^2 = (P^2 / 4 + w^2)^(1/2) -+ P / 2, the
-    determinant of the last two.
+    The arguments are P L^2 / B, w L^2 sqrt(m / B) and M / (m L). The equation is y'''' + P y'' = w^2 y, with
+    y = y' = 0 at the wall. At the tip y'' = 0 and y''' = -M w^2 y, because the force has no part across the column
+    [Beck 1952; Pflueger 1955]. The solution is y = A (cosh a s - cos b s) + C (sinh a s / a - sin b s / b) with a^2,
+    b^2 = (P^2 / 4 + w^2)^(1/2) -+ P / 2. The function is the determinant of the two conditions at the tip.
     """
     half = 0.5 * load
     size = np.sqrt(half**2 + frequency**2 + 0j)
