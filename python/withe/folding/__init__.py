@@ -1,7 +1,7 @@
 """Paper that is lifted from a table and folded over.
 
-Lengths here are in Lgb = (E h^2 / (24 rho g))^(1/3), the gravito-bending length, and forces in w Lgb, w the weight of
-the sheet per length. That makes one solution serve every paper.
+Lengths here are in units of the gravito-bending length Lgb = (E h^2 / (24 rho g))^(1/3), and forces in w Lgb, where w
+is the weight of the sheet per length. One solution therefore serves every paper.
 
 >>> import withe
 >>> pose = withe.folding.elastica(3.0, 2.25)

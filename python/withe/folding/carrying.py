@@ -1,4 +1,4 @@
-"""A simulated sheet while a jaw carries it: how far it goes on, and when it is no folding any more."""
+"""A simulated sheet while a jaw carries it: the end of the motion, and the detection of failed folds."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ _SLIPS = 1e-3  # in the jaw, from which on it is said [m]
 
 
 class Watch:
-    """Looks at a sheet after every step: asks for the next motion, and sees whether it snaps.
+    """Watch a sheet after every step: request the next motion, and detect snaps.
 
     Attributes
     ----------
     max_speed : float [m/s]
     max_curvature : float [1/m]
-        Greatest so far.
+        Greatest values so far.
     slip : float [m]
-        By how much the sheet has slipped in the jaw, where most.
+        Greatest slip of the sheet in the jaw.
     failure : str or None
-        Why it is no fold.
+        Reason of a failed fold.
     over : bool
-        Whether it ended.
+        True if the fold has ended.
     """
 
     def __init__(self, jaw: JawMotion, rods: Sequence[Rod]) -> None:
@@ -71,8 +71,8 @@ def carried(
 ) -> Watch:
     """Run until the jaw has done its motions and the sheet has settled, or until it snaps.
 
-    `hands` are the parts of the jaw, `duration` [s] is what a progress bar expects of the motions, `record_every` [s]
-    as that of `Simulation.run`.
+    `hands` are the parts of the jaw. `duration` [s] is the expected duration for a progress bar. `record_every` [s] is
+    that of `Simulation.run`.
 
     Warns
     -----

@@ -1,4 +1,4 @@
-"""A fold that is watched: the sheet is looked at on the way, and the rest planned anew [dissertation, Alg. 8]."""
+"""A fold with camera corrections, after which the rest is replanned [dissertation, Alg. 8]."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Plan, write the file and say what was planned."""
+    """Plan, write the file and print a summary of the plan."""
     _require_writable(arguments.out)
     given = {
         "length": arguments.length,

@@ -1,4 +1,4 @@
-"""Plans of folds, ended as the sheet bears it: slowly, or by a plunge that simulations have found."""
+"""Plans of folds with their endings: slow, or a plunge that simulations have found."""
 
 from __future__ import annotations
 

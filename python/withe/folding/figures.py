@@ -1,4 +1,4 @@
-"""Pictures of plans: the sheet's side at some of its poses, from the exact equilibria."""
+"""Pictures of plans: side views of the sheet at some of its poses, from the exact equilibria."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _STEPS = 400
 def side_view(forces: FloatArray, length: float, width: Width) -> FloatArray:
     """Points of a sheet from its far end to the jaw's inner edge, of shape (points, 2), x and z in Lgb.
 
-    `forces`: those of one equilibrium, R, H and the suspended length; the fourth-order Runge-Kutta method.
+    `forces` are R, H and the suspended length of one equilibrium. The integration is a fourth-order Runge-Kutta method.
     """
     normal, tangential, suspended = forces
     places, lifted = suspended - np.linspace(0.0, suspended, 2 * _STEPS + 1), float(width.weight(suspended))
@@ -46,7 +46,7 @@ def side_view(forces: FloatArray, length: float, width: Width) -> FloatArray:
 def draw_fold(
     axes: Any, sheets: list[FloatArray], outer: FloatArray, way: FloatArray, table: tuple[float, float]
 ) -> None:
-    """Draw sheets (points in m) light to dark, what the jaw holds of each in black, and the way of the edge."""
+    """Draw sheets (points in m) from light to dark, the held part of each in black, and the path of the edge."""
     from matplotlib import colormaps
 
     colours = colormaps["viridis"](np.linspace(0.9, 0.1, len(sheets)))

@@ -60,12 +60,12 @@ class Holding:
         return x, z - self.thickness - self.finger * np.abs(np.cos(sheet.angle))
 
     def ratio(self, sheet: Elastica) -> FloatArray:
-        """Friction coefficient that the sheet needs not to slide."""
+        """Friction coefficient below which the sheet slides."""
         lying = self.width.lying(sheet.suspended, self.length)
         return np.asarray(np.abs(sheet.tangential_force) / (sheet.normal_force + lying))
 
     def worst_ratio(self, sheet: Elastica) -> FloatArray:
-        """The same at the same poses if Lgb is more or less by the share; infinite where that has no stable pose."""
+        """Greatest `ratio` at these poses if Lgb changes by the share; infinite if that sheet has no stable pose."""
         worst = self.ratio(sheet)
         for factor in (1 - self.share, 1 + self.share) if self.share > 0 else ():
             it = replace(self, length=self.length / factor, width=self.width.of_other(factor))
@@ -75,13 +75,13 @@ class Holding:
         return worst
 
     def has_room(self, sheet: Elastica, least: float = -1e-9) -> npt.NDArray[np.bool_]:
-        """Return True if an edge that looks back is over the table by more than the fingers need and `least`."""
+        """Return True if an edge that looks back is higher above the table than the fingers and `least` need."""
         x, room = self.outer(sheet)
         above = np.clip(_SLOPE * (self.goal - x), 0.0, self.clearance)
         return np.asarray((sheet.angle <= 0.5 * np.pi) | (room >= least + above))
 
     def bearable(self, sheet: Elastica) -> npt.NDArray[np.bool_]:
-        """Return True if sheet and jaw can be there, and the sheet is not bent too far."""
+        """Return True if the pose is possible for sheet and jaw, and the curvature is within its bound."""
         fits = (sheet.suspended < self.length) & (sheet.angle < _STEEPEST) & (sheet.max_curvature <= self.curvature)
         return sheet.valid & sheet.stable & fits & self.has_room(sheet)
 
@@ -100,7 +100,7 @@ def places_at(forces: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class Lattice:
-    """Equilibria over places, of one shape; those that are no good have a ratio of infinity.
+    """Equilibria on a grid of places; invalid equilibria have an infinite ratio.
 
     Attributes
     ----------
@@ -108,7 +108,7 @@ class Lattice:
     sheet : Elastica
         Arrays of shape (nodes,).
     ratio : ndarray of shape (nodes,)
-        Needed friction, of the worst Lgb.
+        Needed friction, for the worst Lgb.
     edges : ndarray of shape (edges, 2)
     lengths : ndarray of shape (edges,)
     """
@@ -127,9 +127,9 @@ def _ways(first: Elastica, second: Elastica) -> FloatArray:
 
 @lru_cache(maxsize=16)
 def make_lattice(holding: Holding, pulls: bool, most: float = np.inf, fine: int = 1) -> Lattice:
-    """Solve all nodes: H = 0 alone, or, with `pulls`, H to either side, but what needs more friction than `most`.
+    """Solve all nodes: only H = 0, or, with `pulls`, H of both signs, as far as the needed friction is below `most`.
 
-    `fine` divides spacings.
+    `fine` divides the spacings.
     """
     count = (20 if pulls else 48) * fine
     # Without weight forces grow as the square of the curvature that they make.
@@ -167,11 +167,10 @@ def _neighbours(shape: tuple[int, ...], good: npt.NDArray[np.bool_]) -> npt.NDAr
 
 
 def goals(lattice: Lattice, holding: Holding, x: float) -> Elastica:
-    """Equilibria whose outer edge is at x with the fingers on what lies there, near all nodes that are next to such.
+    """Equilibria whose outer edge is at x and whose fingers rest on the sheet there, near all nodes next to such poses.
 
-    They form curves, of which these are points, in no order; where H = 0 alone is asked for, a few points, and those
-    are among the others too. The least ratio is found to much less than a cell. Whether they are bearable is not asked,
-    but for that.
+    They are points of curves, in no order. If only H = 0 is allowed, they are a few points, which are among the others
+    too. The least ratio is accurate to much less than a cell. Apart from the ratio, the poses may be impossible.
     """
     near = _next_to_goals(lattice, holding, x)
     found = _on_goal(near, holding, x, len(lattice.axes[1]) > 1)
@@ -268,7 +267,7 @@ def _least(places: FloatArray, lattice: Lattice, holding: Holding, x: float) -> 
 
 @dataclass(frozen=True)
 class Way:
-    """Places from flat to a goal, and the greatest ratio on the way."""
+    """Places from flat to a goal, and the greatest ratio on this path."""
 
     places: FloatArray
     ratio: float
@@ -292,9 +291,9 @@ def _goal_links(lattice: Lattice, goal: Elastica) -> tuple[npt.NDArray[np.intp],
 
 
 def way_to(lattice: Lattice, holding: Holding, goal: Elastica, goal_ratio: FloatArray, limit: float) -> Way | None:
-    """Shortest way, bends counted, on which no ratio is above the limit; or the least greatest where none is.
+    """Shortest path, bends counted, whose ratio is at most the limit; otherwise the path of least greatest ratio.
 
-    None where no way is at all.
+    None if there is no path.
     """
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import connected_components, dijkstra
@@ -341,7 +340,7 @@ def way_to(lattice: Lattice, holding: Holding, goal: Elastica, goal_ratio: Float
 
 
 def smoothed(way: Way, holding: Holding, limit: float) -> FloatArray:
-    """Places of a way without its lattice's corners, densely; ends stay, and so does what was kept on the way."""
+    """Dense places of a path without the corners of its lattice; the ends and the bounds of the path are kept."""
     from scipy.ndimage import gaussian_filter1d
 
     sheet = at_forces(forces_at(way.places))

@@ -1,8 +1,8 @@
-"""The manifold of sheets held without moment on a grid of positions, made once; and searches over it.
+"""The manifold of sheets held without moment on a grid of positions, and searches over it.
 
-All in Lgb. The grid is that of the dissertation, 7.8.5: blocks of 0.0548, a pose at the middle of each. Beside it
-stands the lift: sheets raised from the table without tangential force, the smooth way from flat into the grid, whose
-positions say little where so short a part is lifted.
+All quantities are in Lgb. The grid is that of the dissertation, 7.8.5: blocks of 0.0548 with a pose at the middle of
+each. The "lift" is the smooth path from the flat sheet into the grid: sheets raised from the table without tangential
+force. Positions hardly determine the equilibrium of such short suspended parts.
 """
 
 from __future__ import annotations
@@ -53,8 +53,7 @@ class Grid:
     spacing : float [Lgb]
     lifts : int
         How many nodes belong to the lift.
-    pose : Elastica
-        Arrays of shape (nodes,).
+        Number of nodes of the lift. Arrays of shape (nodes,).
     edges : ndarray of shape (edges, 2)
     lengths : ndarray of shape (edges,) [Lgb]
     """
@@ -105,13 +104,13 @@ def _gentle(width: Width) -> Any:
 
 
 def gentle(lifted: FloatArray, width: Width) -> FloatArray:
-    """Normal force of the lift at lengths between its nodes."""
+    """Normal force of the lift at suspended lengths between its nodes."""
     return np.asarray(_gentle(width)(lifted))
 
 
 @lru_cache(maxsize=8)
 def make_grid(solve: Manifold, spacing: float = SPACING) -> Grid:
-    """Solve the middles of all blocks; edges join neighbours, also over corners, and the lift with blocks nearby."""
+    """Solve the middles of all blocks. Edges join neighbours, also diagonal ones, and the lift with nearby blocks."""
     columns, rows = int(WIDE / spacing), int(HIGH / spacing)
     x, z = np.meshgrid(spacing * (np.arange(columns) + 0.5), spacing * (np.arange(rows) + 0.5), indexing="ij")
     blocks = solve(x, z)
@@ -136,13 +135,13 @@ def make_grid(solve: Manifold, spacing: float = SPACING) -> Grid:
 
 @dataclass(frozen=True)
 class Network:
-    """Nodes of a grid that may be passed, and the cost from each to its neighbours: what one search after another uses.
+    """Allowed nodes of a grid, and the cost from each to its neighbours, shared by successive searches.
 
     Attributes
     ----------
     grid : Grid
     cost : ndarray of shape (nodes,)
-        Per length.
+        Cost per length.
     allowed : ndarray of bool, shape (nodes,)
     graph : scipy.sparse.csr_array of shape (nodes, nodes)
         Cost of each edge, in both directions.
@@ -155,7 +154,7 @@ class Network:
 
 
 def make_network(grid: Grid, cost: FloatArray, allowed: npt.NDArray[np.bool_]) -> Network:
-    """Join the nodes that are allowed. `cost` per length, of shape (nodes,), as `allowed`."""
+    """Join the allowed nodes. `cost` is per length; `cost` and `allowed` have the shape (nodes,)."""
     from scipy.sparse import csr_array
 
     kept = allowed[grid.edges].all(axis=1)
@@ -175,7 +174,7 @@ def _away(grid: Grid, end: Elastica) -> FloatArray:
 
 
 def nodes_near(network: Network, end: Elastica) -> IndexArray:
-    """Blocks around a pose that may be passed."""
+    """Allowed blocks around a pose."""
     return _near(network, end)[0]
 
 
@@ -196,16 +195,16 @@ def _links(network: Network, end: Elastica) -> tuple[IndexArray, FloatArray]:
 
 @dataclass(frozen=True)
 class Ways:
-    """Ways of least cost from every node to a goal.
+    """Paths of least cost from every node to a goal.
 
     Attributes
     ----------
     network : Network
     goal : Elastica
     cost : ndarray of shape (nodes,)
-        Of the way from a node; infinite where there is none.
+        Cost of the path from a node; infinite if there is none.
     following : ndarray of int, shape (nodes,)
-        Node after each on its way; as many as there are nodes means the goal.
+        Next node on each path. The number of nodes stands for the goal.
     """
 
     network: Network
@@ -215,9 +214,9 @@ class Ways:
 
 
 def ways_to(network: Network, goal: Elastica) -> Ways:
-    """Search uniform cost, from a goal back, by cost times length [dissertation, Alg. 7, mended].
+    """Search by uniform cost from a goal backwards, with cost times length [dissertation, Alg. 7, mended].
 
-    Whatever pose one sets out from, it is the same search: a plan and its replans share it.
+    The search is the same for every start, so a plan and its replans share it.
     """
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import dijkstra
@@ -231,7 +230,7 @@ def ways_to(network: Network, goal: Elastica) -> Ways:
 
 
 def shortest_path(ways: Ways, start: Elastica | None) -> Elastica | None:
-    """Nodes of the way of least cost from flat, or from a pose; None where there is none."""
+    """Nodes of the path of least cost from flat, or from a pose; None if there is none."""
     grid, goal = ways.network.grid, ways.goal
     if start is None:
         nodes, costs = np.array([0]), np.zeros(1)

@@ -34,9 +34,9 @@ class Measured:
     ----------
     gravito_bending_length, error : float [m]
     strip : float [Lgb]
-        Length of the strip that was measured.
+        Length of the measured strip.
     curl, curl_error : float [1/m] or None
-        How a strip that was turned over bends by itself, positive where it bends down before it is turned.
+        Natural curvature of a strip that was also measured turned over, positive if it bends down before the turn.
     """
 
     gravito_bending_length: float
@@ -78,12 +78,12 @@ def _angle_where(of: int, value: float) -> float:
 
 
 def droop(length: float) -> float:
-    """Find how far the tip of a strip hangs below its clamp, which is level.
+    """Return the drop of the tip of a hanging strip below its level clamp [Lgb].
 
     Parameters
     ----------
     length : float [Lgb]
-        0.05 to 20.
+        Length of the strip, 0.05 to 20.
 
     Returns
     -------
@@ -92,7 +92,7 @@ def droop(length: float) -> float:
     Raises
     ------
     ValueError
-        No such length.
+        A length out of range.
     """
     length = validation.positive(length, "length")
     if not 0.05 <= length <= 20.0:
@@ -112,34 +112,37 @@ def measure(
 ) -> Measured:
     """Find a sheet's gravito-bending length Lgb = (EI / 2w)^(1/3) with a ruler, or from a picture.
 
-    Clamp a strip level, at the edge of a table under a book, so that `length` of it is free: its tip then hangs `drop`
-    below the clamp. The strip's equilibrium is that of an elastica under its own weight, exactly, however far it bends.
+    Clamp a strip level, at the edge of a table under a book, so that `length` of it is free. Its tip then hangs `drop`
+    below the clamp. The model is the exact elastica under its own weight, for any bending.
 
-    Paper curls, and a strip that curls by 0.5 / m seems stiffer or limper by 1.5 to 4 %. Clamp it a second time, turned
-    over: from both readings follow Lgb and the curl.
+    Paper curls, and a curl of 0.5 / m changes the apparent Lgb by 1.5 to 4 %. Clamp the strip a second time, turned
+    over:
+    both readings together give Lgb and the curl.
 
     Parameters
     ----------
     length, drop : float [m]
+        Length of the free strip, and drop of its tip below the clamp.
     image : path, or array_like of shape (height, width, 3) of uint8
-        Instead of these: the strip from the side, level, before a plain background, cut off at the clamp, so that the
-        strip comes in from the left or the right border. What counts is how far from there the tip is, across and down.
+        Picture of the strip, instead of length and drop: from the side, level, before a plain background, and cut off
+        at the clamp, so that the strip enters at the left or right border. The measurement uses the distance of the tip
+        from there, across and down.
     turned : float [m], path or array_like
-        The same strip turned over: its drop, if the first reading is one by ruler, else its picture.
+        Reading of the same strip turned over: its drop if the first reading is by ruler, else its picture.
     scale : float [px/m]
-        Of the pictures, where the strip is.
+        Pixels per metre of the pictures, at the strip.
     error : float [m]
-        Standard deviation of either length; by default 0.5 mm, and 0.3 pixels of a picture.
+        Standard deviation of either length. By default 0.5 mm, or 0.3 pixels of a picture.
 
     Returns
     -------
     Measured
-        With the error that follows from those of the readings, to first order.
+        Lgb with its standard deviation, by linear propagation of the errors of the readings.
 
     Warns
     -----
     UserWarning
-        The strip is so short or so long that its droop says little: cut one of 1.5 to 3 Lgb.
+        The strip is too short or too long for a precise result: cut one of 1.5 to 3 Lgb.
 
     Raises
     ------

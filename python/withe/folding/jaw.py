@@ -1,4 +1,4 @@
-"""The jaw that holds a sheet by its edge: where it is, and what room it takes."""
+"""The jaw that holds a sheet by its edge: its poses and its size."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ class Jaw:
     Parameters
     ----------
     depth : float [m]
-        Of the sheet between the fingers. What hangs freely ends at the inner edge of the jaw.
+        Length of the sheet between the fingers. The free part of the sheet ends at the inner edge of the jaw.
     finger : float [m]
         Thickness of either finger.
     reach : float [m]
-        Length of the fingers beyond the sheet's edge, to where the gripper is out of the way.
+        Length of the fingers beyond the edge of the sheet. Farther out, the gripper is out of the way.
     stiffness : (float, float), optional [N/m, N m/rad]
-        With which the fingers hold the sheet in place, and against turning in them: a jaw that comes too low yields,
-        and rests on the table. Plans take the jaw for rigid. By default 2000 and 10, which is thousands of times what a
-        sheet of office paper asks for; heavier and stiffer sheets are held by 5000 EI / Lgb^3 and 10000 EI / Lgb.
+        Stiffness with which the fingers hold the sheet, against displacement and rotation. A jaw that comes too low
+        yields, and rests on the table. Plans assume a rigid jaw. The default is 2000 and 10, which is thousands of
+        times the stiffness of office paper, or 5000 EI / Lgb^3 and 10000 EI / Lgb for heavier and stiffer sheets.
     force_limit : float [N]
-        With which they press on the table at most; beyond it the sheet slips in the jaw.
+        Largest force with which the fingers press on the table; beyond it the sheet slips in the jaw.
 
     Raises
     ------
@@ -61,10 +61,10 @@ class Jaw:
         object.__setattr__(self, "force_limit", validation.positive(self.force_limit, "force_limit"))
 
     def clearance(self, x: FloatArray, z: FloatArray, angle: FloatArray, side: str) -> FloatArray:
-        """Height of the lowest point of the fingers over the table [m], the sheet's outer edge being at (x, z).
+        """Height of the lowest point of the fingers over the table [m], for the sheet's outer edge at (x, z).
 
-        `side` "edge": the fingers come from beyond the outer edge, in line with what they hold. "side": from the side
-        of the sheet, across it, so that beyond the edge there is nothing of them.
+        With `side` "edge" the fingers come from beyond the outer edge, in line with the sheet. With "side" they come
+        across the sheet, and nothing of them is beyond the edge.
         """
         beyond = self.reach if side == "edge" else 0.0
         sine, cosine = np.sin(angle), np.abs(np.cos(angle))

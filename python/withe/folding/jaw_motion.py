@@ -72,7 +72,7 @@ class _Way:
 
 
 class JawMotion:
-    """Motions in a row. Each is asked for when the one before has ended, so that it may depend on what came of that."""
+    """Successive motions. Each is requested when the previous one has ended, so it may depend on the result."""
 
     def __init__(self, motions: Iterable[Motion], drawn: Drawn) -> None:
         self._motions: Iterator[Any] = iter(motions)
@@ -81,16 +81,16 @@ class JawMotion:
         self._comes_in = _COMES_IN * (self._way.times[-1] - self._way.times[0])
 
     def on_from_here(self, motions: Iterable[Motion]) -> JawMotion:
-        """Other motions, from the end of the present one on, of a jaw that has come there in the same way."""
+        """Other motions from the end of the present one on, for a jaw with the same past."""
         other = copy(self)
         other._motions = iter(motions)
         other.go_on()
         return other
 
     def lately(self, time: float) -> float:
-        """Greatest speed of the edge in the last moments before a time [m/s]: as long as a sheet takes to follow.
+        """Greatest recent speed of the edge [m/s], over the response time of the sheet.
 
-        Before that it counts less and less, as the sheet rings down.
+        Earlier speeds count less and less, as the vibration of the sheet decays.
         """
         ages = _FOLLOWS * np.arange(_RINGS)
         return max(float(np.exp(-age / _FOLLOWS)) * self._way.speed(time - age - _FOLLOWS, time - age) for age in ages)
@@ -107,11 +107,11 @@ class JawMotion:
 
     @property
     def end(self) -> float:
-        """When the present motion ends [s]."""
+        """End of the present motion [s]."""
         return float(self._way.times[-1])
 
     def go_on(self) -> bool:
-        """Take the next motion; False if there is none."""
+        """Start the next motion; return False if there is none."""
         motion = next(self._motions, None)
         if motion is None:
             return False
@@ -124,9 +124,9 @@ class JawMotion:
 
 
 def lead(hand: RunningHand, flat: FloatArray, jaw: JawMotion, depth: float, y: float = 0.0) -> None:
-    """Move a hand with a jaw that holds `depth` of a sheet, at y: the hand's place is the middle of that.
+    """Move a hand with a jaw that holds `depth` of a sheet, at y. The hand is at the middle of this part.
 
-    `flat`: its rotation while the sheet is flat.
+    `flat` is the rotation of the hand while the sheet is flat.
     """
     middle = 0.5 * depth
 

@@ -1,4 +1,4 @@
-"""Equilibria of a sheet that lies on a table and is lifted by one edge, exactly."""
+"""Exact equilibria of a sheet that lies on a table and is lifted by one edge."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def _table(width: Width) -> SheetManifold:
 
 @dataclass(frozen=True)
 class Manifold:
-    """Equilibria of a sheet that is held without moment, by positions: each from its equations, or all learned."""
+    """Equilibria of a sheet that is held without moment, by positions: solved, or predicted by a network."""
 
     width: Width = EVEN
     learned: bool = False
@@ -56,30 +56,31 @@ def elastica(
     tip_moment: float = 0.0,
     width: npt.ArrayLike | None = None,
 ) -> Elastica:
-    """Find how the lifted part of a sheet hangs from a jaw.
+    """Return the equilibrium of the suspended part of a sheet that a jaw holds.
 
-    The sheet leaves the flat table without curvature (a table only pushes); the jaw holds its tip with a given moment.
-    In units of Lgb and w, with W the weight of the part before s and b the width relative to that at which w is the
-    weight per length,
+    The sheet leaves the flat table without curvature, because a table can only push. The jaw applies a given moment to
+    the tip. Units are Lgb and w. With W the weight of the part before s, and b the width relative to the width at which
+    w is the weight per length, the equations are
 
         theta' = m / (2 b),  m' = (R - W) cos(theta) - T sin(theta),  theta(0) = m(0) = 0,  m(suspended) = tip_moment
 
-    (dissertation, (7.6), with the condition at the lift-off point that it lacks), solved by multiple shooting with
-    exact derivatives. Of several equilibria at one position it is the one that is reached from the flat sheet without
-    a jump, the only one with theta >= 0 all along.
+    (dissertation, (7.6), with the missing condition at the lift-off point). Multiple shooting with exact derivatives
+    solves them. If one position has several equilibria, the result is the one that the flat sheet reaches without a
+    jump. It is the only one with theta >= 0 everywhere.
 
     Parameters
     ----------
     x, z : array_like, broadcast together [Lgb]
-        The tip's way back and up from where it lay in the flat sheet.
+        Displacement of the tip from its place in the flat sheet, back and up.
     length, angle : array_like, broadcast together [Lgb], [rad]
-        Instead of x and z: lifted length, 0.05 to 6.84, and the angle at the tip. Poses depend smoothly on these;
-        on x and z they depend steeply near x = 0.
+        Suspended length, 0.05 to 6.84, and the angle at the tip, instead of x and z. Poses depend smoothly on these
+        two. On x and z they depend steeply near x = 0.
     tip_moment : float [w Lgb^2]
-        Of the jaw on the sheet: twice the curvature at the tip, in 1/Lgb, that it makes there.
+        Moment of the jaw on the sheet. It is twice the curvature at the tip, in 1/Lgb.
     width : array_like of shape (places, 2) [Lgb], [-], optional
-        Distances from the tip, 0 and growing, and b there, straight between and as the last one beyond: a square
-        folded over its diagonal widens from the jaw to its middle. By default 1 everywhere.
+        Distances from the tip, which begin at 0 and grow, and the width b there. The width is linear in between and
+        constant beyond the last place. Example: a square folded over its diagonal widens from the jaw to its middle. By
+        default 1 everywhere.
 
     Returns
     -------
@@ -96,8 +97,8 @@ def elastica(
     Raises
     ------
     ValueError
-        Not numbers, not finite, shapes that do not broadcast, or neither x and z nor length and angle; widths that
-        are not positive, places that do not grow from 0.
+        Arguments that are not finite numbers or do not broadcast. Neither x and z, nor length and angle. Widths that
+        are not positive, or places that do not begin at 0 and grow.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Ways over the manifold of sheets that are held without moment [dissertation, 7.5]. All in Lgb."""
+"""Paths over the manifold of sheets that are held without moment [dissertation, 7.5]. All quantities are in Lgb."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ SMOOTHING = 1.02
 
 @lru_cache(maxsize=8)
 def goal_pose(solve: Manifold, x: float, z: float, depth: float, finger: float) -> Elastica | None:
-    """Pose without moment whose outer edge, `depth` beyond, is at x and finger's height over z; None if there is none.
+    """Pose without moment whose outer edge is at x, and a finger's height over z; None if there is none.
 
-    `finger`: thickness of that between the edge and what lies under it.
+    `depth` is the held length. `finger` is the thickness of the finger between the edge and the layer below.
     """
     angle = last_angle = np.pi
     last_change = 0.0
@@ -58,7 +58,7 @@ def goal_pose(solve: Manifold, x: float, z: float, depth: float, finger: float) 
 
 
 def uniform_cost(solve: Manifold, holding: Holding, goal: Elastica, start: Elastica | None = None) -> Elastica | None:
-    """Nodes from flat, or a pose, to a goal over a sheet's part of the manifold, at least accumulated force ratio."""
+    """Nodes of the path with the least accumulated force ratio, from flat or a pose to a goal, over valid sheets."""
     return shortest_path(_ways_by_ratio(solve, holding, goal), start)
 
 
@@ -99,9 +99,9 @@ def _allowed(solve: Manifold, holding: Holding) -> npt.NDArray[np.bool_]:
 def least_ratio(
     solve: Manifold, holding: Holding, enough: float, goal: Elastica, start: Elastica | None = None
 ) -> Elastica | None:
-    """Nodes of the shortest path, bends counted, that asks for no more friction than is enough.
+    """Nodes of the shortest path, bends counted, that needs no more than sufficient friction.
 
-    Where every path asks for more, of those whose greatest ratio is least.
+    If every path needs more friction, the path has the least greatest ratio.
     """
     ratio = holding.ratio(make_grid(solve).pose)
     return _shortest_within(solve, holding, lambda nodes: ratio[nodes], (enough, 0.0), goal, start)
@@ -197,10 +197,10 @@ def _needed_slides(solve: Manifold, length: float, friction: float) -> _NeededSl
 
 
 def greedy(solve: Manifold, holding: Holding, goal: Elastica) -> Elastica | None:
-    """From pose to pose next to it, always that of least tangential force, back over the sheet [Petrik 2016].
+    """Go from pose to pose, always to the neighbour with the least tangential force, back over the sheet [Petrik 2016].
 
-    Looks no further than one step of a block, within 60 degrees of where it goes, and comes down when it is over the
-    goal; None where it comes to an end before.
+    Each step looks one block ahead, within 60 degrees of its direction, and the path descends when it is over the goal.
+    None if the path ends before.
     """
     grid = make_grid(solve)
     raised = lift(solve.width)
@@ -238,11 +238,10 @@ def smoothed(
     holding: Holding,
     cut: Callable[[FloatArray], FloatArray],
 ) -> Elastica:
-    """Poses along a path through nodes, without their grid's corners; ends stay, and so does the lift.
+    """Poses along a path through nodes, without the corners of their grid; the ends and the lift are kept.
 
-    `cut` says at which places, indices with fractions, of poses of shape (n, 3) that are nearly those of the path.
-    No more friction is needed than `SMOOTHING` times that at the nodes, where corners can be taken off so. Some poses
-    may not be valid.
+    `cut` returns places (fractional indices) on poses of shape (n, 3) near the path. Where corners can be smoothed, the
+    needed friction is at most `SMOOTHING` times that of the nodes. Some poses may not be valid.
     """
     from scipy.ndimage import gaussian_filter1d
 

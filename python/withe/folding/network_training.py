@@ -1,4 +1,4 @@
-"""Training of networks that know how sheets hang, from exact equilibria."""
+"""Training of networks that predict hanging sheets, from exact equilibria."""
 
 from __future__ import annotations
 
@@ -53,10 +53,10 @@ def train(
     threads : int
         Number of threads of torch.
     time_limit : float, optional [s]
-        Training stops there, and so it does at Ctrl-C, with the best network so far. ``network.network.training`` says
-        how it ended.
+        Time at which training stops, with the best network so far. Ctrl-C stops it too.
+        ``network.network.training`` reports the reason.
     progress : bool
-        Whether to show a progress bar.
+        True to show a progress bar.
 
     Returns
     -------
@@ -65,7 +65,7 @@ def train(
     Raises
     ------
     ValueError
-        Another name, a negative seed.
+        An unknown name or a negative seed.
     ImportError
         torch is not installed.
 

@@ -21,32 +21,33 @@ _SHORTEST, _LONGEST = 0.03, 0.3  # waves of friction along the table [m]
 
 @dataclass(frozen=True)
 class Noise:
-    """Standard deviations of what differs from trial to trial; nothing is farther off than twice of these.
+    """Standard deviations of the quantities that vary from trial to trial. Deviations are at most twice these.
 
     Parameters
     ----------
     gravito_bending_length : float
-        Relative, of Lgb.
+        Relative standard deviation of Lgb.
     friction : float
-        Relative, of the coefficient between sheet and table.
+        Relative standard deviation of the friction coefficient between sheet and table.
     friction_variation : float
-        Relative to that, from place to place along the table, in waves of 30 to 300 mm.
+        Relative variation of friction along the table, in waves of 30 to 300 mm.
     curl : float [1/m]
-        Of the curvature that the sheet has without forces.
+        Natural curvature of the sheet.
     tilt : float [rad]
-        Of the table, about y.
+        Tilt of the table about y.
     position : float [m]
-        By which the jaw is off, in x and in z. It comes in over the first tenth of a motion, for where the jaw grips
-        the sheet it is where the sheet is.
+        Error of the jaw in x and in z. It grows from zero over the first tenth of a motion, because the jaw grips the
+        sheet without an error.
     angle : float [rad]
-        By which the jaw is turned too far.
+        Error of the jaw's angle.
     jitter : float [m]
-        Of the jaw's place about its mean, in x and in z, at 0.5 to 4 Hz.
+        Fluctuation of the jaw's position about its mean, in x and in z, at 0.5 to 4 Hz. Of the jaw's place about its
+        mean, in x and in z, at 0.5 to 4 Hz.
 
     Raises
     ------
     ValueError
-        A negative one.
+        A negative standard deviation.
 
     Examples
     --------
@@ -70,7 +71,7 @@ class Noise:
 
     @classmethod
     def none(cls) -> Noise:
-        """Everything is as the planner believes."""
+        """Return noise without any deviation."""
         return cls(*(0.0 for _ in fields(cls)))
 
 
@@ -93,7 +94,7 @@ class Drawn:
 
     @classmethod
     def of(cls, noise: Noise, seed: int) -> Drawn:
-        """Draw; the same from the same seed, number by number, whichever of them are zero."""
+        """Draw the numbers of a seed. Each number is the same whether or not other deviations are zero."""
         random = np.random.default_rng(seed)
         normal = np.array([_truncated(random) for _ in range(7)])
         amplitude = noise.jitter * np.sqrt(2.0 / _WAVES) * np.ones((_WAVES, 2))
@@ -119,7 +120,7 @@ class Drawn:
         return np.asarray(np.maximum(0.0, self.friction * (1.0 + share)))
 
     def off(self, time: float, share: float) -> FloatArray:
-        """Return the error of the jaw, (x, z [m], angle [rad]); `share` of it has come in."""
+        """Return the error of the jaw, (x, z [m], angle [rad]), when a `share` of it acts."""
         amplitude, frequency, phase = self.waves[..., 0], self.waves[..., 1], self.waves[..., 2]
         if not amplitude.any():
             return share * self.shift

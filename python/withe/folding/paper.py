@@ -1,4 +1,4 @@
-"""Sheets of paper: how large they are, and how stiff against their own weight."""
+"""Sheets of paper: their size, and their stiffness relative to their weight."""
 
 from __future__ import annotations
 
@@ -26,15 +26,17 @@ class Paper:
     Parameters
     ----------
     length, width : float [m]
-        Along the fold's way, and across it where it is widest.
+        Length along the fold, and largest width across it.
     gravito_bending_length : float [m]
-        Lgb = (EI / 2w)^(1/3), EI the bending stiffness and w the weight per length: `measure` finds it with a ruler.
+        Lgb = (EI / 2w)^(1/3), with EI the bending stiffness and w the weight per length. `measure` finds it with a
+        ruler.
     friction : float
-        Coefficient between sheet and table.
+        Friction coefficient between sheet and table.
     thickness : float [m]
+        Thickness of the sheet.
     outline : sequence of pairs of float
-        How wide it is where: shares of the length, from the lifted edge on, and shares of the width there, straight
-        between. By default it is as wide everywhere.
+        Width along the sheet: pairs of a share of the length, from the lifted edge on, and a share of `width`, linear
+        in between. By default the width is uniform.
 
     Raises
     ------
@@ -105,27 +107,27 @@ class Paper:
     def origami(cls, side: float = 0.35) -> Paper:
         """Square origami paper, Lgb 43 mm [Choi, dissertation, 7.8.3], to be folded over its diagonal.
 
-        It is held by a corner: its width grows from there to the middle, and falls again. Of the default size, corner
-        on corner (the target "half") would lift more of it than can be led without a moment; the dissertation's target
-        is 0.30 m.
+        A jaw holds it by a corner: the width grows from there to the middle, and falls again. A fold of corner on
+        corner (the target "half") at the default size would lift more of it than a jaw without a moment can lead. The
+        dissertation's target is 0.30 m.
 
         Parameters
         ----------
         side : float [m]
-            The dissertation does not say it; for its C = 0.30 m at least 0.213 m. Of smaller sheets little lies that
-            could hold them where they are.
+            Side of the square. The dissertation does not state it; its C = 0.30 m needs at least 0.213 m. A smaller
+            sheet has too little lying weight to stay in place.
         """
         diagonal = np.sqrt(2.0) * validation.positive(side, "side")
         return cls(diagonal, diagonal, 0.043, outline=((0.0, 0.0), (0.5, 1.0), (1.0, 0.0)))
 
 
 def folded_share(target: str) -> float:
-    """Share of a sheet that is folded over, of a word or a fraction such as "1/3".
+    """Return the share of a sheet that is folded over, for a word or a fraction such as "1/3".
 
     Raises
     ------
     ValueError
-        Another word, or a fraction that is not above 0 and up to a half.
+        An unknown word, or a fraction that is not above 0 and at most a half.
     """
     fraction = re.fullmatch(r"(\d{1,6})/(\d{1,6})", target.replace(" ", "")) if isinstance(target, str) else None
     if fraction is None:
@@ -137,7 +139,7 @@ def folded_share(target: str) -> float:
 
 
 def require_length(paper: Paper, planned: Paper) -> None:
-    """Refuse a sheet that is longer or shorter than that of a plan, whose jaw would hold it elsewhere."""
+    """Refuse a sheet whose length differs from that of a plan: the jaw would hold it at another place."""
     if paper.length != planned.length:
         raise ValueError(f"plan must be for a sheet of {paper.length:g} m, got one for {planned.length:g} m")
 

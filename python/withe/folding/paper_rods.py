@@ -20,10 +20,10 @@ _GRAVITY = 9.81  # [m/s^2], by which Lgb is defined
 
 
 def strip_numbers(paper: Paper) -> tuple[float, float, float]:
-    """Mass per length, bending and stretching stiffness of a sheet where it is widest [kg/m], [N m^2], [N].
+    """Mass per length, bending and stretching stiffness of a sheet at its largest width [kg/m], [N m^2], [N].
 
-    It bends as Lgb says, EI = 2 w Lgb^3, w the weight per length, and stretches as a strip of a uniform material of its
-    thickness h, EA = 12 EI / h^2.
+    The bending stiffness is EI = 2 w Lgb^3, with w the weight per length. The stretching stiffness is that of a uniform
+    strip of its thickness h, EA = 12 EI / h^2.
     """
     line_density = _DENSITY * paper.thickness * paper.width
     bend = 2.0 * line_density * _GRAVITY * paper.gravito_bending_length**3
@@ -31,7 +31,8 @@ def strip_numbers(paper: Paper) -> tuple[float, float, float]:
 
 
 def jaw_stiffness(jaw: Jaw, paper: Paper) -> tuple[float, float]:
-    """With which a jaw holds a sheet in place, and against turning [N/m], [N m/rad]: plans take it for rigid."""
+    """Stiffness of a jaw's hold on a sheet, for displacement and rotation [N/m], [N m/rad]; plans assume a rigid
+    jaw."""
     if jaw.stiffness is not None:
         return jaw.stiffness
     lgb = paper.gravito_bending_length

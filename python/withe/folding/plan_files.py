@@ -1,4 +1,4 @@
-"""Plans of folds in files: what JSON says of them, and a plan's parts from that."""
+"""Plans of folds in files: conversion to and from the content of JSON."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ _ROUNDED = 1e-6  # of angles that quaternions tell [rad]
 
 
 def sheet_listed(sheet: Elastica | None) -> dict[str, list[Any]] | None:
-    """A sheet that a plan knows, pose by pose."""
+    """List the predicted sheet of a plan, pose by pose."""
     if sheet is None:
         return None
     return {name: value.tolist() if name in _FLAGS else listed(value) for name, value in vars(sheet).items()}
 
 
 def parts_of(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Arguments of a plan from what its `to_dict` says.
+    """Arguments of a plan from the result of its `to_dict`.
 
     Raises
     ------
     KeyError, TypeError, ValueError
-        Something is missing, of another kind, or does not fit the rest.
+        Content that is missing, of a wrong type, or inconsistent.
     """
     times = increasing_times(content["times"], "times")
     count = len(times)

@@ -1,4 +1,4 @@
-"""Plans how a jaw folds a sheet over. Knows equilibria of the continuum, and no simulated sheet."""
+"""Planning of folds. It uses equilibria of the continuum, and no simulated sheet."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def slow_plan(
     acceleration: float,
     turning: float,
 ) -> FoldPlan:
-    """Plan a fold whose edge comes down slowly; arguments and what is refused are those of `plan`."""
+    """Plan a fold whose edge comes down slowly. Arguments and errors are those of `plan`."""
     if not isinstance(paper, Paper):
         raise ValueError(f"paper must be a Paper, got {paper!r}")
     jaw = Jaw() if jaw is None else jaw
@@ -233,20 +233,20 @@ def replan(present: FoldPlan, pose: npt.ArrayLike, slide: float) -> FoldPlan:
     ----------
     present : FoldPlan
     pose : array_like of shape (7,) [m], [-]
-        Of the sheet's outer edge, as those of `present`.
+        Pose of the sheet's outer edge, as in `present`.
     slide : float [m]
-        How far the sheet has slid towards +x from where it lay when the first plan was made.
+        Slide of the sheet towards +x since the first plan was made.
 
     Returns
     -------
     FoldPlan
-        In the same frame, from the pose on; its target and its times are those of the rest.
+        Plan in the same frame, from the pose on, with the remaining target and times.
 
     Raises
     ------
     ValueError
-        A pose that no sheet without moment can be near, or from which there is no path; with a free moment one that is
-        too far from those of the present plan.
+        A pose that no sheet without moment can approach, or from which there is no path. With a free moment, a pose
+        that is too far from those of the present plan.
 
     Examples
     --------
@@ -290,9 +290,9 @@ def _task_of(present: FoldPlan) -> _Task:
 
 
 def plan_above(present: FoldPlan, height: float) -> FoldPlan:
-    """Plan as far as over the target, by a height [m]: what a plan was asked for, but for its last part.
+    """Plan with the same task up to a height over the target [m], without the last part.
 
-    Where the edge would have to be pressed down, it is the last part that asks for friction.
+    The last part needs friction if the edge must be pressed down.
     """
     return _planned(replace(_task_of(present), rise=height))
 

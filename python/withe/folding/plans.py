@@ -1,4 +1,4 @@
-"""A plan: where the jaw is when, and what the sheet is predicted to do."""
+"""A plan: the poses of the jaw over time, and the predicted state of the sheet."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _LEAST = 0.1  # lifted, of a sheet that is flat [Lgb]
 
 
 def flat_forces(width: Width) -> tuple[float, float, float]:
-    """Forces of a sheet of which next to nothing is lifted [w Lgb], [Lgb]: half of its weight lies on the table."""
+    """Forces of a nearly flat sheet [w Lgb], [Lgb]: half of the weight of the lifted part lies on the table."""
     return 0.5 * float(width.weight(_LEAST)), 0.0, _LEAST
 
 
@@ -168,9 +168,9 @@ class FoldPlan(PlanFile):
     def slip_ratio(self) -> FloatArray:
         """Friction coefficient below which the sheet slides at a pose, of shape (n,).
 
-        Size of the tangential force over the normal force under all that lies, |H| / (R + weight of what lies). Where
-        the method does not keep the sheet from sliding ("intuitive") it is that of the predicted motion, friction at
-        most; NaN from where that has no equilibrium within reach.
+        It is the tangential force over the normal force below the lying part, |H| / (R + weight of the lying part). For
+        a method that does not prevent slides ("intuitive") it is that of the predicted motion, which is at most the
+        friction. NaN from the pose on at which the predicted motion has no equilibrium within reach.
         """
         sheet = self.sheet
         lying = self._width.lying(sheet.suspended, self._length)
@@ -180,18 +180,18 @@ class FoldPlan(PlanFile):
     def slide(self) -> FloatArray:
         """Return the slide of the sheet towards +x at each pose [m], shape (n,), since the plan was made.
 
-        Predicted with exact elastica, what lies as a rigid body, and Coulomb's law with the friction of the paper, for
-        a sheet without inertia; NaN from `jumps_at` on.
+        The prediction uses exact elastica, a rigid lying part, and Coulomb's law with the friction of the paper, for a
+        sheet without inertia. NaN from `jumps_at` on.
         """
         return self.slide_of(self.paper)
 
     def slide_of(self, paper: Paper) -> FloatArray:
-        """Return the slide of another paper on these poses [m], shape (n,), as `slide` for the plan's.
+        """Return the slide of another paper on these poses [m], shape (n,), as `slide` for the plan's paper.
 
         Parameters
         ----------
         paper : Paper
-            Of the same size; its Lgb and its friction may be others.
+            Paper of the same size, possibly with another Lgb and friction.
 
         Raises
         ------
@@ -218,7 +218,7 @@ class FoldPlan(PlanFile):
         return np.where(sheet.valid, slide * paper.gravito_bending_length, np.nan)
 
     def before_plunge(self) -> FoldPlan:
-        """The part that is led slowly: all of it where there is no plunge."""
+        """The part of the plan before a plunge; the whole plan without a plunge."""
         if self.plunges_at is None:
             return self
         slow = self.times <= self.plunges_at
@@ -230,7 +230,8 @@ class FoldPlan(PlanFile):
     def papers(self) -> list[Paper]:
         """Return the papers within `uncertainty`: the estimate, and the bounds.
 
-        Lgb less and more, with the least friction and with the paper's; five papers, fewer where a share is 0.
+        There are five papers: the estimate, and a smaller and a larger Lgb, each with the least friction and with the
+        friction of the paper. There are fewer papers if a share is 0.
         """
         lgb, friction = self.uncertainty
         bounds = product((1.0 - friction, 1.0), (1.0 - lgb, 1.0 + lgb))
@@ -246,7 +247,7 @@ class FoldPlan(PlanFile):
 
     @cached_property
     def worst_slide(self) -> tuple[float, Paper]:
-        """Greatest slide of any of `papers` at any pose before a plunge [m], and whose; infinite of one that jumps."""
+        """Greatest slide of `papers` at any pose before a plunge [m], and its paper; infinite if one of them jumps."""
         slow = self.before_plunge()
         found = [(np.abs(slow.slide_of(paper)).max(), paper) for paper in self.papers]
         slides = [(float(slide) if np.isfinite(slide) else np.inf, paper) for slide, paper in found]
@@ -256,7 +257,7 @@ class FoldPlan(PlanFile):
     def jumps_at(self) -> float | None:
         """Time from which the slide is not predicted [s]; None if it is predicted to the end.
 
-        A plunge always begins an unpredicted part. Elsewhere the sheet jumps at this time for one of four reasons:
+        A plunge always begins an unpredicted part. Elsewhere the sheet jumps at this time for one of three reasons:
 
         - no stable equilibrium is within reach
         - all of the sheet is lifted
@@ -288,16 +289,16 @@ class FoldPlan(PlanFile):
         return f"FoldPlan({way}, greatest {greatest}, fingers from the {self.side})"
 
     def plot(self, axes: Any | None = None, poses: int = 10) -> Any:
-        """Draw the sheet from the side at some of the poses, as it is predicted to slide and hang there.
+        """Draw the sheet from the side at some of the poses, with its predicted slide and shape.
 
-        From `jumps_at` on nothing is predicted, and only the way of the edge is drawn.
+        From `jumps_at` on nothing is predicted, and only the path of the edge is drawn.
 
         Parameters
         ----------
         axes : matplotlib.axes.Axes, optional
-            To draw into; by default those of a new figure.
+            Axes to draw into. By default those of a new figure.
         poses : int
-            How many, evenly in travel over the whole way.
+            Number of poses, at equal travel over the whole path.
 
         Returns
         -------
@@ -325,7 +326,7 @@ class FoldPlan(PlanFile):
         return axes
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything, with frames and units, as JSON takes it; what is not finite is None."""
+        """Return all values, with frames and units, for JSON. Values that are not finite become None."""
         return {
             "frames": {
                 "world": "origin where the middle of the lifted edge lay in the flat sheet; x along the sheet to its "

@@ -1,4 +1,4 @@
-"""The last part of a fold whose edge would have to be pressed down: quickly, and found by trying it on simulations."""
+"""Last part of a fold whose edge must be pressed down: a quick plunge, found by trials on simulated sheets."""
 
 from __future__ import annotations
 
@@ -82,27 +82,28 @@ def plunge(
     sheet: Mapping[str, Any] | None = None,
     progress: bool = True,
 ) -> FoldPlan:
-    """End a plan quickly, and with the edge pressed onto the sheet that it comes down on.
+    """End a plan by a quick motion that presses the edge onto the sheet.
 
-    Where more friction is needed in the end than there is, the edge is drawn back or pushed on as it comes down slowly.
-    A plunge leads the edge down within a `duration`, before the sheet can follow, and `press` lower than it can go. The
-    jaw yields, and presses both layers on the table by `press` times its stiffness, up to its force limit, so that they
-    stay. The edge goes down from above the target. The way down begins at the least height to which every sheet within
-    the plan's `uncertainty` is led without slide, or where least friction is needed; the plan is recomputed up to that
-    height. The way down is chosen by trials on simulated sheets without noise, those of `FoldPlan.papers`. The trials
-    vary how far the edge goes to the side, within what time, and whether it ends level or as in the plan. Each way is
-    aimed so that the nominal paper is folded right. Among the ways that fold all sheets, the chosen way has the
-    smallest error on its worst sheet: the error of the crease plus half of the slide. Jaws that hold sheets at the
-    bounds are off by 0.5 mm to either side: an edge that comes down on the last of a sheet must not miss it.
+    A slow end pulls the edge back or pushes it on if it needs more friction than there is. A plunge leads the edge down
+    within `duration`, before the sheet can follow, and to `press` below the sheet. The jaw yields, and presses both
+    layers on the table by `press` times its stiffness, up to its force limit, so that they stay in place.
+
+    The plunge begins above the target. Its height is the least to which the jaw leads every sheet within the plan's
+    `uncertainty` without slide, or the height of least friction. The plan is recomputed up to that height.
+
+    Trials on simulated sheets without noise, those of `FoldPlan.papers`, choose the way down. They vary the sideways
+    motion of the edge, the duration, and the final angle (level or as in the plan). Each way is aimed so that the
+    nominal paper is folded exactly. Among the ways that fold all sheets, the chosen way has the smallest error on its
+    worst sheet: the error of the crease plus half of the slide. For sheets at the bounds, the trials also displace the
+    jaw by 0.5 mm to either side, so that the edge comes down on the sheet and not beside it.
 
     Parameters
     ----------
     plan : FoldPlan
+        Plan with a slow end.
     press : float [m]
+        Depth below the sheet to which the plunge leads the edge.
     duration : float or sequence of float [s]
-        Of the way down, or those that are tried. The longer it takes the farther the sheet may slide meanwhile, the
-        shorter, the more it is thrown.
-    within : float [m]
         Duration of the way down, or the durations to try. The sheet slides farther in a longer plunge and is thrown
         more in a shorter one.
     within : float [m]
@@ -110,11 +111,15 @@ def plunge(
     replans : int
         Number of times that `fold` will look at the sheet and replan on the way. The trials replan as often, and only
         the slide during the plunge counts.
+    sheet : mapping, optional
+        Options of `SimulatedSheet`. By default sheets at the bounds have 75 edges.
+    progress : bool
+        True to show a progress bar.
 
     Returns
     -------
     FoldPlan
-        With `plunges_at`. What is predicted of its last part is NaN. Its speed there is beyond its limits.
+        Plan with `plunges_at`. The predictions of its last part are NaN, and its speed there exceeds the limits.
 
     Raises
     ------

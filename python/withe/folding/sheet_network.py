@@ -1,8 +1,8 @@
-"""Networks that have learned how sheets hang from a jaw without moment, in place of exact equilibria.
+"""Networks that predict sheets which hang from a jaw without moment, in place of exact equilibria.
 
-Two of them: "small", whose weights come with withe, and "source", that of Choi, dissertation, 7.5.2, which is trained
-by whoever wants it. They answer like `elastica`, a batch of a thousand some fifty times as fast, and have gradients; a
-plan needs neither. All in Lgb and w Lgb.
+There are two networks. "small" is shipped with withe. "source" is that of Choi, dissertation, 7.5.2, and users train it
+themselves. Both have the interface of `elastica` and have gradients. A batch of a thousand takes a fiftieth of the
+time. Plans need neither. All quantities are in Lgb and w Lgb.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ SHIPPED = Path(__file__).parent / "small.pt"
 
 
 def straight(x: Any, z: Any) -> Any:
-    """Length of a straight sheet from the table to the tip [Lgb]: no shorter one reaches there.
+    """Length of a straight sheet from the table to the tip [Lgb], which is the shortest possible one.
 
-    x = l (1 - cos phi), z = l sin phi, so l = (x^2 + z^2) / 2x. Lifted lengths are 1.2 to 2 times that, and where they
-    vary steeply with x, near x = 0, so does it.
+    From x = l (1 - cos phi) and z = l sin phi follows l = (x^2 + z^2) / 2x. Suspended lengths are 1.2 to 2 times this
+    length, and both vary steeply with x near x = 0.
     """
     return (x * x + z * z) / (2.0 * x)
 
@@ -80,8 +80,8 @@ FORMS = {
 class SheetNetwork(Surrogate):
     """Network that predicts sheets which hang from a jaw without moment. `train` makes one, `load` reads one.
 
-    Its answers are those of `elastica(x, z)`, about right. It cannot say that a sheet touches the table elsewhere,
-    so it also answers at x > 9.1, z < 0.8, where `elastica` refuses most positions for that.
+        Its results approximate those of `elastica(x, z)`. The network does not detect sheets that touch the table
+        elsewhere. It therefore also returns results at x > 9.1, z < 0.8, where `elastica` refuses most positions.
 
     Attributes
     ----------
@@ -145,19 +145,19 @@ class SheetNetwork(Surrogate):
         )
 
     def tensors(self, x: Any, z: Any) -> dict[str, Any]:
-        """The same of torch tensors, with gradients.
+        """Predict with torch tensors, with gradients.
 
         Parameters
         ----------
         x, z : Tensor [Lgb]
-            Of floating point numbers, broadcast together. What is not positive, or far outside, has no meaning, and is
-            not refused.
+            Floating point tensors, broadcast together. Values that are not positive, or far out of range, give
+            meaningless results and no error.
 
         Returns
         -------
         dict of Tensor
-            By the names of `Elastica`: "angle", "suspended", "force_ratio", and of the small one "normal_force",
-            "tangential_force" and "max_curvature".
+            The names are those of `Elastica`: "angle", "suspended", "force_ratio". The small network adds
+            "normal_force", "tangential_force" and "max_curvature".
 
         Examples
         --------
@@ -173,5 +173,5 @@ class SheetNetwork(Surrogate):
 
 @cache
 def shipped() -> SheetNetwork:
-    """The small one that comes with withe."""
+    """Return the small network that is shipped with withe."""
     return SheetNetwork.load()

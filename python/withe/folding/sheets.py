@@ -1,4 +1,4 @@
-"""Equilibria of the lifted part of a sheet, many at a time, in units of Lgb and w."""
+"""Equilibria of the suspended part of a sheet, computed in batches, in units of Lgb and w."""
 
 from __future__ import annotations
 
@@ -32,8 +32,9 @@ __all__ = [
 
 FloatArray = npt.NDArray[np.float64]
 SHORTEST, LONGEST = _core.SheetManifold.shortest, _core.SheetManifold.longest
-"""Lifted lengths between which positions of a tip without moment name one pose; shorter ones are bent too sharply, and
-no method plans over them [Choi, dissertation, 7.8.5]. [Lgb]"""
+"""Suspended lengths between which the position of a tip without moment determines one pose [Lgb]. Shorter parts are
+bent
+too sharply, and no method plans over them [Choi, dissertation, 7.8.5]."""
 _LEAST_SHARE = 500  # sheets that are worth a thread of their own
 
 
@@ -41,32 +42,31 @@ _LEAST_SHARE = 500  # sheets that are worth a thread of their own
 class Elastica:
     """Hanging sheets, pose by pose. All arrays have the shape of the arguments.
 
-    Where `valid` is False the other numbers are NaN, and `stable` is False.
+    If `valid` is False the other numbers are NaN, and `stable` is False.
 
     Attributes
     ----------
     x, z : ndarray [Lgb]
-        How far the tip is back from where it lay in the flat sheet, and up from the table.
+        Displacement of the tip from its place in the flat sheet: back, and up from the table.
     angle : ndarray [rad]
-        Of the tangent at the tip above the direction in which the sheet leaves the table.
+        Angle of the tangent at the tip above the direction in which the sheet leaves the table.
     suspended : ndarray [Lgb]
-        Length that is lifted.
+        Suspended length.
     normal_force, tangential_force : ndarray [w Lgb]
-        w is the sheet's weight per length, that at width 1 of one that is not as wide everywhere.
-        Of the table on the sheet at the lift-off point: upwards, and in the direction in which the sheet leaves
-        (positive where the sheet is pushed together, negative where it is pulled taut).
+        Force of the table on the sheet at the lift-off point: upwards, and in the direction in which the sheet leaves.
+        The tangential force is positive if it compresses the sheet, and negative if it pulls the sheet taut. w is the
+        weight per length, at width 1 if the width varies.
     force_ratio : ndarray
-        Size of the tangential force over the normal one. The sheet behind the lift-off point presses on the table
-        too: a sheet of length L slips where the tangential force exceeds
-        friction * (normal_force + L - suspended).
+        Absolute tangential force over normal force. The sheet behind the lift-off point presses on the table too. A
+        sheet of length L therefore slips if the tangential force exceeds friction * (normal_force + L - suspended).
     max_curvature : ndarray [1/Lgb]
-        Greatest size of the curvature.
+        Greatest absolute curvature.
     tip_moment : ndarray [w Lgb^2]
-        Of the jaw on the sheet.
+        Moment of the jaw on the sheet.
     valid : ndarray of bool
-        Whether there is such a pose; `elastica` says what is refused.
+        True if the pose exists; `elastica` lists the refused positions.
     stable : ndarray of bool
-        Whether it is a minimum of the energy while the jaw holds position and angle.
+        True if the energy is a minimum while the jaw holds position and angle.
     """
 
     x: FloatArray
@@ -83,7 +83,7 @@ class Elastica:
 
 
 def described(rows: FloatArray, shape: tuple[int, ...], *, keep: bool = False) -> Elastica:
-    """Give rows of the engine's table their names; in a shape that has as many entries as there are rows."""
+    """Name the columns of the engine's table; `shape` has as many entries as there are rows."""
     valid = rows[:, 7] > 0
     columns = [np.where(valid | keep, rows[:, i], np.nan).reshape(shape) for i in (0, 1, 2, 3, 4, 5, 6, 9)]
     x, z, angle, suspended, normal, tangential, curvature, moment = columns
@@ -103,17 +103,17 @@ def described(rows: FloatArray, shape: tuple[int, ...], *, keep: bool = False) -
 
 
 def join(first: Elastica, second: Elastica) -> Elastica:
-    """One after the other."""
+    """Concatenate two sets of sheets."""
     return Elastica(**{name: np.concatenate([value, getattr(second, name)]) for name, value in vars(first).items()})
 
 
 def take(sheet: Elastica, index: npt.NDArray[np.generic] | slice) -> Elastica:
-    """Some of many."""
+    """Select some of the sheets."""
     return Elastica(**{name: value[index] for name, value in vars(sheet).items()})
 
 
 def shared(solve: Callable[..., FloatArray], *columns: FloatArray) -> FloatArray:
-    """Rows of many sheets, by threads: the engine releases the interpreter."""
+    """Solve rows of many sheets on several threads: the engine releases the interpreter."""
     parts = max(1, min(os.cpu_count() or 1, len(columns[0]) // _LEAST_SHARE))
     if parts == 1:
         return solve(*columns)
@@ -128,9 +128,9 @@ def forces_of(sheet: Elastica) -> FloatArray:
 
 
 def of_other(forces: FloatArray, factor: float) -> FloatArray:
-    """Forces of about the same sheet if Lgb is more by a factor, in its own units: near which an equilibrium is sought.
+    """Forces of nearly the same sheet if Lgb grows by a factor, in its own units, as an initial guess.
 
-    Those of long parts are their weight, those of short ones bending.
+    For long parts these forces are their weight, for short parts their bending.
     """
     weighs = np.minimum(1.0, 0.5 * forces[:, 2:])
     scale = weighs / factor + (1.0 - weighs) * factor**2
@@ -144,9 +144,9 @@ def poses_of(sheet: Elastica) -> FloatArray:
 
 
 def at_forces(forces: npt.ArrayLike, width: Width = EVEN, *, keep: bool = False) -> Elastica:
-    """Equilibria by the numbers of `forces_of`: an initial value problem, with whatever moment at the tip.
+    """Equilibria by the numbers of `forces_of`. This is an initial value problem with free moment at the tip.
 
-    `keep`: numbers of what is not valid too, for searches that pass through such.
+    `keep` also returns numbers that are not valid, for searches that pass through them.
     """
     forces = np.asarray(forces, dtype=float)
     rows = shared(lambda share: _core.sheets_at_forces(share, width.engine), forces.reshape(-1, 3))
@@ -154,7 +154,7 @@ def at_forces(forces: npt.ArrayLike, width: Width = EVEN, *, keep: bool = False)
 
 
 def at_poses(poses: npt.ArrayLike, forces: npt.ArrayLike, width: Width = EVEN) -> Elastica:
-    """Equilibria of sheets held at poses (x, z, angle), each followed without a jump from one of known forces."""
+    """Equilibria of sheets held at poses (x, z, angle), each reached without a jump from given forces."""
     poses, forces = np.broadcast_arrays(np.asarray(poses, dtype=float), np.asarray(forces, dtype=float))
     rows = shared(
         lambda share, known: _core.sheets_at_poses(share, known, width.engine),
@@ -167,10 +167,10 @@ def at_poses(poses: npt.ArrayLike, forces: npt.ArrayLike, width: Width = EVEN) -
 def drag(
     poses: npt.ArrayLike, forces: npt.ArrayLike, friction: float, length: float, width: Width = EVEN
 ) -> tuple[Elastica, FloatArray]:
-    """Move the tip of a sheet from pose to pose, slowly; what lies slides as a rigid body by Coulomb's law.
+    """Move the tip of a sheet from pose to pose slowly. The lying part slides as a rigid body by Coulomb's law.
 
-    Returns the equilibria, not valid from where none is reached without a jump, and how far the sheet has slid
-    towards its far edge [Lgb].
+    Return the equilibria, and the slide of the sheet towards its far edge [Lgb]. Equilibria are invalid from the first
+    jump on.
     """
     rows, slides = _core.dragged_sheet(
         np.asarray(poses, dtype=float), np.asarray(forces, dtype=float), friction, length, width.engine
@@ -181,7 +181,7 @@ def drag(
 def slides_to_rest(sheet: Elastica, friction: float, length: float, width: Width = EVEN) -> FloatArray:
     """Slides of sheets, with jaws at rest, until friction holds them [Lgb]; infinite for sheets that snap.
 
-    What lies, of sheets `length` long, slides as a rigid body by Coulomb's law. `sheet`: of shape (n,).
+    The lying part, of sheets `length` long, slides as a rigid body by Coulomb's law. `sheet` has shape (n,).
     """
 
     def solve(forces: FloatArray) -> FloatArray:

@@ -1,4 +1,4 @@
-"""A sheet in the rod engine that a robot folds. Knows no planner, nor the equilibria that planners know."""
+"""A sheet in the rod engine that a robot folds. The module is independent of planners and their equilibria."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class Fold:
 
 @dataclass(frozen=True)
 class Held:
-    """A sheet and its jaw on the way, to go on from."""
+    """State of a sheet and its jaw during a motion, from which `carry_on` continues."""
 
     state: Snapshot
     jaw: JawMotion
@@ -100,13 +100,13 @@ class SimulatedSheet(TableSheet[Fold]):
     own_friction : float
         Coefficient of the sheet on itself.
     record_every : float [s]
-        Between frames of `Fold.record`, at which steps end; infinity keeps none on the way.
+        Interval between frames of `Fold.record`, at which steps end; infinity records no frames in between.
 
     Attributes
     ----------
     paper : Paper
     truth : Paper
-        The same as it is on this seed: what a planner must not see.
+        True properties of the sheet for this seed, which a planner must not know.
     jaw : Jaw
     simulation : Simulation
     rod : Rod
@@ -114,7 +114,7 @@ class SimulatedSheet(TableSheet[Fold]):
     Raises
     ------
     ValueError
-        Not a paper, numbers out of range.
+        Not a paper, or numbers out of range.
 
     Examples
     --------
@@ -180,20 +180,20 @@ class SimulatedSheet(TableSheet[Fold]):
     def strip_picture(
         self, length: float | None = None, scale: float = 4000.0, *, turned: bool = False
     ) -> npt.NDArray[np.uint8]:
-        """Take a picture from the side, for `measure`, of a strip of such a sheet that is clamped level and hangs.
+        """Take a picture from the side, for `measure`, of a strip of this paper that is clamped level and hangs.
 
         Parameters
         ----------
         length : float [m]
-            Of the strip; by default 2.2 Lgb as the planner believes.
+            Length of the strip. By default 2.2 times the Lgb that the planner knows.
         scale : float [px/m]
         turned : bool
-            Whether its lower side is up.
+            True if the lower side of the strip is up.
 
         Returns
         -------
         ndarray of uint8, shape (height, width, 3)
-            The strip comes in from the left.
+            Picture in which the strip enters from the left.
 
         Raises
         ------
@@ -220,7 +220,7 @@ class SimulatedSheet(TableSheet[Fold]):
         return Held(self.simulation.snapshot(), copy(self._motion))
 
     def carry_on(self, held: Held, motions: Iterable[Motion], target: float) -> Fold:
-        """Carry out other motions from where a sheet was held, as `carry_out` those from the flat sheet."""
+        """Carry out other motions from a kept state, as `carry_out` does from the flat sheet."""
         self.simulation.restore(held.state)
         return self._carried(held.jaw.on_from_here(motions), target, LONGEST, False)
 

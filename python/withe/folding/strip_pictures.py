@@ -1,4 +1,4 @@
-"""A hanging strip in a picture from the side: where it is clamped, and where it ends."""
+"""A hanging strip in a picture from the side: the positions of its clamp and its tip."""
 
 from __future__ import annotations
 

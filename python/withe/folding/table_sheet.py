@@ -1,4 +1,4 @@
-"""A sheet on a table that a jaw folds, however it is made of rods."""
+"""A sheet on a table that a jaw folds, for any model of rods."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ F = TypeVar("F")
 
 
 class FoldingMotion(Motion, Protocol):
-    """A motion with the place to which it brings the edge."""
+    """A motion with the target of the edge."""
 
     @property
     def target(self) -> float:
@@ -80,13 +80,13 @@ class TableSheet(ABC, Generic[F]):
         Returns
         -------
         Fold or WideFold
-            That of the sheet.
+            Result of the sheet.
 
         Raises
         ------
         ValueError
-            Not a plan, or one for paper of another size; poses that are not finite or do not begin at the flat sheet,
-            times that do not grow.
+            Not a plan, or a plan for paper of another size. Poses that are not finite or do not begin at the flat
+            sheet, or times that do not increase.
 
         Examples
         --------
@@ -110,8 +110,8 @@ class TableSheet(ABC, Generic[F]):
         Parameters
         ----------
         motions : iterable of FoldPlan
-            Each is asked for when the one before has ended, so that a generator may look at the sheet in between. The
-            first pose of a motion is where the one before has ended.
+            Each motion is requested when the previous one has ended, so a generator may look at the sheet in between.
+            The first pose of a motion is the last pose of the previous one.
         target : float [m]
             Place on the sheet where the lifted edge should lie in the end.
         duration : float [s]
@@ -122,12 +122,12 @@ class TableSheet(ABC, Generic[F]):
         Returns
         -------
         Fold or WideFold
-            That of the sheet.
+            Result of the sheet.
 
         Raises
         ------
         ValueError
-            As `fold`, or what a generator raised.
+            As `fold`, or an error that the generator raises.
         """
 
     @abstractmethod
@@ -135,7 +135,7 @@ class TableSheet(ABC, Generic[F]):
         """Return both long sides of the sheet as it lies now, each of shape (n, 3) [m]."""
 
     def picture(self, camera: Camera, size: tuple[int, int] = (640, 480)) -> npt.NDArray[np.uint8]:
-        """Take a picture of the sheet as it lies now, on a dark table. The sheet is straight across.
+        """Take a picture of the sheet in its present state, on a dark table. The sheet is straight across.
 
         Parameters
         ----------
@@ -146,7 +146,7 @@ class TableSheet(ABC, Generic[F]):
         Returns
         -------
         ndarray of uint8, shape (height, width, 3)
-            Red, green, blue, with a sensor's noise.
+            Red, green, blue, with sensor noise.
 
         Raises
         ------
@@ -157,9 +157,9 @@ class TableSheet(ABC, Generic[F]):
 
 
 def node_places(length: float, depth: float, edges: int) -> FloatArray:
-    """Nodes along a sheet, so that the inner edge of the jaw is in the middle of an edge: that is how far it is held.
+    """Nodes along a sheet, such that the inner edge of the jaw is in the middle of an edge.
 
-    The direction of an edge is that of the sheet in its middle, to second order in its length.
+    The direction of an edge is the direction of the sheet in its middle, to second order in its length.
     """
     held = max(0, round(edges * depth / length - 0.5))
     last = depth * (held + 1.0) / (held + 0.5) if depth > 0.0 else length / edges

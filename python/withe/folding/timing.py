@@ -1,4 +1,4 @@
-"""When a jaw is where: from a path to times, within limits of speed and acceleration."""
+"""Timing of a jaw: from a path to times, within limits of speed and acceleration."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def _lengths(poses: FloatArray, speed: float, turning: float) -> FloatArray:
 
 
 def evenly(poses: FloatArray, count: int, speed: float, turning: float) -> FloatArray:
-    """Places along a path (x, z, angle) at which it is cut into parts of equal travel, as indices with fractions."""
+    """Places along a path (x, z, angle) that divide it into parts of equal travel, as fractional indices."""
     travelled = np.concatenate([[0.0], np.cumsum(_lengths(poses, speed, turning))])
     return np.interp(np.linspace(0.0, travelled[-1], count), travelled, np.arange(len(poses)))
 
@@ -25,9 +25,9 @@ def evenly(poses: FloatArray, count: int, speed: float, turning: float) -> Float
 def travel_times(poses: FloatArray, speed: float, turning: float, acceleration: float) -> FloatArray:
     """Times [s] at which a path from rest to rest passes its poses (x, z [m], angle).
 
-    The way is p(q), q the time that it would take at full speed. With rate u = dq/dt, dp/dt = p' u and
-    d2p/dt2 = p'' u^2 + p' du/dt: either part is held to half the acceleration, and u <= 1. Angles count as lengths of
-    speed / turning.
+    The path is p(q), where q is the time at full speed. With the rate u = dq/dt, dp/dt = p' u and d2p/dt2 = p'' u^2 +
+    p' du/dt. Each of the two parts is bounded by half of the acceleration, and u <= 1. Angles count as lengths of speed
+    / turning.
     """
     q = np.concatenate([[0.0], np.cumsum(np.maximum(_lengths(poses, speed, turning), 1e-9))])
     scaled = poses * [1.0, 1.0, speed / turning]

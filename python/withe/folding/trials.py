@@ -1,4 +1,4 @@
-"""Trials of folding, many at once: sheets that are not quite what the planner thinks, plans, and what comes of them."""
+"""Trials of folding, many in parallel: sheets that differ from the planner's paper, plans, and results."""
 
 from __future__ import annotations
 
@@ -35,27 +35,28 @@ _SCALE = 4000.0  # of the picture of a strip [px/m]
 
 @dataclass(frozen=True)
 class Trial:
-    """One fold from beginning to end: a strip is photographed from both sides, a motion is planned and carried out.
+    """One complete fold: a strip is photographed from both sides, a motion is planned and carried out.
 
     Parameters
     ----------
     paper : Paper
-        As it is thought to be; of its Lgb the planner is told only what the photograph says.
-    target : float [m] or str, as of `plan`
+        Paper as it is believed to be. The planner knows its Lgb only from the photographs.
+    target : float [m] or str
+        Target as in `plan`.
     seed : int
-        Of how the sheet differs from the paper.
+        Seed of the deviations of the sheet.
     noise : Noise
-        How much.
+        Size of the deviations.
     replans : int
-        How often the sheet is looked at on the way; 0, the loop is open.
+        Number of camera corrections on the way; 0 means open loop.
     planner : mapping
         Options of `plan`.
     sheet : mapping
         Options of `SimulatedSheet`.
     believed : Paper, optional
-        What the planner takes the paper for, but for its Lgb; by default it knows it.
+        Paper that the planner assumes, except for its Lgb. By default `paper`.
     name : str
-        For whoever asks, to know it again.
+        Label for the user.
 
     Examples
     --------
@@ -85,22 +86,21 @@ class Outcome:
     ----------
     trial : Trial
     gravito_bending_length : float [m]
-        As it was measured.
+        Measured value.
     needed_friction : float
-        Least friction with which the sheet would not slide on the way that was planned, before a plunge; NaN where
-        there is none.
+        Least friction at which the sheet does not slide on the planned path, before a plunge. NaN without a plan.
     plunges : bool
-        Whether the plan ends in a plunge.
+        True if the plan ends in a plunge.
     blocked : str or None
-        Why the plan does not bear its uncertainty, as `FoldPlan.blocked`.
+        Reason why the plan fails within its uncertainty, as `FoldPlan.blocked`.
     error, length, slide : float [m]
     max_curvature : float [1/m]
-        As those of `Fold`; NaN where there was no plan.
+        Values of `Fold`; NaN without a plan.
     failure : str or None
-        Why there is no fold: what the planner or the sheet said. It begins with "no plan" where the planner did.
+        Error of the planner or the sheet that prevented the fold. It begins with "no plan" if it is the planner's.
     seconds : float
-        Of the processor, on the thread that carried it out: what it takes alone. Trials of one sheet share its
-        photographs and plans.
+        Processor time on the thread of the trial, without other trials. Trials of one sheet share its photographs and
+        plans.
     """
 
     trial: Trial
@@ -120,9 +120,9 @@ class Outcome:
 def run_trials(
     trials: Sequence[Trial], *, workers: int | None = None, client: Any | None = None, progress: bool = True
 ) -> Iterator[Outcome]:
-    """Carry out trials side by side, and hand out what came of each as it comes.
+    """Carry out trials in parallel, and yield each result when its trial ends.
 
-    What has come is kept when Ctrl-C ends the rest. Trials are the same whatever they run beside.
+    Results that were yielded before Ctrl-C remain. The result of a trial does not depend on the other trials.
 
     Parameters
     ----------
@@ -131,21 +131,21 @@ def run_trials(
         Number of processes. By default one per processor; 1 runs the trials in this process. A script that uses
         more must begin under ``if __name__ == "__main__":``.
     client : dask.distributed.Client, optional
-        Of a cluster that carries them out instead, with withe installed on it.
+        Cluster that carries out the trials instead. It needs withe installed.
     progress : bool
-        Whether to show a progress bar on a terminal.
+        True to show a progress bar on a terminal.
 
     Returns
     -------
     iterator of Outcome
-        In whatever order they end; ``outcome.trial`` says of which.
+        Results in the order of completion; ``outcome.trial`` identifies the trial.
 
     Raises
     ------
     ValueError
-        Not trials, both workers and a client, or not a client.
+        Arguments that are not trials, both workers and a client, or a client of another type.
     ImportError
-        Dask is not installed, and there is a client.
+        A client without Dask installed.
     """
     trials = list(trials)
     for each in trials:
@@ -209,7 +209,7 @@ def _carry_out_all(trials: list[Trial]) -> list[Outcome]:
 
 
 def carry_out(trial: Trial) -> Outcome:
-    """One trial, here and now."""
+    """Carry out one trial in this process."""
     began = time.thread_time()
     done = _carried_out(trial)
     return replace(done, seconds=done.seconds + time.thread_time() - began)

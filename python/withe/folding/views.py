@@ -26,7 +26,7 @@ _MARGIN = 0.02  # round a strip [m]
 
 
 def strip_picture(paper: Paper, curl: float, length: float, scale: float, random: np.random.Generator) -> Picture:
-    """A strip that is clamped level at the left border of the picture and hangs, from the side; `scale` in px/m."""
+    """Picture of a strip from the side, clamped level at the left border; `scale` in px/m."""
     scene = Scene()
     strip = add_paper(scene, paper, np.linspace(0.0, length, _STRIP_NODES), curl)
     scene.clamp(strip.start)
@@ -52,7 +52,7 @@ def strip_picture(paper: Paper, curl: float, length: float, scale: float, random
 def table_picture(
     sides: Sequence[FloatArray], camera: Camera, size: tuple[int, int], random: np.random.Generator
 ) -> Picture:
-    """A sheet on the table, by both of its sides: its upper face bright, its lower one bluish, steep parts darker."""
+    """Picture of a sheet on the table: its upper face bright, its lower face bluish, steep parts darker."""
     positions = 0.5 * (sides[0] + sides[1])
     steps = np.diff(positions, axis=0)
     seen = [camera.project(side) for side in sides]

@@ -1,4 +1,4 @@
-"""A plan in parts, of which the rest is planned anew after each [dissertation, Alg. 8]."""
+"""A plan in parts, whose rest is replanned after each part [dissertation, Alg. 8]."""
 
 from __future__ import annotations
 
@@ -32,15 +32,15 @@ def watched_parts(
     look: Callable[[FloatArray], float],
     tolerance: float = TOLERANCE,
 ) -> Iterator[Part]:
-    """One part after the other; what is yielded is carried out before the next is asked for.
+    """Yield one part after the other. Each part is carried out before the next is requested.
 
     Parameters
     ----------
     plan : FoldPlan
     looks : int
-        At equal distances of the way; the last one before a plunge, which goes down where the sheet is then.
+        Number of looks, at equal distances along the path. The last look before a plunge shifts the plunge.
     look : callable
-        Of the jaw's pose: how far the sheet has slid [m], NaN where that is not seen.
+        Function of the jaw's pose that returns the slide of the sheet [m], NaN if it is not seen.
     tolerance : float [m]
     """
     present, plunge = plan.before_plunge(), _plunge(plan)

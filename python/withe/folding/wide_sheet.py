@@ -1,6 +1,6 @@
-"""A sheet that is wide: two strips side by side, joined at their ends, that may slide by different ways.
+"""A wide sheet: two strips side by side, joined at their ends, that may slide by different amounts.
 
-Knows no planner, nor the equilibria that planners know.
+The module is independent of planners and their equilibria.
 """
 
 from __future__ import annotations
@@ -43,21 +43,22 @@ class WideFold:
     Attributes
     ----------
     error : float [m]
-        Of the length from the lifted edge to the crease, mean of both sides, as that of `Fold`.
+        Error of the length from the lifted edge to the crease, as in `Fold`, mean of both sides.
     length : float [m]
+        Length from the lifted edge to the crease, mean of both sides.
     slides : ndarray of shape (2,) [m]
-        How far the far end of either strip has slid along x, that of less y first.
+        Slide of the far end of either strip along x; the strip with the smaller y comes first.
     spin : float [rad]
-        Angle of the crease to where it should be, by the lengths of both sides: positive where that of less y is
+        Error of the angle of the crease, from the lengths of both sides: positive if the side with the smaller y is
         longer [dissertation, 7.8.4].
     failure : str or None
-        Why it is no fold.
+        Reason of a failed fold.
     record : Record
-        Of rods "strip 0" and "strip 1".
+        Record of rods "strip 0" and "strip 1".
     seen_slides : tuple of float [m]
-        What a camera saw of the slide on the way, of the middle of the far edge; NaN where it did not see it.
+        Slides of the middle of the far edge that a camera saw on the way; NaN where it did not see the edge.
     slip : float [m]
-        By how much the sheet has slipped in the jaw, beyond its force limit, where most.
+        Greatest slip of the sheet in the jaw, above its force limit.
     """
 
     error: float
@@ -82,31 +83,36 @@ class WideSheet(TableSheet[WideFold]):
     Parameters
     ----------
     paper : Paper
+        Paper as the planner knows it.
     seed : int
+        Seed of the noise.
     noise : Noise, optional
-        `friction_variation` is not for wide sheets: their tables are even along x.
+        Deviations of the sheet, table and jaw. `friction_variation` is ignored.
     unevenness : float
-        Standard deviation, relative, of half the difference between the strips' coefficients; at most twice that.
+        Relative standard deviation of half the difference between the coefficients of the strips. The deviation is at
+        most twice this value.
     jaw : Jaw, optional
+        Jaw that holds the sheet.
     edges : int
-        Of each strip.
+        Number of edges of each strip.
     time_step : float [s]
-        Of backward Euler; shorter in plunges, as in `SimulatedSheet`.
+        Time step of backward Euler; shorter in plunges, as in `SimulatedSheet`.
     own_friction : float
-        Of a strip on itself.
+        Coefficient of a strip on itself.
 
     Attributes
     ----------
     paper, truth : Paper
+        Paper as the planner knows it, and as it is.
     frictions : ndarray of shape (2,)
-        On the table, of either strip.
+        Coefficient of either strip on the table.
     simulation : Simulation
     strips : tuple of two Rod
 
     Raises
     ------
     ValueError
-        Not a paper, numbers out of range.
+        Not a paper, or numbers out of range.
 
     Examples
     --------

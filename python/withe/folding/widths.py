@@ -1,4 +1,4 @@
-"""Widths of sheets along them: those that are cut so that they are not as wide everywhere."""
+"""Widths of sheets along their length, for sheets without uniform width."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ FloatArray = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Width:
-    """Width of a sheet over the distance from its tip, in straight pieces, and beyond the last place as there.
+    """Width of a sheet over the distance from its tip, in straight pieces, constant beyond the last place.
 
-    Bending stiffness and weight per length are those at width 1 times this.
+    Bending stiffness and weight per length are proportional to the width.
 
     Attributes
     ----------
     places : tuple of float [Lgb]
-        0, and growing.
+        Distances from the tip, which begin at 0 and grow.
     widths : tuple of float
     """
 
@@ -39,7 +39,7 @@ class Width:
 
     @cached_property
     def engine(self) -> SheetWidth:
-        """The same, for the engine."""
+        """Return the width for the engine."""
         return SheetWidth() if self.even else SheetWidth(list(self.places), list(self.widths))
 
     def __getstate__(self) -> dict[str, object]:
@@ -58,11 +58,11 @@ class Width:
         )
 
     def lying(self, lifted: FloatArray, length: float) -> FloatArray:
-        """Weight of what lies of a sheet of a length, where so much is lifted [w Lgb]."""
+        """Weight of the lying part of a sheet of some length, for a suspended length [w Lgb]."""
         return np.asarray(self.weight(length) - self.weight(lifted))
 
     def of_other(self, factor: float) -> Width:
-        """The same sheet if Lgb is more by a factor."""
+        """Return the width of the same sheet if Lgb grows by a factor."""
         return self if self.even else Width(tuple(place / factor for place in self.places), self.widths)
 
 
@@ -70,7 +70,7 @@ EVEN = Width()
 
 
 def free_width(paper: Paper, depth: float) -> Width:
-    """Width of what hangs freely from a jaw that holds so much of a paper [m]; 1 is that of the paper."""
+    """Width of the part of a paper that hangs freely from a jaw, relative to the width of the paper."""
     if paper.is_strip:
         return EVEN  # whatever its length: what was made for one serves all
     lgb = paper.gravito_bending_length
