@@ -1,7 +1,7 @@
 """Cables that are laid down along a pattern.
 
-Lengths here are in Lgb = (EI / 2w)^(1/3), the gravito-bending length, and forces in w Lgb, w the weight of the rod per
-length, unless they belong to a particular cable: then in m and N.
+Lengths here are in units of the gravito-bending length Lgb = (EI / 2w)^(1/3), and forces in w Lgb, where w is the
+weight of the rod per length. Quantities of a particular cable are in m and N.
 
 >>> import withe
 >>> found = withe.deployment.grasp(5.0, 0.25)

@@ -54,7 +54,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Plan, write the files and say what will hold."""
+    """Plan, write the files and print where the floor will hold the cable."""
     cable = _cable(arguments)
     if arguments.out.exists() and not arguments.out.is_dir():
         raise ValueError(f"out must be a folder, {str(arguments.out)!r} is a file")

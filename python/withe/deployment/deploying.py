@@ -1,4 +1,4 @@
-"""Plans carried out in the simulated world, and how well the cable then lies."""
+"""Simulations of plans, and the error of the laid cable."""
 
 from __future__ import annotations
 
@@ -37,21 +37,21 @@ class Deployment:
     Attributes
     ----------
     laid : ndarray of shape (nodes, 3) [m]
-        Its centreline from the free end, after the jaw let go.
+        Centreline of the cable from the free end, after the jaw let go.
     error, std : float [m]
         Mean and standard deviation of the distance of each point from its place on the plan's pattern
         (dissertation (9.11), whose sum under the root lacks a square).
     nearest_error, nearest_std : float [m]
-        The same of the distance from the nearest point of what the user gave.
+        Mean and standard deviation of the distance from the nearest point of the user's pattern.
     slipped : ndarray of shape (nodes,) [m]
-        How far each point of the pattern moved along the floor once it lay there; zero beyond the pattern, and where
-        the cable lies over itself.
+        Slide of each point of the pattern along the floor after it was laid. Zero beyond the pattern, and where the
+        cable lies over itself.
     released : float [m]
-        How far the pattern moved at most when the jaw let go.
+        Greatest displacement of the pattern when the jaw let go.
     record : Record
-        Of the motion, with the rod "cable".
+        Record of the motion, with the rod "cable".
     passed : ndarray of bool of shape (posts,)
-        Whether the cable lies on the floor beside each post of the plan, on the same side of it as the pattern.
+        True if the cable lies on the floor beside each post of the plan, on the same side as the pattern.
     """
 
     laid: FloatArray
@@ -170,28 +170,28 @@ def place(
     quasi_static: bool = True,
     progress: bool = True,
 ) -> Deployment:
-    """Put the cable of a plan on its pattern as if by hand, and see what the floor holds of it.
+    """Put the cable of a plan on its pattern as if by hand, and simulate how the floor holds it.
 
-    It begins as a rod without stress that lies on the pattern and its tail; its natural curvature then goes to zero
-    within a second. Ends are free. What friction cannot hold moves here too. Where a pattern touches itself, the cable
-    passes through itself.
+    The cable begins as a rod without stress that lies on the pattern and its tail. Its natural curvature then becomes
+    zero within a second. Both ends are free. The cable moves where friction cannot hold it. Where a pattern crosses
+    itself, the cable passes through itself.
 
     Parameters
     ----------
     plan : LayPlan
-        Of which cable, pattern and tail are used.
+        Plan whose cable, pattern and tail are used.
     friction, rolling_friction, nodes, time_step, quasi_static, progress
         See `deploy`.
 
     Returns
     -------
     Deployment
-        `released` is zero, `slipped` what moved.
+        Result in which `released` is zero, and `slipped` is the motion of the cable.
 
     Raises
     ------
     ValueError
-        No plan, friction that is not positive, negative rolling friction, wrong numbers of nodes.
+        Not a plan, friction that is not positive, negative rolling friction, or a number of nodes out of range.
 
     Examples
     --------
@@ -225,14 +225,14 @@ def place(
 
 
 def trial_cable(cable: Cable, seed: int, noise: float = 1.0) -> Cable:
-    """The cable of a noisy trial of `deploy`, for planners that measure it beforehand.
+    """Return the cable of a noisy trial of `deploy`, for planners that measure it beforehand.
 
     Parameters
     ----------
     cable : Cable
-        That is given to `deploy`.
+        Cable that is passed to `deploy`.
     seed, noise
-        Of the trial.
+        Seed and noise of the trial.
 
     Returns
     -------
@@ -261,13 +261,14 @@ def hang(cable: Cable, *, nodes: int = 200) -> FloatArray:
     Parameters
     ----------
     cable : Cable
+        Cable to hang.
     nodes : int
-        20 to 2000.
+        Number of nodes, 20 to 2000.
 
     Returns
     -------
     ndarray of shape (nodes, 3) [m]
-        Its centreline from the free end; the jaw is upright above the origin.
+        Centreline of the cable from the free end; the jaw is upright above the origin.
 
     Examples
     --------
@@ -310,7 +311,7 @@ def drawn_setup(
     quasi_static: bool,
     rolling_friction: float = ROLLING_FRICTION,
 ) -> Setup:
-    """Setup of a trial, from `DRAWN` numbers of standard normal distribution, times the noise."""
+    """Setup of a trial from `DRAWN` numbers of standard normal distribution, times the noise."""
     return Setup(
         cable=replace(_cable_of(cable, drawn), length=plan.cable.length),
         friction=friction * float(np.exp(_FRICTION * drawn[1])),

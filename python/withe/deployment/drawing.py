@@ -1,4 +1,4 @@
-"""Figures of planned patterns, by matplotlib, which is imported when first used."""
+"""Figures of planned patterns by matplotlib, which is imported on first use."""
 
 from __future__ import annotations
 

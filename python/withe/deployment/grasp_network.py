@@ -1,8 +1,8 @@
-"""Networks that have learned where to hold a rod so that it is laid down where it should lie, in place of exact grasps.
+"""Networks that predict the grasp that lays a rod in its place, instead of exact grasps.
 
-Two of them: "small", whose weights come with withe, and "source", that of Choi, dissertation, 9.3.3, which is trained
-by whoever wants it. They answer like `grasp`, a pattern of 200 nodes some hundred times as fast, and have gradients; of
-forces they know nothing. All in Lgb.
+There are two networks. "small" is shipped with withe. "source" is that of Choi, dissertation, 9.3.3, and users train it
+themselves. Both have the interface of `grasp` and have gradients. A pattern of 200 nodes takes a hundredth of the time.
+They do not predict forces. All quantities are in Lgb.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _NAMES = ("x", "y", "z", "ex", "ey", "ez")
 
 
 def side(module: Any, curvature: Any) -> Any:
-    """Odd factor in curvature of the outputs, so that straight rods are laid straight."""
+    """Odd function of curvature that multiplies the outputs, so that straight rods are laid straight."""
     return module.tanh(curvature)
 
 
@@ -89,8 +89,7 @@ FORMS = {
 class GraspNetwork(Surrogate):
     """Network that predicts grasps that lay a rod. `train` makes one, `load` reads one.
 
-    Its answers are those of `grasp(suspended, curvature, stretch_stiffness)`, about right, and mirrored for negative
-    curvature.
+    Its results approximate those of `grasp(suspended, curvature, stretch_stiffness)`, mirrored for negative curvature.
 
     Attributes
     ----------
@@ -149,17 +148,17 @@ class GraspNetwork(Surrogate):
         )
 
     def tensors(self, suspended: Any, curvature: Any, stretch_stiffness: Any) -> dict[str, Any]:
-        """The same of torch tensors, with gradients.
+        """Predict with torch tensors, with gradients.
 
         Parameters
         ----------
         suspended, curvature, stretch_stiffness : Tensor
-            Of floating point numbers, broadcast together. What is beyond its range has no meaning, and is not refused.
+            Floating point tensors, broadcast together. Values out of range give meaningless results and no error.
 
         Returns
         -------
         dict of Tensor
-            "x", "y", "z" [Lgb] of the position, "ex", "ey", "ez" [rad] of the rotation vector.
+            "x", "y", "z" [Lgb] of the position, and "ex", "ey", "ez" [rad] of the rotation vector.
 
         Examples
         --------
@@ -177,7 +176,7 @@ class GraspNetwork(Surrogate):
 
 
 def require_learned(suspended: FloatArray, curvature: FloatArray, stretch_stiffness: FloatArray) -> None:
-    """Refuse what networks have not learned."""
+    """Refuse arguments outside of the range that the networks have learned."""
     for values, name, (low, high) in (
         (suspended, "suspended", LENGTHS),
         (np.abs(curvature), "the size of curvature", CURVATURES),
@@ -192,5 +191,5 @@ def require_learned(suspended: FloatArray, curvature: FloatArray, stretch_stiffn
 
 @cache
 def shipped() -> GraspNetwork:
-    """The small one that comes with withe."""
+    """Return the small network that is shipped with withe."""
     return GraspNetwork.load()

@@ -1,4 +1,4 @@
-"""Grasps: poses of a jaw that lays a rod down in its place."""
+"""Grasps: poses of a jaw that lays a rod in its place."""
 
 from __future__ import annotations
 
@@ -30,18 +30,18 @@ TWIST_STIFFNESS = _BEND_STIFFNESS / 1.5  # GJ of a round rod of incompressible m
 class Grasp:
     """Grasp of the suspended part of a rod. The arrays have the shape of the arguments, then (3,).
 
-    The frame is that of the lift-off point: x the direction in which the rod leaves the floor, z up.
+    The frame is that of the lift-off point: x is the direction in which the rod leaves the floor, and z points up.
 
     Attributes
     ----------
     position : ndarray [Lgb]
-        Of the held end.
+        Position of the held end.
     rotation : ndarray [rad]
-        Rotation vector that turns the frame at lift-off into the jaw's: its first axis is the tangent there.
+        Rotation vector from the frame at lift-off to the frame of the jaw, whose first axis is the tangent there.
     force : ndarray [w Lgb]
-        Of the floor on the suspended part at lift-off.
+        Force of the floor on the suspended part at lift-off.
     stable : ndarray of bool
-        Whether the energy is a minimum while the jaw holds position and rotation, out of the rod's plane too.
+        True if the energy is a minimum while the jaw holds position and rotation, also against motion out of the plane.
     residual : ndarray
         Largest error of the boundary value problem: of tangents, and of moments in w Lgb^2.
     """
@@ -54,13 +54,13 @@ class Grasp:
 
     @property
     def friction(self) -> FloatArray:
-        """Coefficient of friction that lift-off needs: the floor's force along itself over that across."""
+        """Friction coefficient that lift-off needs: the tangential force of the floor over its normal force."""
         return np.asarray(np.hypot(self.force[..., 0], self.force[..., 1]) / self.force[..., 2])
 
 
 @cache
 def table() -> GraspTable:
-    """Make the table that solutions begin from, once."""
+    """Return the table of initial guesses, which is computed once."""
     return GraspTable()
 
 
@@ -149,7 +149,7 @@ def grasp(
 
 
 def least_stiffness(suspended: FloatArray) -> FloatArray:
-    """The stretch stiffness with which what hangs stretches by an eighth under its own weight."""
+    """Stretch stiffness at which the suspended part stretches by an eighth under its own weight."""
     return np.maximum(100.0, 4.0 * suspended)
 
 
@@ -260,11 +260,11 @@ def least_friction(
 def thickened(
     solve: Callable[[FloatArray, FloatArray], Grasp], suspended: FloatArray, curvature: FloatArray, radius: float
 ) -> Grasp:
-    """Grasps of a thick rod by those that `solve` knows of a thin one, without force along the floor; nearly.
+    """Grasps of a thick rod, approximated by those that `solve` returns for a thin rod, without axial force.
 
-    That force_y acts behind the lift-off point makes the curvature there less, and twisted is the rod as `grasp` says.
-    Couples at lift-off and of the jaw balance about the upright axis: force_y x = m(0)_z - radius force_y t_z. By how
-    much its twist bends a rod, some 0.3 radius where the jaw is at a curvature of 0.5 / Lgb, is left out.
+    Since force_y acts behind the lift-off point, the curvature there is smaller. The rod is twisted as `grasp` states.
+    The couples at lift-off and of the jaw balance about the upright axis: force_y x = m(0)_z - radius force_y t_z. The
+    bending of the rod by its twist is neglected. It is some 0.3 radius at the jaw for a curvature of 0.5 / Lgb.
     """
     from scipy.spatial.transform import Rotation
 
@@ -282,9 +282,9 @@ def thickened(
 
 
 def pivoting(suspended: float, angles: FloatArray, stretch_stiffness: float) -> Grasp:
-    """Grasps of a rod whose free end stands on the floor, at angles above it, without force along it; shape (n,).
+    """Grasps of a rod whose free end stands on the floor at given angles, without axial force; shape (n,).
 
-    Rotations are those from the floor's frame.
+    Rotations are relative to the frame of the floor.
     """
     count = len(angles)
     questions = np.zeros((count, 6))

@@ -1,4 +1,4 @@
-"""Small letters that are written without lifting the pen, one after the other: what a cable can be laid along."""
+"""Small letters that a pen writes without lifting, one after the other, as patterns for a cable."""
 
 from __future__ import annotations
 
@@ -52,12 +52,13 @@ LETTERS = {
 
 
 def written(text: str, height: float) -> FloatArray:
-    """Points along a word, shape (n, 2) [m]: a cubic spline through those of its letters, small x's `height` high.
+    """Points along a word, shape (n, 2) [m]: a cubic spline through the points of its letters. A small x is `height`
+    high.
 
     Raises
     ------
     ValueError
-        No text, or other characters than the letters a to z and spaces between them.
+        An empty text, or characters other than the letters a to z and spaces between them.
     """
     from scipy.interpolate import CubicSpline
 

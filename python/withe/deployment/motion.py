@@ -1,4 +1,4 @@
-"""Paths of a lift-off point, and the poses of the jaw along them: hanging, touching down, laying."""
+"""Paths of the lift-off point, and the poses of the jaw along them: hanging, touching down, laying."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _UPRIGHT = 0.5 * np.pi - 1e-3
 
 @dataclass(frozen=True)
 class Phase:
-    """A part of a motion: "hang", "touch down" or "lay", and when it begins and ends [s]."""
+    """A part of a motion: "hang", "touch down" or "lay", with its start and end [s]."""
 
     name: str
     start: float
@@ -46,7 +46,7 @@ class Course:
 
 @dataclass(frozen=True)
 class Path:
-    """The pattern and the tail behind it, as far as the lift-off point goes; `grasps_along` sees a pattern in it."""
+    """The pattern and the tail behind it, up to the last lift-off point; `grasps_along` uses it as a pattern."""
 
     arc_length: FloatArray
     points: FloatArray
@@ -60,7 +60,7 @@ class Path:
 
 
 def lengthened(pattern: Pattern, cable: Cable, tail: float) -> Path:
-    """A pattern and its tail, which becomes straight."""
+    """Append a tail to a pattern; the tail becomes straight."""
     lgb = cable.gravito_bending_length
     heading = np.unwrap(np.arctan2(pattern.tangent[:, 1], pattern.tangent[:, 0]))
     more = tail - max(_LAST_HELD * lgb, JAW)
@@ -90,7 +90,7 @@ def lengthened(pattern: Pattern, cable: Cable, tail: float) -> Path:
 
 
 def displaced(path: Path, shift: FloatArray) -> Path:
-    """A path moved to its left by some way at each of its points, shape (n,) [m]; it goes on by its own arc length."""
+    """Move each point of a path to its left by `shift`, shape (n,) [m]. The result has its own arc length."""
     from scipy.interpolate import make_interp_spline
 
     left = np.stack([-np.sin(path.heading), np.cos(path.heading)], 1)
@@ -107,7 +107,8 @@ def displaced(path: Path, shift: FloatArray) -> Path:
 
 @dataclass(frozen=True)
 class Piece:
-    """Poses along a parameter that runs smoothly in time; `reach` is the way that the speed counts along it [m]."""
+    """Poses along a parameter that runs smoothly in time; `reach` is the length along it that counts for the speed
+    [m]."""
 
     parameter: FloatArray
     positions: FloatArray
@@ -161,7 +162,7 @@ class Piece:
         )
 
     def fastest(self) -> float:
-        """Speed at which the acceleration along the piece reaches its share of gravity's [m/s]."""
+        """Speed at which the acceleration along the piece reaches its share of gravity [m/s]."""
         from scipy.interpolate import CubicSpline
 
         bend = np.linalg.norm(CubicSpline(self.parameter, self.positions)(self.parameter, 2), axis=1)
@@ -177,7 +178,7 @@ def way_along(cable: Cable, path: Path, grasps: Grasp) -> Piece:
 
 
 def upright_way(cable: Cable, path: Path) -> Piece:
-    """The jaw straight above the lift-off point, as high as what still hangs is long."""
+    """Poses of an upright jaw above the lift-off point, at the height of the suspended length."""
     upright = np.array([np.sqrt(0.5), 0.0, -np.sqrt(0.5), 0.0])  # x turned up
     rotations = _continuous(_product(_about_z(path.heading), np.broadcast_to(upright, (len(path.points), 4))))
     positions = _on_floor(cable, path)
@@ -186,7 +187,7 @@ def upright_way(cable: Cable, path: Path) -> Piece:
 
 
 def course(cable: Cable, path: Path, way: Piece, speed: float, sampling_interval: float, start: Start) -> Course:
-    """Hang, touch down and go along a way, at a speed of the lift-off point [m/s] and with rows every time step [s]."""
+    """Hang, touch down and lay, at a speed of the lift-off point [m/s], with a row every `sampling_interval` [s]."""
     down = _touch_down(cable, path, way, start)
     pieces, phases, clock = [], [], 0.0
     for name, piece in (("hang", _hang(down)), ("touch down", down), ("lay", way)):

@@ -1,4 +1,4 @@
-"""Ways of the lift-off point that are improved against the rod engine, until the cable comes to lie on its pattern."""
+"""Paths of the lift-off point that are improved by runs of the rod engine, until the cable lies on its pattern."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _GAIN = 0.97  # of the error that a step must leave at most to go on
 class Trial:
     """Shift of a path, its method of planning, and the distances of the laid cable from its places.
 
-    Shapes (knots + 3,), the last three of which move it as a whole, and (nodes, 2) [m].
+    The shapes are (knots + 3,), whose last three components move the path as a whole, and (nodes, 2) [m].
     """
 
     shift: FloatArray
@@ -47,7 +47,7 @@ class Trial:
 
     @property
     def error(self) -> float:
-        """Root of the mean square [m]."""
+        """Root mean square distance [m]."""
         return float(np.sqrt((self.away**2).sum(1).mean()))
 
 
@@ -126,15 +126,16 @@ def optimised(
 ) -> tuple[Path, Method]:
     """Shift a path sideways so that the cable comes to lie on its pattern, friction permitting.
 
-    The shift is a cubic spline with a knot each Lgb, and a motion of the whole. What the engine makes of a shift of one
-    knot is found by differences, several distant knots at a time, for a shift moves the cable only nearby. With that
-    derivative, corrected after each trial [Broyden 1965], damped least squares [Levenberg 1944, Marquardt 1963] lower
-    the distances of the laid cable from its places. It begins from the better of the two controllers.
+    The shift is a cubic spline with a knot each Lgb, and a motion of the whole path. Finite differences give the
+    response of the engine to a shift of each knot. Several distant knots share one run, because a shift moves the cable
+    only nearby. Damped least squares [Levenberg 1944, Marquardt 1963] reduces the distances of the laid cable from its
+    places. The derivative is updated after each trial [Broyden 1965]. The search starts from the better of the two
+    controllers.
 
     Raises
     ------
     ConvergenceError
-        The engine finds no equilibrium on the way of either.
+        The engine finds no equilibrium for either controller.
     """
     setup = Setup(
         cable=cable,

@@ -1,4 +1,4 @@
-"""Patterns on a floor that a cable is to lie along."""
+"""Patterns on a floor along which a cable is laid."""
 
 from __future__ import annotations
 
@@ -46,44 +46,46 @@ _BENT_START = 1.0  # [rad]: curvature at a function's start times its length tha
 class Pattern:
     """A curve on the floor, smoothed and resampled by its length.
 
-    Exactly one of `points`, `function` and `image` says what it is. The cable's free end lies at its beginning.
+    Exactly one of `points`, `function` and `image` defines the curve. The cable's free end lies at its beginning.
 
     Parameters
     ----------
     points : array_like of shape (n, 2) or (n, 3) [m]
-        In order along the curve; of a third column, the height, nothing is used.
+        Points in order along the curve. A third column, the height, is ignored.
     function : callable
-        From an array of shape (n,) of shares of the way, 0 to 1, to points of shape (n, 2) [m].
+        Function from an array of shape (n,) of shares of the path, 0 to 1, to points of shape (n, 2) [m].
     image : str, Path or array_like of shape (height, width, 3)
-        A picture of one drawn curve, traced by `withe.perception`; the longest one is taken, y upwards. Needs `scale`.
+        Picture of a drawn curve, traced by `withe.perception`, with y upwards. The longest curve is used. Needs
+        `scale`.
     scale : float [m]
-        Of one pixel.
+        Size of one pixel.
     smoothing : float [m]
-        How far the pattern may depart from what was given, at its nodes: of all such curves it is that which a floor
-        holds with least friction (the greatest EI x'''' along it is least). A free end has no moment, so that a curve
-        that begins bent begins a little straighter. What lies behind it goes straight on from the end of what was
-        given; behind one that ends bent the bend fades out.
+        Largest distance of the pattern from the given curve, at its nodes. Among all such curves, the pattern is the
+        one that a floor holds with the least friction: its greatest EI x'''' is least. A free end has no moment, so a
+        curve that begins with curvature begins a little straighter. Behind the given curve the cable is laid straight;
+        if the curve ends with curvature, the curvature decays to zero.
     lead_in : float [m]
-        Length of an extra piece before the beginning, along which curvature grows from zero. None: that over which the
-        cable turns by one radian, for a `function` that begins bent.
+        Length of an extra piece before the beginning, along which the curvature grows from zero. By default none. For a
+        `function` that begins with curvature, the default is the length over which the cable turns by one radian.
     nodes : int
         Number of points of the pattern, 50 to 2000.
 
     Attributes
     ----------
     raw : ndarray of shape (m, 2) [m]
-        What was given, lead-in included.
+        Given points, lead-in included.
     arc_length : ndarray of shape (nodes,) [m]
-        Evenly spaced.
+        Arc lengths of the nodes, uniform.
     points : ndarray of shape (nodes, 2) [m]
+        Nodes of the pattern.
     tangent : ndarray of shape (nodes, 2)
+        Unit tangents at the nodes.
     curvature : ndarray of shape (nodes,) [1/m]
-        Positive to the left of its way.
+        Curvature, positive to the left of the direction of the pattern.
     curvature_slope, curvature_bend : ndarray of shape (nodes,) [1/m^2], [1/m^3]
         First and second derivative of the curvature by arc length.
     curvature_behind : ndarray of shape (n,) [1/m]
-        With which a tail goes on behind the pattern, in steps as long as those of `arc_length`; after them it is
-        straight.
+        Curvature of the tail behind the pattern, in steps of `arc_length`. Beyond these steps the tail is straight.
     deviation : float [m]
         Greatest distance of a raw point from the pattern.
     lead_in : float [m]
@@ -91,13 +93,13 @@ class Pattern:
     Raises
     ------
     ValueError
-        None or several of the three, fewer than 3 points, repeated points, points that turn back, NaN, a picture
+        None or several of the three, fewer than 3 points, repeated points, points that turn back, NaN, or a picture
         without a curve.
 
     Warns
     -----
     UserWarning
-        It departs by more than the smoothing, for want of nodes.
+        The pattern departs by more than the smoothing, because it has too few nodes.
 
     Examples
     --------
@@ -152,18 +154,18 @@ class Pattern:
         smoothing: float = 1e-3,
         nodes: int = 301,
     ) -> Pattern:
-        """Straight pieces and bends by turns, from the origin along x; the curvature between them changes smoothly.
+        """Make a pattern of straight pieces and bends in turn, from the origin along x, with smooth curvature.
 
         Parameters
         ----------
         turns : array_like of shape (bends,) [rad]
-            How far each bend turns, positive to the left.
+            Angle of each bend, positive to the left.
         radii : array_like of shape (bends,) [m]
-            Of the bends, if they changed into straight pieces at once.
+            Radii of the bends, before the curvature is smoothed.
         straights : array_like of shape (bends + 1,) [m]
-            Lengths of the straight pieces before, between and after them.
+            Lengths of the straight pieces before, between and after the bends.
         easing : float [m]
-            Length over which curvature is averaged, with a cosine's weights.
+            Length over which the curvature is averaged, with the weights of a cosine.
         smoothing, nodes
             See `Pattern`.
 
@@ -174,8 +176,8 @@ class Pattern:
         Raises
         ------
         ValueError
-            Numbers of bends that do not fit, radii or easing that are not positive, negative straight pieces, or less
-            than half of the easing before the first bend or after the last.
+            Numbers of bends that do not match, radii or easing that are not positive, negative straight pieces, or less
+            than half of the easing before the first bend or after the last one.
 
         Examples
         --------
@@ -215,22 +217,22 @@ class Pattern:
 
     @classmethod
     def word(cls, text: str, height: float, *, smoothing: float = 1e-3, nodes: int = 301) -> Pattern:
-        """A word of small letters, written without lifting the pen from its beginning to its end.
+        """Make a pattern of a word in small letters, written without lifting the pen.
 
         Parameters
         ----------
         text : str
-            Letters a to z and spaces. Dots are left out, and bars across f and t.
+            Letters a to z and spaces. Dots, and the bars of f and t, are left out.
         height : float [m]
-            Of a small x. Letters have bends of a third of that, which a floor of friction 1 holds where it is some 4
-            gravito-bending lengths of the cable, and are about 4 heights long each.
+            Height of a small x. Letters are about 4 heights long, and have bends with a radius of a third of the
+            height. A floor with friction 1 holds these if the radius is some 4 gravito-bending lengths of the cable.
         smoothing, nodes
             See `Pattern`.
 
         Returns
         -------
         Pattern
-            It crosses itself in loops: `plan(..., crossings="over")` lays the cable over itself there.
+            Pattern with crossings in its loops. `plan(..., crossings="over")` lays the cable over itself there.
 
         Raises
         ------
@@ -287,18 +289,18 @@ class Pattern:
             )
 
     def to_dict(self) -> dict[str, Any]:
-        """All its numbers as lists, for JSON. SI units."""
+        """Return all numbers as lists, for JSON. SI units."""
         columns = {name: getattr(self, name).tolist() for name in ("raw", "curvature_behind", *_COLUMNS)}
         return {**columns, "deviation": self.deviation, "lead_in": self.lead_in}
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Pattern:
-        """Return the pattern of a `to_dict`, to the last digit: it is not smoothed again.
+        """Return the pattern of a `to_dict`, to the last digit. It is not smoothed again.
 
         Raises
         ------
         KeyError, TypeError, ValueError
-            Something is missing, not numbers, or does not fit the rest.
+            Content that is missing, not numeric, or inconsistent.
         """
         pattern = cls.__new__(cls)
         pattern.raw = validation.number_array(content["raw"], "raw", ("m", 2))
@@ -326,15 +328,15 @@ class Pattern:
 
     @renamed(controller="method")
     def feasibility(self, cable: Cable, friction: float, method: Method = "exact") -> Feasibility:
-        """Say where friction holds the cable on the pattern while it is laid, and where not.
+        """Predict where friction holds the cable on the pattern while it is laid.
 
         Parameters
         ----------
         cable : Cable
         friction : float
-            Coefficient between cable and floor.
+            Friction coefficient between cable and floor.
         method : {"exact", "least_friction"}
-            How the cable is laid.
+            Method by which the cable is laid.
 
         Returns
         -------

@@ -1,4 +1,4 @@
-"""Cables that are laid between posts: where these stand, and on which side of each the cable came to lie."""
+"""Cables between posts: positions of the posts, and the side on which the laid cable passes each post."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def posts_along(
     radius: float = 0.004,
     height: float = 0.008,
 ) -> tuple[Post, ...]:
-    """Pairs of posts, one on either side of a pattern.
+    """Place pairs of posts, one on either side of a pattern.
 
     Parameters
     ----------
@@ -38,19 +38,19 @@ def posts_along(
     at : array_like of shape (pairs,) [m]
         Arc lengths along the pattern.
     gap : float [m]
-        Between the cable on its pattern and each post.
+        Distance between each post and the cable on its pattern.
     radius, height : float [m]
-        Of posts.
+        Radius and height of the posts.
 
     Returns
     -------
     tuple of Post
-        That to the left of the pattern's way, then that to the right, pair by pair.
+        Posts pair by pair: first the post to the left of the pattern's direction, then the post to the right.
 
     Raises
     ------
     ValueError
-        Arc lengths off the pattern, a negative gap, or posts of another pair in the cable's way.
+        Arc lengths outside of the pattern, a negative gap, or posts that stand in the way of the cable elsewhere.
 
     Examples
     --------
@@ -76,7 +76,7 @@ def posts_along(
 
 
 def require_room(posts: Sequence[Post], pattern: Pattern, cable: Cable) -> None:
-    """Refuse posts that stand where the cable is to lie."""
+    """Refuse posts that stand on the pattern."""
     for post in posts:
         if not isinstance(post, Post):
             raise ValueError(f"posts must be withe.deployment.Post, got {post!r:.80}")
@@ -89,7 +89,7 @@ def require_room(posts: Sequence[Post], pattern: Pattern, cable: Cable) -> None:
 def passed(posts: Sequence[Post], pattern: Pattern, cable: Cable, laid: FloatArray) -> npt.NDArray[np.bool_]:
     """Return True for each post that the laid cable passes on the side of its pattern, on the floor.
 
-    What lies between pattern and cable then does not go round the post: the winding number is zero.
+    The closed curve of pattern and cable then does not go round the post: its winding number is zero.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def passed(posts: Sequence[Post], pattern: Pattern, cable: Cable, laid: FloatArr
     pattern : Pattern
     cable : Cable
     laid : ndarray of shape (nodes, 3) [m]
-        Of the pattern's part of the cable.
+        Centreline of the laid cable, for the part of the pattern.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Plans of deployments in files: a plan's parts from what JSON says of it."""
+"""Plans of deployments in files: conversion from the content of JSON."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ _UNIT = 1e-9  # of quaternions
 
 
 def parts_of(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Arguments of a plan from what its `to_dict` says.
+    """Arguments of a plan from the result of its `to_dict`.
 
     Raises
     ------
     KeyError, TypeError, ValueError
-        Something is missing, of another kind, or does not fit the rest.
+        Content that is missing, of a wrong type, or inconsistent.
     """
     motion, cable = content["motion"], dict(content["cable"])
     times = increasing_times(motion["t"], "t")

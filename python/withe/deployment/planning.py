@@ -44,33 +44,34 @@ class LayPlan(PlanFile):
     Attributes
     ----------
     times : ndarray of shape (n,) [s]
+        Times of the poses.
     positions : ndarray of shape (n, 3) [m]
-        Of the cable's centreline in the middle of the jaw, which holds 10 mm of it.
+        Positions of the cable's centreline in the middle of the jaw, which holds 10 mm of the cable.
     rotations : ndarray of shape (n, 4)
-        Quaternions (x, y, z, w). A jaw's first axis is the cable's tangent, away from its free end; at lift-off of a
-        straight cable that lies along x its axes would be x, y, z.
+        Quaternions (x, y, z, w) of the jaw. The first axis of the jaw is the cable's tangent, away from the free end.
+        At the lift-off point of a straight cable that lies along x, the axes would be x, y, z.
     laid : ndarray of shape (n,) [m]
         Arc length of the lift-off point; zero before laying.
     phases : tuple of Phase
     cable : Cable
-        As long as what is between its free end and the middle of the jaw.
+        Cable from its free end to the middle of the jaw.
     pattern : Pattern
     tail : float [m]
-        How much of the cable lies beyond the pattern, straight on.
+        Length of the cable beyond the pattern.
     method : str
     start : str
-        "free", or "held" so that the free end slides up and down only.
+        "free", or "held" if the free end may slide only vertically.
     speed : float [m/s]
-        Of the lift-off point along the pattern, where that is long enough to reach it.
+        Speed of the lift-off point along the pattern, if the pattern is long enough to reach it.
     fastest : float [m/s]
-        The speed at which the jaw's acceleration while it lays reaches a hundredth of gravity's. Faster, the cable
-        swings, and that, not friction, soon decides how well it lies.
+        Speed at which the acceleration of the jaw while laying reaches a hundredth of gravity. At a higher speed the
+        cable swings, and the swing, not friction, soon determines the error.
     needed_friction : ndarray of shape (pattern's nodes,)
-        Coefficient that each place of the pattern needs; NaN for "intuitive" and "network", which know no forces
-        (`feasibility` finds them). An "optimised" plan has that of what it began from: where that slips, it makes up
-        for it.
+        Friction coefficient that each place of the pattern needs. NaN for "intuitive" and "network", which do not
+        compute forces (`feasibility` does). An "optimised" plan has the values of its initial plan, and compensates the
+        slips of that plan.
     posts : tuple of Post
-        Between which the cable is laid.
+        Posts between which the cable is laid.
     """
 
     times: FloatArray
@@ -103,7 +104,7 @@ class LayPlan(PlanFile):
         return self.method
 
     def feasibility(self, friction: float) -> Feasibility:
-        """Say where friction holds the cable and where it will slip; see `Pattern.feasibility`."""
+        """Predict where friction holds the cable and where it slips; see `Pattern.feasibility`."""
         return examine(
             self.pattern,
             self.cable,
@@ -112,12 +113,12 @@ class LayPlan(PlanFile):
         )
 
     def plot(self, friction: float) -> Any:
-        """Draw the pattern coloured by the friction that it needs, the jaw's way, and each test along the cable.
+        """Draw the pattern coloured by the friction that it needs, the path of the jaw, and each test along the cable.
 
         Parameters
         ----------
         friction : float
-            Coefficient that there is; stretches that need more are shaded.
+            Available friction coefficient. Parts that need more are shaded.
 
         Returns
         -------
@@ -127,7 +128,7 @@ class LayPlan(PlanFile):
         return draw_plan(self.pattern, self.positions, self.feasibility(friction), title)
 
     def to_dict(self) -> dict[str, Any]:
-        """All numbers as lists, for JSON. SI units."""
+        """Return all numbers as lists, for JSON. SI units."""
         return {
             "controller": self.method,
             "start": self.start,

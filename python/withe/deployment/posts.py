@@ -16,15 +16,16 @@ class Post:
     Parameters
     ----------
     x, y : float [m]
-        Of its axis.
+        Position of its axis.
     radius : float [m]
+        Radius of post and head.
     height : float [m]
-        Of its head's top above the floor, at least its radius.
+        Height of the top of its head above the floor, at least its radius.
 
     Raises
     ------
     ValueError
-        Not finite or not positive, or lower than its radius.
+        Values that are not finite or not positive, or a height below the radius.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Least greatest values: the curve near given points, and the tension along a cable, that a floor holds most easily."""
+"""Minimax problems: the curve near given points, and the tension along a cable, that a floor holds most easily."""
 
 from __future__ import annotations
 
@@ -91,11 +91,11 @@ def _minimised(norm: _Norm, x: FloatArray, extra: Any) -> FloatArray:
 
 
 def smooth(points: FloatArray, spacing: float, deviation: FloatArray) -> FloatArray:
-    """Move points, evenly spaced along a curve, each by at most its `deviation`, so that the floor must hold least.
+    """Move evenly spaced points of a curve, each by at most its `deviation`, to minimise the force on the floor.
 
-    Without tension, what a floor must give an elastic rod per length is EI x'''', with x'' = x''' = 0 at both ends.
-    Its greatest size is a convex function of the points: an 8-norm of it is minimised with a logarithmic barrier at
-    `deviation`.
+    Without tension, the force per length of a floor on an elastic rod is EI x'''', with x'' = x''' = 0 at both ends.
+    Its greatest size is a convex function of the points. The function minimises its 8-norm, with a logarithmic barrier
+    at `deviation`.
 
     Parameters
     ----------
@@ -127,12 +127,12 @@ def smooth(points: FloatArray, spacing: float, deviation: FloatArray) -> FloatAr
 
 
 def least_tension(middle: FloatArray, across: FloatArray, along: FloatArray, spacing: float) -> FloatArray:
-    """Size of (across - middle n, along + n') on each interval, for the n that makes the greatest least.
+    """Size of (across - middle n, along + n') on each interval, for the n that minimises the greatest size.
 
     Parameters
     ----------
     middle, across, along : ndarray of shape (intervals,)
-        n is 0 at the beginning of the first one.
+        Values on the intervals; n is 0 at the beginning of the first one.
     spacing : float
 
     Returns
@@ -157,7 +157,7 @@ def least_tension(middle: FloatArray, across: FloatArray, along: FloatArray, spa
 def fourth_differences(count: int) -> Any:
     """Fourth differences at every point.
 
-    Before the first one and behind the last the curve goes on straight, as at a free end.
+    Before the first point and behind the last one the curve continues straight, as at a free end.
     """
     from scipy import sparse
 

@@ -22,20 +22,20 @@ _ANGLE_STEP = 0.1  # [rad] between the rays that outline the region
 class StraightPose:
     """Pose of a jaw that holds a rod which leaves the floor straight. Arrays have the shape of the arguments.
 
-    Where `valid` is False the other numbers are NaN, and `stable` is False.
+    If `valid` is False the other numbers are NaN, and `stable` is False.
 
     Attributes
     ----------
     x, z : ndarray [Lgb]
-        Of the held end, seen from the lift-off point.
+        Position of the held end, relative to the lift-off point.
     angle : ndarray [rad]
-        Of the tangent there above the floor.
+        Angle of the tangent at the held end above the floor.
     force : ndarray of shape (..., 2) [w Lgb]
-        Of the floor on the rod at lift-off, along it and up.
+        Force of the floor on the rod at lift-off, along the rod and up.
     stable : ndarray of bool
-        Whether the energy is a minimum while the jaw holds position and rotation, out of the plane too.
+        True if the energy is a minimum while the jaw holds position and rotation, also against motion out of the plane.
     valid : ndarray of bool
-        Whether the rod stays above the floor and the floor pushes (dissertation (9.6)).
+        True if the rod stays above the floor and the floor pushes (dissertation (9.6)).
     residual : ndarray
         Largest error of the boundary value problem.
     """
@@ -52,26 +52,26 @@ class StraightPose:
 class StraightLine:
     """Poses that lay a straight line with a given suspended length (Choi, dissertation, 9.3.1).
 
-    The rod leaves the floor flat and without curvature; the jaw may bend it, and its rotation follows from its
-    position. In two of these poses the floor gives no force along itself and the jaw no moment; one bends gently, the
-    other is folded over and, where much hangs, buckles out of its plane.
+    The rod leaves the floor flat and without curvature. The jaw may bend it, and its rotation follows from its
+    position. In two of these poses the floor applies no axial force and the jaw no moment. One pose bends gently. The
+    other is folded over and, for a long suspended part, buckles out of its plane.
 
     Parameters
     ----------
     suspended : float [Lgb]
-        0.3 to 50.
+        Suspended length, 0.3 to 50.
     stretch_stiffness : float
         EA Lgb^2 / EI, as in `grasp`.
 
     Attributes
     ----------
     gentle, folded : StraightPose
-        Both optima.
+        The gentle and the folded optimum.
 
     Raises
     ------
     ValueError
-        Out of range.
+        Arguments out of range.
 
     Examples
     --------
@@ -95,21 +95,22 @@ class StraightLine:
         self.gentle, self.folded = (_described(rows[i], ()) for i in range(2))
 
     def pose(self, x: npt.ArrayLike, z: npt.ArrayLike) -> StraightPose:
-        """Find how the rod hangs from a jaw at given positions.
+        """Return the shape of the rod for given positions of the jaw.
 
         Parameters
         ----------
         x, z : array_like, broadcast together [Lgb]
+            Positions of the jaw.
 
         Returns
         -------
         StraightPose
-            Of several equilibria that which is reached from the nearer optimum without a jump.
+            The pose, if there are several, that the nearer optimum reaches without a jump.
 
         Raises
         ------
         ValueError
-            Not numbers, not finite, or shapes that do not broadcast.
+            Arguments that are not finite numbers or do not broadcast.
         """
         x, z = validation.broadcast_arrays(x=x, z=z)
         rows = self._rod.poses(np.stack([x.ravel(), z.ravel()], 1), TWIST_STIFFNESS)
@@ -119,8 +120,8 @@ class StraightLine:
     def outline(self) -> FloatArray:
         """Outline of the region of valid positions, found on rays from the lift-off point, shape (points, 2) [Lgb].
 
-        Its far side is where the floor would begin to pull, its near side where the rod meets the floor elsewhere; a
-        loop of a short rod may come back to the lift-off point.
+        At its far side the floor would begin to pull, and at its near side the rod touches the floor elsewhere. The
+        loop of a short rod may return to the lift-off point.
         """
         rays = self._rod.outline(_ANGLE_STEP)
         return np.concatenate([rays[:, 2:], rays[::-1, :2]])
@@ -131,7 +132,7 @@ class StraightLine:
         Raises
         ------
         ValueError
-            No pose there.
+            No pose exists there.
         """
         return np.asarray(self._rod.points(validation.number(x, "x"), validation.number(z, "z"))[:, 1:4])
 

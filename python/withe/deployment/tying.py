@@ -31,23 +31,23 @@ _LEG = 2.0  # [s] from point to point
 
 @dataclass(frozen=True)
 class Move:
-    """Move of one gripper: it takes a cable, carries it from point to point, and lets go.
+    """Move of one gripper: it grips a cable, carries it from point to point, and releases it.
 
     Parameters
     ----------
     cable : int
-        Which one, in the order of the plans.
+        Index of the cable, in the order of the plans.
     at : float [m]
-        Arc length from the cable's free end where it is to be held.
+        Arc length from the free end of the cable to the grip.
     by : array_like of shape (legs, 3) [m]
-        Where each leg ends, from where the cable is taken; z is up. A leg takes two seconds.
+        End of each leg, relative to the grip on the lying cable; z is up. A leg takes two seconds.
     turn : array_like of shape (legs,) [rad]
-        By how much the gripper is then turned about the vertical; by default not at all.
+        Rotation of the gripper about the vertical after each leg. By default none.
 
     Raises
     ------
     ValueError
-        A negative cable or arc length, wrong shapes, or what is not finite.
+        A negative cable or arc length, a wrong shape, or values that are not finite.
     """
 
     cable: int
@@ -71,13 +71,13 @@ class Tying:
     Attributes
     ----------
     names : tuple of str
-        What had been done: "laid 0", ..., "step 0", ...
+        Names of the stages: "laid 0", ..., "step 0", ...
     shapes : tuple of tuple of ndarray of shape (nodes, 3) [m]
-        Centrelines after each, cable by cable, all grippers open.
+        Centrelines after each stage, cable by cable, with all grippers open.
     picks : tuple of tuple of ndarray of shape (3,) [m]
-        Where each gripper reached, step by step.
+        Positions that the grippers reached for, step by step.
     missed : tuple of (int, int)
-        Step and move of grippers that found no cable there.
+        Step and move of each gripper that found no cable.
     """
 
     names: tuple[str, ...]
@@ -87,7 +87,7 @@ class Tying:
 
     @property
     def centrelines(self) -> tuple[FloatArray, ...]:
-        """In the end, from the free ends; `withe.knots` says which knot they are."""
+        """Final centrelines, from the free ends; `withe.knots` identifies their knot."""
         return self.shapes[-1]
 
 
@@ -105,25 +105,27 @@ def tie(
 ) -> Tying:
     """Lay cables on one floor, one after the other, then pick and place them.
 
-    Everything happens in the rod engine, in time, as in `deploy`. All grippers of a step begin together and go from
-    point to point together: one may lift a strand while another leads an end below it. They look at nothing: without
-    `picks` each takes its cable where it is, which is a rehearsal; with the picks of a rehearsal it reaches there, and
-    holds what is within 12 mm, or nothing.
+    Everything runs in the rod engine, in time, as in `deploy`. All grippers of a step begin together and go from point
+    to point together. One may therefore lift a strand while another leads an end below it. Grippers have no sensors.
+    Without `picks` each gripper grips its cable where the cable is, which is a rehearsal. With the picks of a rehearsal
+    it reaches there, and grips a cable within 12 mm, or nothing.
 
     Parameters
     ----------
     plans : sequence of LayPlan
-        A cable each; later ones are laid over earlier ones.
+        One plan per cable; later cables are laid over earlier ones.
     steps : sequence of sequences of Move
+        Moves of each step.
     friction : float
-        Coefficient of friction of cables with the floor and each other.
+        Friction coefficient of cables with the floor and each other.
     picks : sequence of sequences of array_like of shape (3,) [m], optional
         `Tying.picks` of a rehearsal.
     seed, noise
-        See `deploy`: all that differs in a trial is drawn for each cable and its gripper, friction once.
+        Seed and noise, as in `deploy`. Deviations are drawn for each cable and its gripper, and once for friction.
     nodes : int
-        Of each cable, 20 to 2000.
+        Number of nodes of each cable, 20 to 2000.
     time_step : float [s]
+        Time step.
 
     Returns
     -------

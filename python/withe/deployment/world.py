@@ -1,4 +1,4 @@
-"""A cable laid down by a moving jaw on a floor, in the rod engine: told of a motion, not of how it was planned."""
+"""A cable that a moving jaw lays on a floor, in the rod engine. The module takes a motion, and no plan."""
 
 from __future__ import annotations
 
@@ -73,9 +73,9 @@ def lay(setup: Setup, motion: Motion, *, progress: bool) -> tuple[FloatArray, Fl
     Returns
     -------
     held, laid : ndarray of shape (nodes, 3) [m]
-        The centreline from the free end, when the jaw opens and after the cable has come to rest.
+        Centreline from the free end, when the jaw opens and after the cable has come to rest.
     record : Record
-        Of the motion, every tenth of a second.
+        Record of the motion, every tenth of a second.
     """
     scene, cable = _scene(setup, _hanging(setup, motion))
     jaw_part = scene.grasp(cable, at=setup.cable.length, length=JAW, stiffness=jaw_stiffness(setup.cable), name="jaw")
@@ -101,7 +101,7 @@ def lay(setup: Setup, motion: Motion, *, progress: bool) -> tuple[FloatArray, Fl
 
 
 def hang(setup: Setup) -> FloatArray:
-    """The cable at rest as it hangs from a jaw, its free end off the floor: shape (nodes, 3) [m]."""
+    """Shape of a cable at rest that hangs from a jaw, with its free end off the floor: (nodes, 3) [m]."""
     points = setup.arc_length[:, None] * [0.0, 0.0, 1.0]
     scene = Scene(gravity=(0.0, 0.0, -_GRAVITY))
     cable = _add_cable(scene, setup.cable, points, "cable")
@@ -113,18 +113,18 @@ def hang(setup: Setup) -> FloatArray:
 
 
 def place(setup: Setup, points: FloatArray, *, progress: bool) -> tuple[FloatArray, Record]:
-    """Put a cable on the floor in the shape of a curve, free of stress, and let its stress come within a second.
+    """Put a cable on the floor in the shape of a curve, free of stress, and apply its stress within a second.
 
     Parameters
     ----------
     setup : Setup
     points : ndarray of shape (nodes, 2) [m]
-        Its nodes, from the free end.
+        Nodes of the cable, from the free end.
 
     Returns
     -------
     laid : ndarray of shape (nodes, 3) [m]
-        After it has come to rest, both ends free.
+        Centreline after the cable has come to rest, with both ends free.
     record : Record
     """
     scene, cable = _scene(setup, np.column_stack([points, np.full(len(points), setup.cable.radius)]))
@@ -139,9 +139,9 @@ def place(setup: Setup, points: FloatArray, *, progress: bool) -> tuple[FloatArr
 def hung(
     setups: Sequence[Setup], motions: Sequence[Motion], heights: Sequence[float]
 ) -> tuple[Simulation, list[Rod], list[RunningHand]]:
-    """Several cables on one floor, each hanging from a jaw where its motion begins, or higher by some way [m].
+    """Cables on one floor, each hanging from a jaw at the start of its motion, or higher by some distance [m].
 
-    The first setup says what the floor is like. Jaws are held: `jaw_path` leads them.
+    The first setup determines the floor. `jaw_path` leads the jaws.
     """
     scene = _floor(setups[0])
     cables, jaws = [], []
@@ -192,7 +192,7 @@ def _bending_stiffness(cable: Cable) -> float:
 
 
 def jaw_stiffness(cable: Cable) -> tuple[float, float]:
-    """With which a jaw's pads hold a cable [N/m, N m/rad]: plans take the jaw for rigid."""
+    """Stiffness of a jaw's pads on a cable [N/m, N m/rad]; plans assume a rigid jaw."""
     lgb, bend = cable.gravito_bending_length, _bending_stiffness(cable)
     (along, about), (share, turning) = _JAW_STIFFNESS, _JAW_RATIOS
     return max(along, share * bend / lgb**3), max(about, turning * bend / lgb)
@@ -206,7 +206,7 @@ def _add_cable(scene: Scene, cable: Cable, points: FloatArray, name: str) -> Rod
 
 
 def jaw_path(setup: Setup, motion: Motion, begin: Any) -> Any:
-    """Position and rotation of the jaw by time; the rod's axes in it are `begin` when it hangs."""
+    """Position and rotation of the jaw by time; `begin` is the rotation of the hanging rod's frame."""
     from scipy.interpolate import CubicSpline
     from scipy.spatial.transform import Rotation
 
