@@ -49,28 +49,28 @@ def overhand_knot(
     shortening: float | None = None,
     nodes: int | None = None,
 ) -> FloatArray:
-    """Points of a loose overhand knot along the x axis, its tails straight, to be pulled tight at its ends.
+    """Points of a loose overhand knot along the x axis with straight tails, to be tightened by its ends.
 
-    Two strands wind about each other by (2 n + 1) half turns: n = 1 is the trefoil, and closed it is the
-    torus knot (2, 2 n + 1).
+    Two strands wind about each other by (2 n + 1) half turns. With n = 1 the knot is the trefoil; the closed curve is
+    the torus knot (2, 2 n + 1).
 
     Parameters
     ----------
     n : int
-        Times that the tail passes through the loop.
+        Number of times that the tail passes through the loop.
     length : float [m]
-        Of the whole rod. By default 1 m, or more where the knot and its tails need it.
+        Length of the whole rod. By default 1 m, or more if the knot and its tails need it.
     radius : float [m]
-        Of its section.
+        Radius of the section.
     shortening : float [m]
-        Length minus the distance of its ends. By default 0.6 of the length, or more where the knot needs it.
+        Length minus the distance of the ends. By default 0.6 of the length, or more if the knot needs it.
     nodes : int
-        By default 301, or more where edges would be longer than 9 radii: these cut through the knot's bends.
+        Number of nodes. By default 301, or more if edges would be longer than 9 radii, which would cut off the bends.
 
     Returns
     -------
     ndarray of shape (nodes, 3) [m]
-        Evenly spaced.
+        Evenly spaced points.
 
     Raises
     ------
@@ -143,23 +143,24 @@ def overhand_knot(
 def reef_knot(
     *, length: float = 1.0, radius: float = 2e-3, nodes: int | None = None, tails: Tails = "up"
 ) -> FloatArray:
-    """Points of a loose reef knot: two half knots of opposite hands on one rod, whose middle is the first one's loop.
+    """Points of a loose reef knot: two half knots of opposite handedness. The loop of the first is the middle of the
+    rod.
 
     Parameters
     ----------
     length : float [m]
-        Of the whole rod.
+        Length of the whole rod.
     radius : float [m]
-        Of its section.
+        Radius of the section.
     nodes : int
-        By default 301, or more where edges would be longer than 9 radii: these cut through the knot's bends.
+        Number of nodes. By default 301, or more if edges would be longer than 9 radii, which would cut off the bends.
     tails : {"up", "sideways"}
-        Where the ends go off: along +z, or along x, away from each other, as they do when they are pulled apart.
+        Direction of the ends: along +z, or along x, away from each other, as if they were pulled apart.
 
     Returns
     -------
     ndarray of shape (nodes, 3) [m]
-        Evenly spaced; the loop hangs below. Half a turn about z takes one half into the other.
+        Evenly spaced points; the loop hangs below. The knot is symmetric under half a turn about z.
 
     Raises
     ------
@@ -173,7 +174,7 @@ def reef_knot(
 def granny_knot(
     *, length: float = 1.0, radius: float = 2e-3, nodes: int | None = None, tails: Tails = "up"
 ) -> FloatArray:
-    """Points of a loose granny knot: like `reef_knot`, with two half knots of the same hand."""
+    """Points of a loose granny knot: like `reef_knot`, with two half knots of the same handedness."""
     return _two_half_knots(1.0, length, radius, nodes, tails)
 
 
@@ -275,7 +276,7 @@ def _even(points: FloatArray, nodes: int, length: float, braid_radius: float) ->
 
 
 def writhe(points: npt.ArrayLike, closed: bool = False) -> float:
-    """Writhe of a polygon [turns]; of an open one, with its ends carried on straight to far away.
+    """Return the writhe of a polygon [turns]. The ends of an open polygon are continued straight to infinity.
 
     The Gauss integral over each pair of edges is the area that their directions sweep on the sphere
     [Klenin and Langowski 2000, method 1a].
@@ -284,7 +285,7 @@ def writhe(points: npt.ArrayLike, closed: bool = False) -> float:
     ----------
     points : array_like of shape (nodes, 3) [m]
     closed : bool
-        Whether the last point is joined to the first, which may be repeated at the end.
+        True if the last point is joined to the first, which may be repeated at the end.
 
     Returns
     -------
@@ -293,7 +294,7 @@ def writhe(points: npt.ArrayLike, closed: bool = False) -> float:
     Raises
     ------
     ValueError
-        Wrong shape, not finite, or fewer than 3 different points in a row.
+        A wrong shape, values that are not finite, or fewer than 3 different points in a row.
     """
     x = _polygon(points, 3, closed)
     if not closed:
@@ -332,14 +333,14 @@ def _gauss(a0: FloatArray, a1: FloatArray, b0: FloatArray, b1: FloatArray) -> Fl
 
 
 def signed_crossings(points: npt.ArrayLike, direction: npt.ArrayLike = (0.0, 0.0, 1.0)) -> int:
-    """Sum of the signs of the crossings that a curve shows from a direction: the writhe of its diagram.
+    """Return the sum of the signs of the crossings of a curve seen from a direction: the writhe of its diagram.
 
     Parameters
     ----------
     points : array_like of shape (nodes, 3)
-        Of a closed curve with the first one repeated at the end.
+        Points of a closed curve, with the first one repeated at the end.
     direction : array_like of shape (3,)
-        From which it is looked at.
+        Direction from which the curve is seen.
 
     Returns
     -------
@@ -369,24 +370,24 @@ def signed_crossings(points: npt.ArrayLike, direction: npt.ArrayLike = (0.0, 0.0
 
 
 def alexander_polynomial(points: npt.ArrayLike, closed: bool = False) -> npt.NDArray[np.int64]:
-    """Alexander polynomial of a knot: 1 of what is no knot, 1 - t + t^2 of a trefoil.
+    """Return the Alexander polynomial of a knot: 1 for no knot, 1 - t + t^2 for a trefoil.
 
     Parameters
     ----------
     points : array_like of shape (nodes, 3)
     closed : bool
-        Whether the last point is joined to the first, which may be repeated at the end. The ends of an open curve are
-        joined outside, straight away from its middle.
+        True if the last point is joined to the first, which may be repeated at the end. The ends of an open curve are
+        joined on the outside, straight away from the middle of the curve.
 
     Returns
     -------
     ndarray of int
-        Coefficients from the lowest power of t, the first of which is not zero; they sum to 1.
+        Coefficients from the lowest power of t on. The first is not zero, and they sum to 1.
 
     Raises
     ------
     ValueError
-        Wrong shape, not finite, or far more crossings than knots have that are tied by hand.
+        A wrong shape, values that are not finite, or far more crossings than knots that are tied by hand.
 
     Examples
     --------
@@ -398,7 +399,7 @@ def alexander_polynomial(points: npt.ArrayLike, closed: bool = False) -> npt.NDA
 
 
 def signature(points: npt.ArrayLike, closed: bool = False) -> int:
-    """Signature of a knot, which changes sign in a mirror: it tells a granny knot, 4 or -4, from a reef knot, 0.
+    """Return the signature of a knot, which changes sign in a mirror. A granny knot has 4 or -4, a reef knot 0.
 
     Parameters
     ----------
@@ -409,12 +410,12 @@ def signature(points: npt.ArrayLike, closed: bool = False) -> int:
     Returns
     -------
     int
-        -2 of the right-handed trefoil.
+        Signature; -2 for the right-handed trefoil.
 
     Raises
     ------
     ValueError
-        Wrong shape or not finite.
+        A wrong shape, or values that are not finite.
 
     Examples
     --------

@@ -23,11 +23,11 @@ def helix(radius: float, pitch: float, length: float, nodes: int, *, left_handed
     Parameters
     ----------
     radius : float [m]
-        Of the cylinder that the helix is wound on.
+        Radius of the cylinder of the helix.
     pitch : float [m]
         Rise in one turn.
     length : float [m]
-        Along the helix.
+        Length along the helix.
     nodes : int
         Number of points, evenly spaced along it.
     left_handed : bool
@@ -56,7 +56,7 @@ def helix(radius: float, pitch: float, length: float, nodes: int, *, left_handed
 
 
 def circle(radius: float, nodes: int) -> FloatArray:
-    """Points on a circle about the origin in the x-y plane, for a closed rod: the first is not repeated.
+    """Points on a circle about the origin in the x-y plane, for a closed rod. The first point is not repeated.
 
     Parameters
     ----------
@@ -81,13 +81,12 @@ def circle(radius: float, nodes: int) -> FloatArray:
 def arc(
     start: npt.ArrayLike, tangent: npt.ArrayLike, towards: npt.ArrayLike, curvature: float, length: float, nodes: int
 ) -> FloatArray:
-    """Points on an arc of a circle, or on a straight line where the curvature is zero.
+    """Points on an arc of a circle, or on a straight line if the curvature is zero.
 
     Parameters
     ----------
     start, tangent, towards : array_like of shape (3,)
-        Where the arc starts [m], which way it goes there, and to which side it bends; `towards` need
-        not be normal to `tangent`.
+        Start [m], direction at the start, and side to which the arc bends. `towards` need not be normal to `tangent`.
     curvature : float [1/m]
     length : float [m]
     nodes : int
@@ -100,8 +99,7 @@ def arc(
     Raises
     ------
     ValueError
-        A tangent of no length, a side along the tangent, a length that is not positive, or fewer than
-        two nodes.
+        A tangent of length zero, a side along the tangent, a length that is not positive, or fewer than two nodes.
     """
     positive(length, "length")
     origin, along, side = vector(start, "start"), unit_vector(tangent, "tangent"), vector(towards, "towards")

@@ -5,11 +5,11 @@
 >>> x[-1, -1, 2].backward()  # doctest: +SKIP
 >>> robots = gymnasium.make_vec("withe/Follow-v0", num_envs=64)  # doctest: +SKIP
 
-Torch, Gymnasium and Stable-Baselines3 are imported when they are first used (``pip install ".[learn]"`` in a clone of
-withe). What a robot is to do is a `Task`, which needs none of them; `Environment` and `VectorEnvironment` make
-Gymnasium environments of it. ``withe/Follow-v0``, ``Reach-v0``, ``Obstacles2D-v0``, ``Obstacles3D-v0``, ``Crawl-v0``
-and ``Wrap-v0`` are known to ``gymnasium.make`` and ``gymnasium.make_vec`` when Gymnasium is imported before withe, or
-after a call of `register`.
+Torch, Gymnasium and Stable-Baselines3 are imported on first use (``pip install ".[learn]"`` in a clone of withe). A
+`Task` describes what a robot should do, and needs none of them. `Environment` and `VectorEnvironment` make Gymnasium
+environments of a task. ``gymnasium.make`` and ``gymnasium.make_vec`` know ``withe/Follow-v0``, ``Reach-v0``,
+``Obstacles2D-v0``, ``Obstacles3D-v0``, ``Crawl-v0`` and ``Wrap-v0`` if Gymnasium is imported before withe, or after a
+call of `register`.
 """
 
 import sys

@@ -1,7 +1,8 @@
-"""A soft arm that follows, reaches, and finds its way past obstacles: the tasks of [arXiv 2511.06667].
+"""Tasks of a soft arm: following a target, reaching a pose, and passing obstacles [arXiv 2511.06667].
 
-An upright arm of 1 m, held at its lowest edge, is bent in five segments: an action adds to the discrete curvature that
-each segment has in sum, spread evenly over its nodes. Newton's method is not stopped early, and twist stays in range.
+An upright arm of 1 m is held at its lowest edge and bent in five segments. An action adds to the sum of the discrete
+curvature of each segment, spread evenly over its nodes. Unlike in the source, Newton's method is not stopped early, and
+the twist stays in range.
 """
 
 from __future__ import annotations
@@ -42,11 +43,11 @@ class Arm(Task):
     Attributes
     ----------
     bend_step : float [-]
-        Discrete curvature that an action of 1 adds to a segment, in sum.
+        Increase of a segment's total discrete curvature for an action of 1.
     axes : slice
-        Coordinates that are observed: two in a plane.
+        Coordinates in the observations: two in a plane.
     components : int
-        Of curvature that are driven.
+        Number of actuated components of curvature.
     time_step : float [s]
         Timestep of the simulation.
     longest_meant : float [s]
@@ -69,7 +70,7 @@ class Arm(Task):
         self.action_size = 5 * (self.components + self.twisted)
 
     def build(self, generator: np.random.Generator) -> Simulation:
-        """The arm, upright, among the obstacles of the task."""
+        """Build the arm, upright, among the obstacles of the task."""
         scene = Scene()
         rubber = Material(youngs_modulus=_MODULUS, poisson_ratio=0.5, density=_DENSITY)
         arm = scene.add_rod(
@@ -98,10 +99,10 @@ class Arm(Task):
         return built
 
     def add_obstacles(self, scene: Scene, generator: np.random.Generator) -> None:
-        """Put what is in the way into the scene; nothing by default."""
+        """Add obstacles to the scene; none by default."""
 
     def prepare(self, robots: Batch) -> None:
-        """Bends and targets of every robot."""
+        """Allocate bends and targets of all robots."""
         count = len(robots)
         self.bends = np.zeros((count, 5, self.components))
         self.twists = np.zeros((count, 5))
@@ -110,7 +111,7 @@ class Arm(Task):
         self._v = np.empty((count, _NODES, 3))
 
     def begin(self, robots: Batch, chosen: IntArray, generators: list[np.random.Generator]) -> None:
-        """Straight, with a target of each generator."""
+        """Start with a straight arm and a target from each generator."""
         self.bends[chosen] = 0.0
         self.twists[chosen] = 0.0
         for lane, generator in zip(chosen, generators, strict=True):
@@ -121,7 +122,7 @@ class Arm(Task):
         """Return the position of a robot's target at the start of its episode."""
 
     def act(self, robots: Batch, actions: FloatArray, chosen: IntArray) -> None:
-        """Lead the natural curvatures on, and twists."""
+        """Ramp the natural curvatures and twists."""
         rows = _rows(robots, chosen)
         parts = actions.reshape(len(chosen), -1, 5).swapaxes(1, 2)
         bends = self.bends[rows] + self.bend_step * parts[..., : self.components]
@@ -137,7 +138,7 @@ class Arm(Task):
             robots.set("arm", natural_twist=rates, over=self.control_step, lanes=chosen)
 
     def observe(self, robots: Batch) -> npt.NDArray[np.float32]:
-        """Positions and velocities of every second node, bends, twists, and what the task adds."""
+        """Return positions and velocities of every second node, bends, twists, and additions of the task."""
         count = len(robots)
         x, v = robots.positions("arm", out=self._x), robots.velocities("arm", out=self._v)
         parts = [x[:, _SEEN, self.axes], v[:, _SEEN, self.axes], self.bends]
@@ -156,21 +157,21 @@ class Arm(Task):
         return np.asarray(np.sqrt(np.einsum("ij,ij->i", apart, apart)))
 
     def reward(self, robots: Batch) -> FloatArray:
-        """Minus the distance squared, and more the closer."""
+        """Return minus the squared distance, plus a bonus near the target."""
         d = self.distances(robots)
         return _BONUSES.take(_BOUNDS.searchsorted(d, side="right")) - d * d
 
     def draw(self, axes: Any, robots: Batch) -> None:
-        """The target."""
+        """Draw the target."""
         axes.plot(*self.target[:1].T, "o", color="#d1495b", markersize=9)
 
 
 class Follow(Arm):
-    """The tip is to follow a target that goes about at 0.5 m/s and turns now and then.
+    """Follow a target with the tip. The target moves at 0.5 m/s and turns now and then.
 
-    Actions: for each segment what is added to its curvature towards x, then towards y, (10,). Observed: positions and
-    velocities of nodes 2, 4 .. 20, bends of the segments, position and velocity of the target, (76,). Reward -d^2, and
-    0.5 within 0.1 m, 2 within 0.05 m. 500 steps of 0.1 s.
+    Actions: increases of the curvature of each segment, towards x and then towards y, (10,). Observations: positions
+    and velocities of nodes 2, 4 .. 20, bends of the segments, position and velocity of the target, (76,). Reward: -d^2,
+    plus 0.5 within 0.1 m or 2 within 0.05 m. An episode has 500 steps of 0.1 s.
 
     Examples
     --------
@@ -182,7 +183,7 @@ class Follow(Arm):
     turning = 0.025  # chance of a new direction, an action
 
     def prepare(self, robots: Batch) -> None:
-        """Targets move, by numbers drawn as an episode begins."""
+        """Allocate the motions of targets, which are drawn at the start of an episode."""
         super().prepare(robots)
         count = len(robots)
         self.way = np.zeros((count, 3))  # velocity of the target [m/s]
@@ -191,7 +192,7 @@ class Follow(Arm):
         self._ways = np.zeros((count, self.steps + 1, 3))
 
     def aim(self, lane: int, generator: np.random.Generator) -> None:
-        """Anywhere, on its way anywhere."""
+        """Draw a position and a direction of motion anywhere."""
         self.target[lane] = generator.uniform(_LOW, _HIGH)
         ways = generator.normal(size=(self.steps + 1, 3))
         self._ways[lane] = self.speed * ways / np.linalg.norm(ways, axis=1, keepdims=True)
@@ -200,7 +201,7 @@ class Follow(Arm):
         self.way[lane] = self._ways[lane, -1]
 
     def act(self, robots: Batch, actions: FloatArray, chosen: IntArray) -> None:
-        """The target goes on too; walls send it back."""
+        """Move the arm and the target; walls reflect the target."""
         super().act(robots, actions, chosen)
         rows = _rows(robots, chosen)
         taken = self._taken[rows] % self.steps
@@ -217,14 +218,14 @@ class Follow(Arm):
         self._taken[rows] += 1
 
     def seen(self, robots: Batch) -> list[FloatArray]:
-        """The target and its velocity."""
+        """Return the target and its velocity."""
         return [self.target, self.way]
 
 
 class Reach(Arm):
-    """The tip is to come to a pose: a position, and upright but for a yaw of up to 90 degrees.
+    """Move the tip to a pose: a position, and an upright orientation with a yaw of up to 90 degrees.
 
-    Actions: for each segment curvatures and twist, (15,). Observed besides the arm: twists, quaternion of the tip,
+    Actions: curvatures and twist of each segment, (15,). Observations besides the arm: twists, quaternion of the tip,
     position and quaternion of the target, scalar last, (86,). With o = 1 - (q . q*)^2 the reward is -d^2 - o^2 / 2,
     plus a bonus near the target. The bonus within 0.1 m is 1 - o / 2 (1.5 if o < 0.1). Within 0.05 m it is 4 - 2 o
     instead (4.5 if o < 0.1, 6 if o < 0.05). An episode has 100 steps of 0.1 s.
@@ -237,18 +238,18 @@ class Reach(Arm):
     twisted = True
 
     def prepare(self, robots: Batch) -> None:
-        """Targets have an orientation."""
+        """Allocate orientations of the targets."""
         super().prepare(robots)
         self.goal = np.tile((0.0, 0.0, 0.0, 1.0), (len(robots), 1))
 
     def aim(self, lane: int, generator: np.random.Generator) -> None:
-        """Anywhere, yawed."""
+        """Draw a position anywhere and a yaw."""
         self.target[lane] = generator.uniform(_LOW, _HIGH)
         yaw = generator.uniform(-0.5 * np.pi, 0.5 * np.pi)
         self.goal[lane] = (0.0, 0.0, np.sin(0.5 * yaw), np.cos(0.5 * yaw))
 
     def orientations(self, robots: Batch) -> FloatArray:
-        """Quaternions of the last edges, scalar last, the one of the drawn arm (0, 0, 0, 1)."""
+        """Return quaternions of the last edges, scalar last. The drawn arm has (0, 0, 0, 1)."""
         from scipy.spatial.transform import Rotation
 
         frames = robots.directors("arm")[:, -1].swapaxes(1, 2)
@@ -256,11 +257,11 @@ class Reach(Arm):
         return np.asarray(q * np.where(q[:, 3:] < 0.0, -1.0, 1.0))
 
     def seen(self, robots: Batch) -> list[FloatArray]:
-        """Orientation of the tip, pose of the target."""
+        """Return the orientation of the tip and the pose of the target."""
         return [self.orientations(robots), self.target, self.goal]
 
     def reward(self, robots: Batch) -> FloatArray:
-        """For the place and the orientation."""
+        """Return the reward of position and orientation."""
         d = self.distances(robots)
         o = 1.0 - np.sum(self.orientations(robots) * self.goal, axis=1) ** 2
         near = np.where(o < 0.1, 1.5, 1.0) - 0.5 * o
@@ -284,10 +285,10 @@ class _Obstructed(Arm):
 
 
 class Obstacles2D(_Obstructed):
-    """The tip is to come to (0.8, 0.15) m in the plane of x and z, past six round obstacles of radius 0.1 m.
+    """Move the tip to (0.8, 0.15) m in the plane of x and z, past six round obstacles of radius 0.1 m.
 
-    Actions: for each segment what is added to its curvature, (5,). Observed: positions and velocities of nodes
-    2, 4 .. 20, bends, the goal, (47,). Reward as in `Follow`. 50 steps of 0.5 s.
+    Actions: increases of the curvature of each segment, (5,). Observations: positions and velocities of nodes
+    2, 4 .. 20, bends, the goal, (47,). Reward as in `Follow`. An episode has 50 steps of 0.5 s.
 
     Examples
     --------
@@ -301,7 +302,7 @@ class Obstacles2D(_Obstructed):
     places = ((0.2, 0.12), (0.6, 0.12), (0.4, 0.0), (0.4, 0.37), (0.4, 0.57), (0.4, 0.77))  # x, z [m]
 
     def add_obstacles(self, scene: Scene, generator: np.random.Generator) -> None:
-        """Capsules across the plane."""
+        """Add capsules across the plane."""
         for x, z in self.places:
             scene.add_capsule((x, -0.2, z), (x, 0.2, z), 0.1)
 
@@ -309,8 +310,8 @@ class Obstacles2D(_Obstructed):
 class Obstacles3D(_Obstructed):
     """Move the tip to (0.8, 0, 0.35) m through eight capsules of radius 0.03 m. Each episode draws other capsules.
 
-    Actions: as in `Follow`, (10,). Observed: positions and velocities of nodes 2, 4 .. 20, bends, the goal, ends of the
-    capsules, (121,). Reward as in `Follow`. 50 steps of 0.5 s.
+    Actions as in `Follow`, (10,). Observations: positions and velocities of nodes 2, 4 .. 20, bends, the goal, ends of
+    the capsules, (121,). Reward as in `Follow`. An episode has 50 steps of 0.5 s.
 
     Examples
     --------
@@ -323,23 +324,23 @@ class Obstacles3D(_Obstructed):
     count, radius, length, apart = 8, 0.03, 1.0, 0.015  # [-], [m]
 
     def prepare(self, robots: Batch) -> None:
-        """Obstacles are seen."""
+        """Allocate the obstacles for observations."""
         super().prepare(robots)
         self.ends = np.zeros((len(robots), self.count * 6))
 
     def begin(self, robots: Batch, chosen: IntArray, generators: list[np.random.Generator]) -> None:
-        """Notes where the capsules are."""
+        """Store the positions of the capsules."""
         super().begin(robots, chosen, generators)
         for lane in chosen:
             capsules = robots[int(lane)]._session.directory.all(ObstaclePart)
             self.ends[lane] = np.ravel([(capsule.point, capsule.other) for capsule in capsules])
 
     def seen(self, robots: Batch) -> list[FloatArray]:
-        """The goal, and the obstacles."""
+        """Return the goal and the obstacles."""
         return [self.target, self.ends]
 
     def add_obstacles(self, scene: Scene, generator: np.random.Generator) -> None:
-        """Capsules of random direction whose axes are in the box, and not too near each other."""
+        """Add capsules of random direction whose axes are in the box, and not too near each other."""
         for start, end in self._drawn(generator):
             scene.add_capsule(start, end, self.radius)
 

@@ -315,7 +315,7 @@ class _VectorEnvironment:
 
 @cache
 def environment_class(name: str) -> Any:
-    """The class of that name, a subclass of Gymnasium's."""
+    """Return the environment class of that name, a subclass of Gymnasium's."""
     gymnasium = _require()
     own, base = {
         "Environment": (_Environment, gymnasium.Env),

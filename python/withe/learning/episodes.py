@@ -1,4 +1,4 @@
-"""Episodes of a task: when they begin, an action's way through the simulation, when they end."""
+"""Episodes of a task: their start, the simulation of actions, and their end."""
 
 from __future__ import annotations
 
@@ -34,8 +34,9 @@ class Outcome:
     Attributes
     ----------
     reward : ndarray of shape (n,)
+        Rewards after the actions.
     terminated, truncated, failed : ndarray of shape (n,), bool
-        Failed: the simulation found no solution, and the episode is truncated.
+        Ends of episodes. `failed` is true if the simulation found no solution; the episode is then truncated.
     """
 
     reward: FloatArray
@@ -60,18 +61,18 @@ def _shared_causes(task: type[Task]) -> _Causes:
 
 
 class Episodes:
-    """Robots that do a task, each at its own place in its episode.
+    """Robots that perform a task, each at its own stage of its episode.
 
     Parameters
     ----------
     task : Task
-        They work on a deep copy of it: what it remembers of each robot is theirs alone.
+        Task, of which this object uses a deep copy with its own data of each robot.
     count : int
-        How many robots.
+        Number of robots.
     workers : int, optional
         Number of threads.
     most : int, optional
-        Actions after which an episode is truncated, where that is fewer than the task has.
+        Number of actions after which an episode is truncated, if it is below that of the task.
     """
 
     def __init__(self, task: Task, count: int, workers: int | None, most: int | None = None) -> None:
@@ -106,7 +107,7 @@ class Episodes:
         return len(self.robots)
 
     def begin(self, chosen: IntArray, generators: list[np.random.Generator]) -> None:
-        """Begin episodes of some robots, with a generator of random numbers for each of them."""
+        """Begin episodes of some robots, each with its own random generator."""
         with each_cause_once(self._causes):
             if self.task.redraw:
                 for lane, generator in zip(chosen, generators, strict=True):
@@ -123,7 +124,7 @@ class Episodes:
         Raises
         ------
         ValueError
-            The task returns another shape than (n, ...) or than at first, or what are no numbers or not finite.
+            The task returns a shape other than (n, ...) or than at first, or values that are not finite numbers.
         """
         seen = self._returned(self.task.observe(self.robots), "observe", np.float32)
         if seen.shape[:1] != (len(self),):
@@ -134,7 +135,7 @@ class Episodes:
         return seen
 
     def act(self, actions: FloatArray, chosen: IntArray) -> Outcome:
-        """Do one action each; of robots that are not chosen nothing changes.
+        """Apply one action to each chosen robot; other robots do not change.
 
         Raises
         ------
@@ -200,12 +201,13 @@ class Episodes:
             raise ValueError(f"{self._name(method)} must be finite, got {found[~finite][0]} of robot {robot}")
 
     def checked(self, actions: npt.ArrayLike, *robots: int) -> FloatArray:
-        """Actions of so many robots, or of one, from -1 to 1; what single precision rounds beyond is cut off.
+        """Return valid actions of some robots, or of one, from -1 to 1. Rounding errors of single precision are
+        clipped.
 
         Raises
         ------
         ValueError
-            Another shape, not finite, or outside of the box.
+            A wrong shape, values that are not finite, or values outside of the box.
         """
         values = validation.number_array(actions, "action", (*robots, self.action_size))
         most = np.abs(values).max(initial=0.0)

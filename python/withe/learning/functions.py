@@ -47,12 +47,13 @@ def rollout(
     Parameters
     ----------
     simulation : Simulation
-        Where the run begins; stays as it is.
+        State at the start of the run. It is not changed.
     values : mapping
-        From what `Record.gradient` takes in `wrt` (a part and a word of `set`; "gravity"; "initial_positions",
-        "initial_velocities" of all nodes) to tensors, float64, of a shape that `set` takes. Other than `set`,
-        "initial_positions" take directors along by the smallest turn, and joints as they are. Where one value sets
-        another (see `Simulation.set`), that is as given, and what it replaces has no part in the gradient.
+        Float64 tensors by parameter, as in `wrt` of `Record.gradient`: a part and a word of `set`, "gravity", or
+        "initial_positions" and "initial_velocities" of all nodes. Shapes are those of `set`. Unlike `set`,
+        "initial_positions" turns directors with their edges by the smallest rotation, and keeps the orientation of
+        joints. If one value sets another (see `Simulation.set`), the given value counts, and the replaced value has no
+        part in the gradient.
     duration, record_every : float [s]
         As in `Simulation.run`.
     of : str or list of str

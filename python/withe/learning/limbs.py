@@ -1,4 +1,4 @@
-"""Robots of several limbs: one that crawls on six legs, one that wraps its limbs around a ball."""
+"""Robots of several limbs: a crawler on six legs, and a gripper that wraps its limbs around a ball."""
 
 from __future__ import annotations
 
@@ -47,12 +47,12 @@ class _Limbs(Task):
 
 
 class Crawl(_Limbs):
-    """A robot of six soft legs that meet in one joint is to walk along x, on a floor with friction.
+    """Crawl along x with a robot of six soft legs that meet in one joint, on a floor with friction.
 
-    Actions: for each leg how much of their most its hip bends sideways, its hip bends up, its knee bends, (18,).
-    Observed: height and velocity of the body; where feet and knees are from it, and their velocities; the last action,
-    (94,). Reward: way of the body along x in centimetres, less 0.5 of that aside, less 1 % of the squared action. 100
-    steps of 0.1 s.
+    Actions: for each leg the sideways and upward bend of the hip and the bend of the knee, as shares of their maxima,
+    (18,). Observations: height and velocity of the body; positions of feet and knees relative to the body, and their
+    velocities; the last action, (94,). Reward: motion of the body along x in centimetres, minus 0.5 times the sideways
+    motion, minus 1 % of the squared action. An episode has 100 steps of 0.1 s.
 
     Examples
     --------
@@ -69,7 +69,7 @@ class Crawl(_Limbs):
     friction = 0.8
 
     def build(self, generator: np.random.Generator) -> Simulation:
-        """On its feet, as drawn."""
+        """Build the robot on its feet, as drawn."""
         scene = Scene()
         rubber = Material(youngs_modulus=1.5e7, poisson_ratio=0.5, density=1180.0, viscosity=5.0e4)
         arch = (self.fall - self.rise) / self.length
@@ -93,12 +93,12 @@ class Crawl(_Limbs):
         return scene.build(integrator="backward_euler", time_step=5e-3)
 
     def prepare(self, robots: Batch) -> None:
-        """Remembers where the body was."""
+        """Allocate the previous positions of the bodies."""
         super().prepare(robots)
         self.before = np.zeros((len(robots), 3))
 
     def begin(self, robots: Batch, chosen: IntArray, generators: list[np.random.Generator]) -> None:
-        """The body begins at the origin."""
+        """Store the start of the body at the origin."""
         super().begin(robots, chosen, generators)
         self.before[chosen] = 0.0
 
@@ -108,7 +108,7 @@ class Crawl(_Limbs):
         self._bend(robots, actions, chosen)
 
     def observe(self, robots: Batch) -> FloatArray:
-        """The body, feet and knees from there, the last action."""
+        """Return the body, the feet and knees relative to it, and the last action."""
         places, speeds = [], []
         for limb in self.limbs:
             x, v = robots.positions(limb), robots.velocities(limb)
@@ -118,17 +118,17 @@ class Crawl(_Limbs):
         return np.hstack([body, *places, *speeds, self.actions])
 
     def reward(self, robots: Batch) -> FloatArray:
-        """The way along x."""
+        """Return the reward for the motion along x."""
         way = robots.positions(self.limbs[0])[:, 0] - self.before
         return np.asarray(100.0 * (way[:, 0] - 0.5 * np.abs(way[:, 1])) - 0.01 * np.sum(self.actions**2, axis=1))
 
 
 class Wrap(_Limbs):
-    """A gripper of five limbs that hang side by side is to wrap them around a ball, elsewhere in each episode.
+    """Wrap the five hanging limbs of a gripper around a ball, which is at another place in each episode.
 
-    Actions: for each limb how much of their most its upper and its lower half bend towards d1 and d2, (20,). Observed:
-    positions of five nodes of each limb, where the ball is, the last action, (98,). Reward: the mean over nodes in the
-    lower halves of exp(-gap / 1 cm), from 0 (far) to 1 (all touch). 60 steps of 0.1 s.
+    Actions: for each limb the bends of its upper and lower half towards d1 and d2, as shares of their maxima, (20,).
+    Observations: positions of five nodes of each limb, position of the ball, the last action, (98,). Reward: the mean
+    over nodes in the lower halves of exp(-gap / 1 cm), from 0 (far) to 1 (all touch). An episode has 60 steps of 0.1 s.
 
     Examples
     --------
@@ -144,7 +144,7 @@ class Wrap(_Limbs):
     ball, depth, spread = 0.04, -0.2, 0.02  # radius of the ball, its height, how far aside it may be [m]
 
     def build(self, generator: np.random.Generator) -> Simulation:
-        """Hanging, the ball somewhere between the limbs."""
+        """Build the hanging gripper with the ball somewhere between its limbs."""
         scene = Scene()
         silicone = Material(youngs_modulus=3e5, poisson_ratio=0.5, density=1200.0, viscosity=3e3)
         turns = 2.0 * np.pi * np.arange(5) / 5
@@ -168,12 +168,12 @@ class Wrap(_Limbs):
         return scene.build(integrator="backward_euler", time_step=1e-2)
 
     def prepare(self, robots: Batch) -> None:
-        """Balls are seen."""
+        """Allocate the positions of the balls."""
         super().prepare(robots)
         self.balls = np.zeros((len(robots), 3))
 
     def begin(self, robots: Batch, chosen: IntArray, generators: list[np.random.Generator]) -> None:
-        """Notes where the balls are."""
+        """Store the positions of the balls."""
         super().begin(robots, chosen, generators)
         for lane in chosen:
             self.balls[lane] = robots[int(lane)].obstacle_position("ball")
@@ -183,7 +183,7 @@ class Wrap(_Limbs):
         self._bend(robots, actions, chosen)
 
     def observe(self, robots: Batch) -> FloatArray:
-        """Limbs, ball, last action."""
+        """Return the limbs, the ball and the last action."""
         nodes = np.arange(4, self.nodes, 4)
         limbs = [robots.positions(limb)[:, nodes].reshape(len(robots), -1) for limb in self.limbs]
         return np.hstack([*limbs, self.balls, self.actions])

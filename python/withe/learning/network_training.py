@@ -1,4 +1,4 @@
-"""Training of small networks on a processor: one pass over the data after another, by one of two schedules."""
+"""Training of small networks on a processor, in passes over the data, by one of two schedules."""
 
 from __future__ import annotations
 
@@ -24,15 +24,16 @@ __all__ = ["Alternating", "Cosine", "own_torch", "train_network"]
 
 @dataclass(frozen=True)
 class Cosine:
-    """Adam, with a rate that falls from step to step as half a cosine, to nothing at the end.
+    """Adam with a cosine schedule: the rate decreases to zero as half a cosine.
 
     Attributes
     ----------
     epochs : int
         Passes over the data.
     batch : int
+        Samples per step.
     rate : float
-        At the start, after a twentieth of all steps in which it rises.
+        Largest rate. It is reached after a twentieth of all steps.
     """
 
     epochs: int = 200
@@ -42,24 +43,24 @@ class Cosine:
 
 @dataclass(frozen=True)
 class Alternating:
-    """The other one of stochastic gradient descent and Adam whenever training stalls, with batches twice as large.
+    """Stochastic gradient descent and Adam in turn, with a change whenever training stalls, and doubled batches.
 
-    Choi, dissertation, 7.5.2 and 9.3.3; how long training stalls and how fast it learns are not printed there.
+    The schedule follows Choi, dissertation, 7.5.2 and 9.3.3, which does not state the length of a stall and the rates.
 
     Attributes
     ----------
     epochs : int
-        At most.
+        Largest number of passes over the data.
     batch, largest_batch : int
-        At first, and at last.
+        Initial and final number of samples per step.
     patience : int
-        Epochs without a loss that is less by 1 %, to be stalled.
+        Number of epochs without a decrease of the loss by 1 % that count as a stall.
     rates : pair of float
-        Of gradient descent, which begins, and of Adam. Each is halved when training stalls at the largest batch.
+        Rates of gradient descent, which comes first, and of Adam. A stall at the largest batch halves both.
     whole_below : float
-        Loss on the data held out, below which they are trained on too.
+        Held-out loss below which training also uses the held-out data.
     until : float
-        Loss at which training is done.
+        Loss at which training ends.
     """
 
     epochs: int = 2000
@@ -95,32 +96,35 @@ def train_network(
     Parameters
     ----------
     x : array_like of shape (samples, inputs)
+        Inputs of the function.
     y : array_like of shape (samples, outputs)
+        Values of the function.
     inputs, outputs : sequence of str, optional
-        Names of their columns; by default x0, x1, ... and y0, y1, ...
+        Names of the columns; by default x0, x1, ... and y0, y1, ...
     hidden : sequence of int
-        Widths of the layers between.
+        Widths of the hidden layers.
     activation : {"relu", "silu", "tanh"}
-        The last two are smooth, and so is then what is learned.
+        Activation function. "silu" and "tanh" make the network smooth.
     loss : {"squared", "absolute"}
-        Mean of weights * error^2, or of weights * size of error; of errors of outputs as they are scaled.
+        Mean of weights * error^2, or of weights * |error|, with the errors of scaled outputs.
     weights : array_like that broadcasts to the shape of y
-        How much each number counts; not negative.
+        Weight of each number; not negative.
     scale_outputs : bool
-        Whether outputs are learned as parts of their standard deviation from their mean, which gives each the same say;
-        or as they are. Inputs are always scaled so.
+        True to scale each output by its mean and standard deviation, so that all outputs count equally. Inputs are
+        always scaled.
     schedule : Cosine or Alternating, optional
-        By default ``Cosine()``.
+        Schedule of training. By default ``Cosine()``.
     held_out : float
-        Share of the samples that only choose which epoch is kept.
+        Share of the samples that are not trained on, and determine the best epoch.
     seed : int
-        Equal seeds give equal networks where torch runs the same. Torch's own seed is left alone.
+        Seed. Equal seeds give equal networks if torch runs the same. The seed of torch itself does not change.
     threads : int
-        Of torch while it trains. Small networks are faster on one; of other numbers sums are in other orders.
+        Number of threads of torch during training. Small networks are faster on one thread. The number of threads
+        changes the order of sums.
     time_limit : float, optional [s]
-        Training stops after the epoch in which that has passed.
+        Time after which the present epoch is the last one.
     progress : bool
-        Whether to show a progress bar on a terminal.
+        True to show a progress bar on a terminal.
 
     Returns
     -------
@@ -131,9 +135,10 @@ def train_network(
     Raises
     ------
     ValueError
-        Shapes that do not fit, what is not finite, fewer than ten samples, unknown words, numbers out of range.
+        Shapes that do not match, values that are not finite, fewer than ten samples, unknown words, or numbers out of
+        range.
     RuntimeError
-        The loss is not finite any more: the rate is too high.
+        The loss is not finite: the rate is too high.
     ImportError
         torch is not installed.
 
@@ -160,7 +165,7 @@ def train_network(
 
 @contextmanager
 def own_torch(threads: int, seed: int) -> Iterator[None]:
-    """Lend torch some threads and a seed, and give back what it had."""
+    """Set threads and seed of torch, and restore them afterwards."""
     torch = require("torch", "learn")
     before = torch.get_num_threads()
     try:

@@ -1,4 +1,4 @@
-"""Small networks that stand in for what is slow to compute: numbers in, numbers out, from NumPy or from torch.
+"""Small networks that replace slow computations, with NumPy or torch.
 
 >>> import withe
 >>> network = withe.learning.train_network(x, y, hidden=(64, 64, 64), seed=0)  # doctest: +SKIP
@@ -37,17 +37,19 @@ class Training:
     Attributes
     ----------
     seed : int
+        Seed of the training.
     epochs : int
-        How many were run: passes over the data.
+        Number of passes over the data.
     best : int
-        That after which it is kept, counted from 1: the one of least loss on the data held out; 0, untrained.
+        Epoch that was kept, counted from 1: the one with the least held-out loss. 0 without training.
     held_out_until : int
-        After that epoch what was held out was trained on too.
+        Epoch after which training also used the held-out data.
     loss : float
-        On the data held out, after the best epoch.
+        Held-out loss after the best epoch.
     seconds : float
+        Duration of the training.
     stopped : str
-        Why: "epochs", "time", "loss" or "interrupted".
+        Reason for the end: "epochs", "time", "loss" or "interrupted".
     """
 
     seed: int
@@ -60,20 +62,22 @@ class Training:
 
 
 class Network:
-    """A multilayer perceptron with its scales inside. `train_network` makes them, `load` reads one from a file.
+    """A multilayer perceptron with its scales. `train_network` trains one, `load` reads one from a file.
 
-    Linear layers with an activation between each two, y = b + W f(... f(b0 + W0 (x - m) / s)), and outputs scaled back;
-    weights in single precision, m and s and those of outputs in double. It knows nothing of what lies outside its
-    `domain`.
+    Linear layers alternate with the activation f, y = b + W f(... f(b0 + W0 (x - m) / s)), and outputs are scaled back.
+    Weights are in single precision; m, s and the scales of outputs in double precision. Results outside of `domain` are
+    extrapolations.
 
     Attributes
     ----------
     inputs, outputs : tuple of str
         Names of the columns.
     hidden : tuple of int
-        Widths of the layers between.
+        Widths of the hidden layers.
     activation : {"relu", "silu", "tanh"}
+        Activation function.
     training : Training
+        Record of the training.
     """
 
     def __init__(
@@ -93,7 +97,7 @@ class Network:
 
     @property
     def domain(self) -> npt.NDArray[np.float64]:
-        """Least and greatest inputs of its data, of shape (2, inputs)."""
+        """Least and greatest inputs of the training data, of shape (2, inputs)."""
         return np.array(self._tensors["domain"].double().numpy())
 
     def __call__(self, x: Any) -> Any:
@@ -172,7 +176,7 @@ class Network:
         return f"Network({named}, {widths} {self.activation}, held-out loss {self.training.loss:.2g})"
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write it to a file, as torch's own format with nothing in it but numbers, words and tensors.
+        """Write the network to a file, in the format of torch, with numbers, words and tensors only.
 
         Parameters
         ----------
@@ -199,7 +203,7 @@ class Network:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Network:
-        """Read it from a file. Such a file can run no code.
+        """Read a network from a file. Such a file cannot execute code.
 
         Parameters
         ----------
@@ -212,9 +216,9 @@ class Network:
         Raises
         ------
         ValueError
-            A file of something else, or of another version.
+            A file with other content or of another version.
         FileNotFoundError
-            No such file.
+            The file does not exist.
         """
         torch = require("torch", "learn")
         try:
@@ -235,7 +239,7 @@ class Network:
 
 
 def make_layers(inputs: int, outputs: int, hidden: Sequence[int], activation: str) -> Any:
-    """Linear layers with an activation between each two, as a torch module that can be trained."""
+    """Return linear layers with activations in between, as a torch module that can be trained."""
     nn = require("torch", "learn").nn
     layers: list[Any] = []
     for wide, next_wide in pairwise((inputs, *hidden)):

@@ -1,4 +1,4 @@
-"""The environments of withe as Gymnasium knows them."""
+"""Registration of the environments of withe in Gymnasium."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ globals().update({f"{name}Vector": vector_maker(task) for name, task in _TASKS.i
 
 
 def register() -> None:
-    """Make the environments known to `gymnasium.make` and `gymnasium.make_vec`, as withe/Follow-v0 and so on.
+    """Register the environments for `gymnasium.make` and `gymnasium.make_vec`, as withe/Follow-v0 and so on.
 
-    Importing withe does this where Gymnasium has been imported before.
+    Importing withe registers them if Gymnasium has been imported before.
 
     Raises
     ------

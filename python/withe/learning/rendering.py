@@ -32,9 +32,9 @@ class Screen:
     ----------
     robots : Batch
     draw : callable
-        Called with axes and the robots, adds what the task knows.
+        Function of axes and robots that draws the task.
     window : bool
-        Whether it is a window, or pictures are asked for.
+        True for a window, False for pictures.
     """
 
     def __init__(self, robots: Batch, draw: Callable[[Any, Batch], None], window: bool) -> None:
@@ -43,13 +43,13 @@ class Screen:
         self._figure: Any = None
 
     def picture(self) -> npt.NDArray[np.uint8]:
-        """The present state, shape (480, 640, 3)."""
+        """Return a picture of the present state, shape (480, 640, 3)."""
         self._paint()
         self._figure.canvas.draw()
         return np.array(self._figure.canvas.buffer_rgba())[..., :3]
 
     def show(self) -> None:
-        """Bring the window up to date; warns where there is no screen to open it on."""
+        """Update the window; warn if there is no screen for it."""
         if self._figure is None and str(require("matplotlib", "view").get_backend()).lower() == "agg":
             warn(
                 'render_mode="human" shows nothing, because matplotlib has no screen to open a window on: use '
@@ -60,7 +60,7 @@ class Screen:
         require("matplotlib.pyplot", "view").pause(1e-3)
 
     def close(self) -> None:
-        """Take the figure down."""
+        """Close the figure."""
         if self._figure is not None and self._window:
             require("matplotlib.pyplot", "view").close(self._figure)
         self._figure = None

@@ -1,4 +1,4 @@
-"""Networks that stand in for a solver: what they are asked, what they say, and how they are known again in a file."""
+"""Networks that replace a solver: their inputs, their outputs, and their identification in files."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ FloatArray = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Form:
-    """Inputs and outputs of a network, as functions of NumPy or torch, whose names are the same.
+    """Inputs and outputs of a network, as functions of NumPy or torch (functions with the same names).
 
     Attributes
     ----------
     inputs, outputs : tuple of str
-        Names by which a file is known again.
+        Names that identify the form in a file.
     ask : callable
-        (module, *question) -> inputs.
+        Function (module, *question) -> inputs.
     tell : callable
-        (module, *question, outputs) -> what is known, by name.
+        Function (module, *question, outputs) -> results by name.
     learn : callable
-        Outputs to be learned, from exact solutions.
+        Function that returns the outputs to learn, from exact solutions.
     """
 
     inputs: tuple[str, ...]
@@ -44,11 +44,12 @@ class Form:
 
 
 class Surrogate:
-    """A network with the meaning of its numbers; `Surrogate` itself has none, the classes made of it do.
+    """Base of networks with a meaning of their inputs and outputs.
 
     Attributes
     ----------
     network : withe.learning.Network
+        The network itself.
     """
 
     FORMS: ClassVar[Mapping[str, Form]] = {}
@@ -65,19 +66,19 @@ class Surrogate:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str] | None = None) -> Self:
-        """Read one from a file; by default the small one that comes with withe.
+        """Read a network from a file; by default the small one that is shipped with withe.
 
         Raises
         ------
         ValueError
-            A file of something else, or of another version.
+            A file with other content or of another version.
         ImportError
             torch is not installed.
         """
         return cls(Network.load(cls.SHIPPED if path is None else path))
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write it to a file."""
+        """Write the network to a file."""
         return self.network.save(path)
 
     def __reduce__(self) -> tuple[type[Self], tuple[Network]]:
@@ -103,8 +104,8 @@ def train_form(
 ) -> Network:
     """Train a network of a form on exact solutions.
 
-    With `hidden` it is small and smooth: SiLU, squares of errors of scaled outputs. Without, it is that of Choi,
-    dissertation, 7.5.2 and 9.3.3: four layers of 392 with ReLU, mean absolute error of outputs as they are.
+    With `hidden` the network is small and smooth: SiLU, and squared errors of scaled outputs. Without `hidden` it is
+    that of Choi, dissertation, 7.5.2 and 9.3.3: four ReLU layers of 392 units, and absolute errors of unscaled outputs.
     """
     small = hidden is not None
     return train_network(

@@ -18,26 +18,26 @@ IntArray = npt.NDArray[np.intc]
 
 
 class Task(ABC):
-    """Task of many robots: each method is given a `withe.Batch`, of one robot or of hundreds.
+    """Task of many robots. Each method receives a `withe.Batch`, of one robot or of hundreds.
 
-    A subclass says how the scene is built, what an action does, what is observed, and how good that is; arrays have a
-    row for each robot. `Environment` makes one Gymnasium environment of it, `VectorEnvironment` many in one.
+    A subclass defines the scene, the effect of an action, the observations and the reward. Arrays have a row for each
+    robot. `Environment` makes one Gymnasium environment of a task, and `VectorEnvironment` many in one.
 
-    Each environment works on a deep copy of the task, its attribute `task`. So one task may be given to several, and
-    what a task remembers of its robots is read there: ``env.task``. A subclass that holds what cannot be copied, or
-    what environments are to share, defines ``__deepcopy__``.
+    Each environment works on a deep copy of the task, its attribute `task`. Several environments can therefore share
+    one task object, and the data of their robots are in ``env.task``. A subclass with members that cannot be copied, or
+    that environments should share, defines ``__deepcopy__``.
 
     Attributes
     ----------
     action_size : int
-        How many numbers an action has, each from -1 to 1.
+        Size of an action. Each number is from -1 to 1.
     control_step : float [s]
-        From one action to the next; a whole number of time steps of the simulation.
+        Time from one action to the next; a whole number of time steps of the simulation.
     steps : int
-        Actions in an episode, which is then truncated.
+        Number of actions in an episode, which is then truncated.
     redraw : bool
-        Whether each episode begins with a scene of its own, from `build`, instead of a reset. Where it is false,
-        a `build` that draws random numbers is warned of, with `withe.PlausibilityWarning`: all robots are equal.
+        True if each episode begins with a new scene from `build`, instead of a reset. If it is false and `build` draws
+        random numbers, `withe.PlausibilityWarning` warns that all robots are equal.
 
     Examples
     --------
@@ -77,11 +77,11 @@ class Task(ABC):
 
     @abstractmethod
     def build(self, generator: np.random.Generator) -> Simulation:
-        """A robot as it is at the start of an episode; where `redraw` is true, by random numbers of the generator."""
+        """Build a robot in its state at the start of an episode, with random numbers if `redraw` is true."""
 
     @abstractmethod
     def act(self, robots: Batch, actions: FloatArray, chosen: IntArray) -> None:
-        """Set what actions of the chosen robots mean, shape (chosen, action_size), for the coming control step."""
+        """Apply actions of the chosen robots, shape (chosen, action_size), for the next control step."""
 
     @abstractmethod
     def observe(self, robots: Batch) -> npt.NDArray[np.floating[Any]]:
@@ -92,14 +92,14 @@ class Task(ABC):
         """Return the reward of the present state of every robot, shape (n,), finite."""
 
     def finished(self, robots: Batch) -> npt.NDArray[np.bool_]:
-        """Whose episode has come to its end (terminated, not truncated), shape (n,); none by default."""
+        """Return True for each robot whose episode has terminated (not truncated), shape (n,); none by default."""
         return np.zeros(len(robots), bool)
 
     def prepare(self, robots: Batch) -> None:  # noqa: B027
-        """Make room for what the task remembers of each robot. Called once; nothing by default."""
+        """Allocate data of each robot. Called once; nothing by default."""
 
     def begin(self, robots: Batch, chosen: IntArray, generators: list[np.random.Generator]) -> None:  # noqa: B027
-        """An episode begins for the chosen robots, each with its generator of random numbers; nothing by default."""
+        """Begin an episode of the chosen robots, each with its random generator; nothing by default."""
 
     def draw(self, axes: Any, robots: Batch) -> None:  # noqa: B027
         """Add to a picture of the first robot, on 3D axes of matplotlib; nothing by default."""

@@ -1,4 +1,4 @@
-"""Controllers learned by Stable-Baselines3: no more than what joins it to robots of withe."""
+"""Controllers trained by Stable-Baselines3: the connection to robots of withe."""
 
 from __future__ import annotations
 
@@ -36,40 +36,40 @@ def train_policy(
     progress: bool = True,
     **options: Any,
 ) -> Any:
-    """Train a controller by soft actor-critic [Haarnoja et al. 2018], on robots that are stepped side by side.
+    """Train a controller by soft actor-critic [Haarnoja et al. 2018], on robots that are stepped in parallel.
 
-    A thin example: everything else that Stable-Baselines3 can do, it does with `VectorEnvironment` too.
+    This is a thin example: `VectorEnvironment` works with all other methods of Stable-Baselines3 too.
 
     Parameters
     ----------
     task : Task
-        The robots work on a deep copy of it, ``policy.get_env().get_attr("task")[0]``.
+        Task, of which the robots use a deep copy, ``policy.get_env().get_attr("task")[0]``.
     steps : int
-        Control steps of all robots together.
+        Number of control steps of all robots together.
     environments : int
-        How many robots.
+        Number of robots.
     workers : int, optional
-        Threads that step them; by default one a processor.
+        Number of threads that step them; by default one per processor.
     seed : int
-        Equal seeds give equal controllers, where torch runs the same. Generators of torch, NumPy and Python, and the
-        threads of torch, are left as they were.
+        Seed. Equal seeds give equal controllers if torch runs the same. The random generators of torch, NumPy and
+        Python, and the threads of torch, are restored.
     normalize : bool
-        Whether observations are scaled by their running mean and deviation, a part of the policy.
+        True to scale observations by their running mean and deviation, as a part of the policy.
     callback : callable, optional
-        Called with the policy before each control step and at the end: to keep it, or to see how good it is.
+        Function of the policy that is called before each control step and at the end, to save or evaluate the policy.
     progress : bool
-        Whether to show a progress bar on a terminal.
+        True to show a progress bar on a terminal.
     **options
-        Of ``stable_baselines3.SAC``, such as gamma and learning_rate. Unless given, there is an update by 256
-        remembered steps for every 4 control steps, and entropy is worth little from the start, as rewards about 1
-        want it.
+        Options of ``stable_baselines3.SAC``, such as gamma and learning_rate. By default there is an update with 256
+        stored steps for every 4 control steps. The weight of the entropy is small from the start, for rewards of about
+        1.
 
     Returns
     -------
     stable_baselines3.SAC
-        ``action, _ = policy.predict(observation, deterministic=True)``; its ``save`` and ``load`` keep it. Rewards of
-        episodes that ended last are in ``policy.ep_info_buffer``. Ctrl-C ends training with a warning, and the
-        present policy is returned.
+        Policy. ``action, _ = policy.predict(observation, deterministic=True)`` returns an action; ``save`` and ``load``
+        store the policy. ``policy.ep_info_buffer`` holds the rewards of the last episodes. Ctrl-C ends training with a
+        warning and returns the present policy.
 
     Raises
     ------

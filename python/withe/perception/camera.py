@@ -1,4 +1,4 @@
-"""From pixels to metres."""
+"""Cameras: from pixels to metres."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ def _checked(values: ArrayLike, shape: tuple[int | None, ...], name: str) -> Arr
 class Camera:
     """A pinhole camera with lens distortion (the model of OpenCV).
 
-    A point X of the world is seen at R X + t = (x, y, z) from the camera, z forwards; x/z and y/z are distorted and
-    multiplied by the matrix.
+    A point X of the world has the coordinates R X + t = (x, y, z) in the camera, with z forwards. The ratios x/z and
+    y/z are distorted and then multiplied by the matrix.
 
     Parameters
     ----------
@@ -38,14 +38,15 @@ class Camera:
     distortion : array_like of shape (4,) or (5,), optional
         k1, k2, p1, p2 and k3.
     rotation : array_like of shape (3, 3), optional
-        R, from the world to the camera.
+        Rotation R from the world to the camera.
     translation : array_like of shape (3,), optional [m]
-        t, where the camera sees the origin of the world.
+        Translation t: the position of the world's origin in the camera.
 
     Raises
     ------
     ValueError
-        A wrong shape, not finite, a matrix that is singular or ends otherwise, or a rotation that is none.
+        A wrong shape, values that are not finite, a singular matrix or one with another last row, or a matrix that is
+        no rotation.
     """
 
     def __init__(
@@ -82,23 +83,24 @@ class Camera:
         matrix: ArrayLike | None = None,
         distortion: ArrayLike | None = None,
     ) -> Camera:
-        """Calibrate by points whose places are known.
+        """Calibrate a camera from points with known positions.
 
         Parameters
         ----------
         pixels : array_like of shape (n, 2) [px]
+            Points in the picture.
         metres : array_like of shape (n, 2) or (n, 3) [m]
-            On the plane z = 0 (at least four points, no three on a line), or anywhere (at least six, not in one
-            plane).
+            Positions of the points: on the plane z = 0 (at least four points, no three on a line), or anywhere (at
+            least six, not in one plane).
         matrix, distortion : optional
-            Of the camera, where they are known. Points on a plane alone tell nothing about other heights; with the
-            matrix they do.
+            Matrix and distortion of the camera, if they are known. Points on a plane do not determine other heights
+            without the matrix.
 
         Raises
         ------
         ValueError
-            Wrong shapes, too few points, points that do not determine the camera, or pixels that the lens shows no
-            direction at.
+            Wrong shapes, too few points, points that do not determine the camera, or pixels outside of the range of the
+            lens distortion.
         """
         seen = _checked(pixels, (None, 2), "pixels")
         known = np.asarray(metres, dtype=float)
@@ -140,12 +142,12 @@ class Camera:
         return self._flat
 
     def looks_from(self, pixels: ArrayLike) -> Array:
-        """Side of the plane z = 0 from which pixels see it, 1 from above and -1 from below, shape (n,).
+        """Return the side of the plane z = 0 from which pixels see it, 1 from above and -1 from below, shape (n,).
 
         Parameters
         ----------
         pixels : array_like of shape (n, 2) [px]
-            That see the plane; their rows grow downwards, as pictures have them.
+            Pixels that see the plane. Rows grow downwards, as in pictures.
 
         Returns
         -------
@@ -158,7 +160,7 @@ class Camera:
         return np.asarray(-np.sign(np.linalg.det(self.matrix[:2, :2]) * np.linalg.det(by)))
 
     def project(self, points: ArrayLike) -> Array:
-        """Pixels of points of the world.
+        """Project points of the world to pixels.
 
         Parameters
         ----------
@@ -179,11 +181,12 @@ class Camera:
         return distorted @ self.matrix[:2, :2].T + self.matrix[:2, 2]
 
     def to_plane(self, pixels: ArrayLike, height: ArrayLike = 0.0) -> Array:
-        """Points of the world where lines of sight meet a horizontal plane.
+        """Return the points where lines of sight meet a horizontal plane.
 
         Parameters
         ----------
         pixels : array_like of shape (n, 2) [px]
+            Pixels of the lines of sight.
         height : float or array_like of shape (n,) [m]
             z of the plane, for all or for each.
 

@@ -33,7 +33,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Trace, write both files and say what was found."""
+    """Trace, write both files and print a summary."""
     cv2 = require("cv2", "vision")
     image = read_image(arguments.image)
     mask = None if arguments.mask is None else read_image(arguments.mask, "mask").max(axis=2) > 127

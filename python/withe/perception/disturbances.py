@@ -9,7 +9,8 @@ __all__ = ["add_frays", "add_occluder", "add_specks", "strip_across"]
 
 
 def add_frays(mask: NDArray[np.bool_], rng: np.random.Generator, amount: float = 1.0) -> NDArray[np.bool_]:
-    """Make the border of a mask ragged: pixels within about 1.5 px of it flip at random, `amount` scales how many."""
+    """Make the border of a mask ragged: pixels within about 1.5 px of it flip at random; `amount` scales their
+    number."""
     result = mask.copy()
     for _ in range(2):
         padded = np.pad(result, 1, mode="edge")
@@ -48,9 +49,9 @@ def strip_across(
     at : int
         Row of the line in the middle of the strip, not one of the two at its ends.
     length : float [px]
-        Along the line.
+        Length of the strip along the line.
     reach : float [px]
-        To either side of it.
+        Half width of the strip.
     shape : (int, int)
         Height and width of the picture [px].
     """
@@ -66,7 +67,7 @@ def strip_across(
 def add_occluder(
     picture: NDArray[np.uint8], strip: NDArray[np.bool_], rng: np.random.Generator, level: float = 120, grain: float = 6
 ) -> NDArray[np.uint8]:
-    """Lay something grey over a picture, where `strip` says; `grain` is the standard deviation of its noise."""
+    """Cover the part `strip` of a picture by a grey object; `grain` is the standard deviation of its noise."""
     result = picture.copy()
     grey = level + rng.normal(0, grain, (int(strip.sum()), 1)) + np.zeros(3)
     result[strip] = np.clip(np.round(grey), 0, 255).astype(np.uint8)

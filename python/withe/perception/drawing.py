@@ -1,4 +1,4 @@
-"""A picture with what was found in it."""
+"""Pictures with the results of tracing."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _FRACTION_BITS = 4  # OpenCV draws between pixels when coordinates are scaled by
 
 
 def cable_colour(index: int) -> tuple[int, int, int]:
-    """A bright colour of its own for every cable, red, green, blue."""
+    """Return a bright colour of a cable, red, green, blue."""
     red, green, blue = colorsys.hsv_to_rgb((0.58 + 0.618034 * index) % 1.0, 0.85, 1.0)
     return round(255 * red), round(255 * green), round(255 * blue)
 
@@ -28,7 +28,7 @@ def draw(image: ArrayLike, tracing: Tracing) -> NDArray[np.uint8]:
     Parameters
     ----------
     image : array_like of shape (height, width, 3)
-        Red, green, blue as uint8; grey and alpha will do.
+        Red, green, blue as uint8; grey and alpha are accepted.
     tracing : Tracing
 
     Returns
@@ -40,7 +40,7 @@ def draw(image: ArrayLike, tracing: Tracing) -> NDArray[np.uint8]:
     Raises
     ------
     ValueError
-        An image that is none.
+        The argument is not an image.
     """
     cv2 = require("cv2", "vision")
     picture = np.ascontiguousarray(check_image(image) // 2 + 20)

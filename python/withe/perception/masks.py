@@ -1,4 +1,4 @@
-"""Which pixels belong to cables: by colour, by contrast with the border, or by a network."""
+"""Masks of cable pixels: by colour, by contrast with the border, or by a network."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ _HIGHEST = (180, 255, 255)
 
 
 def border_filter(image: Image, contrast: int = 25) -> NDArray[np.bool_]:
-    """Pixels that differ from the median colour of the image's border: the filter where none is given.
+    """Return the pixels that differ from the median colour of the image's border. This is the default filter.
 
-    The threshold on the largest difference of a channel is that which separates two classes best (Otsu), on
-    square roots, so that dark cables are not lost among bright ones.
+    The threshold on the largest difference of a channel is the one that separates two classes best (Otsu). It uses
+    square roots, so that dark cables are found beside bright ones.
 
     Parameters
     ----------
     image : ndarray of uint8, shape (height, width, 3)
         Red, green, blue.
     contrast : int
-        Nothing is found where the two classes differ by less [grey levels].
+        Least difference of the two classes; with less contrast nothing is found [grey levels].
 
     Returns
     -------
@@ -43,25 +43,25 @@ def border_filter(image: Image, contrast: int = 25) -> NDArray[np.bool_]:
 
 
 def color_filter(ranges: Sequence[Range], clean: bool = True) -> MaskFunction:
-    """A filter that takes the pixels whose colour lies in one of several ranges.
+    """Return a filter for pixels whose colour lies in one of several ranges.
 
     Parameters
     ----------
     ranges : sequence of (lowest, highest)
-        Hue 0 to 180 (half degrees), saturation and value 0 to 255, all inclusive, as OpenCV counts them. Where the
-        lowest hue exceeds the highest, the range goes over red.
+        Hue 0 to 180 (half degrees), saturation and value 0 to 255, all inclusive, as in OpenCV. If the lowest hue
+        exceeds the highest, the range passes through red.
     clean : bool
         Close, then open, the mask by a square of 3 x 3 pixels.
 
     Returns
     -------
     callable
-        From an image of shape (height, width, 3), uint8 RGB, to a mask; give it to `trace` as `mask`.
+        Function from an image of shape (height, width, 3), uint8 RGB, to a mask, for the argument `mask` of `trace`.
 
     Raises
     ------
     ValueError
-        No range, or bounds that are no three numbers in their limits.
+        No range, or bounds that are not three numbers within their limits.
 
     Examples
     --------
@@ -96,7 +96,7 @@ def color_filter(ranges: Sequence[Range], clean: bool = True) -> MaskFunction:
 
 
 def network_mask(model: Any, threshold: float = 0.5, size: tuple[int, int] | None = None) -> MaskFunction:
-    """A filter that asks a segmentation network.
+    """Return a filter that uses a segmentation network.
 
     Parameters
     ----------
@@ -107,12 +107,12 @@ def network_mask(model: Any, threshold: float = 0.5, size: tuple[int, int] | Non
     threshold : float
         Pixels above it belong to cables.
     size : (int, int), optional
-        Height and width that the network wants; the image is resized to it and the answer back.
+        Height and width of the network's input. The image is resized to it, and the result is resized back.
 
     Raises
     ------
     ValueError
-        A file that cannot be read, or (when used) an answer of another shape.
+        A file that cannot be read, or (on use) a result of another shape.
     ImportError
         OpenCV or torch is not installed.
     """

@@ -25,9 +25,9 @@ class Crossing:
     ----------
     point : ndarray of shape (2,) [px]
     over, under : (int, int)
-        Cable and row of its centreline; the same cable twice where it crosses itself.
+        Cable, and row of its centreline. Both name the same cable if it crosses itself.
     confidence : float
-        That `over` is over: 0 where nothing is known, as from a mask alone, up to 1.
+        Confidence in the order, from 0 (unknown, as from a mask alone) to 1.
     """
 
     point: Array
@@ -43,9 +43,9 @@ class Joint:
     Attributes
     ----------
     point : ndarray of shape (2,) [px]
-        The end.
+        End of the cable that ends.
     end, through : (int, int)
-        Cable and row of the cable that ends and of the one that goes on.
+        Cable and row of the cable that ends, and of the cable that continues.
     """
 
     point: Array
@@ -55,7 +55,7 @@ class Joint:
 
 @dataclass(eq=False)
 class Ambiguity:
-    """A place where another reading of the picture is almost as good.
+    """A place where another interpretation of the picture is almost as good.
 
     Attributes
     ----------
@@ -76,14 +76,14 @@ class Tracing:
     Attributes
     ----------
     centrelines : list of ndarray of shape (n, 2) [px]
-        x, y from end to end, rows at most 2 px apart.
+        x, y of each cable from end to end, with rows at most 2 px apart.
     widths : list of ndarray of shape (n,) [px]
     closed : list of bool
-        A ring; its first row is not repeated at the end.
+        True for a ring; its first row is not repeated at the end.
     labels : ndarray of int32, shape (height, width)
-        0 is background, cable i has i + 1.
+        Label of each pixel: 0 for background, i + 1 for cable i.
     crossings : list of Crossing
-        Every two strands that cross; three cables at one point are three crossings.
+        Crossings of pairs of strands; three cables at one point have three crossings.
     joints : list of Joint
     ambiguous : list of Ambiguity
     timings : dict of str to float [s]
@@ -100,18 +100,19 @@ class Tracing:
     timings: dict[str, float] = field(default_factory=dict)
 
     def points(self, cable: int, camera: Camera, height: float = 0.0, radius: float | None = None) -> Array:
-        """The centreline of a cable in metres, for ``Scene.add_rod(points=...)``.
+        """Return the centreline of a cable in metres, for ``Scene.add_rod(points=...)``.
 
         Parameters
         ----------
         cable : int
+            Index of the cable.
         camera : Camera
         height : float [m]
-            z of the plane that the cables lie in (their centrelines).
+            z of the plane of the centrelines.
         radius : float, optional [m]
-            Of the cables: upper strands are lifted over lower ones by two radii and a tenth, towards the camera, so
-            that rods do not start inside each other. What a camera that is calibrated on the plane only sees of that
-            height is left out.
+            Radius of the cables. With a radius, upper strands are lifted over lower ones by 2.1 radii, towards the
+            camera, so that rods do not start inside each other. For a camera that is calibrated on the plane only, the
+            effect of this height on the picture is neglected.
 
         Returns
         -------
@@ -120,7 +121,7 @@ class Tracing:
         Raises
         ------
         ValueError
-            No such cable, a radius that is not positive, or pixels that do not see the plane.
+            A missing cable, a radius that is not positive, or pixels that do not see the plane.
         """
         if not -len(self) <= cable < len(self):
             raise ValueError(f"cable must be from 0 to {len(self) - 1}, got {cable}")
@@ -137,7 +138,7 @@ class Tracing:
         return points
 
     def to_dict(self) -> dict[str, Any]:
-        """Every field in plain Python objects that JSON can hold; labels as runs (label, length) row by row."""
+        """Return all fields as plain Python objects for JSON; labels as runs (label, length) row by row."""
         flat = self.labels.ravel()
         starts = np.flatnonzero(np.diff(flat, prepend=-1)) if len(flat) else np.zeros(0, int)
         lengths = np.diff(np.append(starts, len(flat)))
@@ -168,7 +169,7 @@ class Tracing:
         Raises
         ------
         ValueError
-            Another format, or a version that this one does not know.
+            Another format, or an unknown version.
         """
         if fields.get("format") != "withe tracing" or fields.get("version") != FORMAT_VERSION:
             raise ValueError(

@@ -1,7 +1,7 @@
-"""Pictures of cables whose centrelines and order are known, for tests and benchmarks.
+"""Pictures of cables with known centrelines and order, for tests and benchmarks.
 
-Masks are exact: a pixel belongs to a cable when its centre is within half a width of the centreline, cut straight
-at the ends. Pictures are shaded like round cables under a lamp, with grain and shadows of the upper cable on the lower.
+Masks are exact: a pixel belongs to a cable if its centre is within half a width of the centreline. Ends are cut
+straight. Pictures show round cables under a lamp, with grain, and with shadows of upper cables on lower ones.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ Array = NDArray[np.float64]
 
 @dataclass
 class TrueCrossing:
-    """Crossing of two strands: the place and, for either strand, cable and arc length [px]."""
+    """Crossing of two strands: its place, and the cable and arc length [px] of either strand."""
 
     point: Array
     over: tuple[int, float]
@@ -59,7 +59,7 @@ class SyntheticScene(ShortRepr):
     closed : list of bool
     crossings : list of TrueCrossing
     cut : list of bool
-        Ends cut straight, or round.
+        True for cables with straight ends, False for round ends.
     """
 
     mask: NDArray[np.bool_]
@@ -118,7 +118,7 @@ def render_mask(
     shape: tuple[int, int],
     cut: Sequence[bool] | None = None,
 ) -> NDArray[np.bool_]:
-    """Mask of cables with the given centrelines [px] and widths [px], cut straight or (`cut` False) with round ends."""
+    """Return the mask of cables with the given centrelines and widths [px]; ends are round if `cut` is False."""
     mask = np.zeros(shape, bool)
     for i, (line, width, ring) in enumerate(zip(centrelines, widths, closed, strict=True)):
         for _, rows, columns, distance, _ in _boxes(line, ring, width / 2 + 1, shape, cut is None or cut[i]):
@@ -308,7 +308,7 @@ def _random_lines(
 
 
 def make_case(case: str, seed: int, scale: float = 1.0, shape: tuple[int, int] = (480, 640)) -> SyntheticScene:
-    """One random scene of a kind.
+    """Return a random scene of a kind.
 
     Parameters
     ----------
@@ -317,7 +317,7 @@ def make_case(case: str, seed: int, scale: float = 1.0, shape: tuple[int, int] =
     seed : int
         Equal seeds give equal scenes.
     scale : float
-        Of lengths and widths; 1 is cables 8 to 12 px wide.
+        Scale of lengths and widths. With 1 the cables are 8 to 12 px wide.
     shape : (int, int)
         Height and width of the picture [px].
 
@@ -411,23 +411,22 @@ def render(
     grain: float = 6.0,
     shadow: float = 0.45,
 ) -> NDArray[np.uint8]:
-    """A picture of a scene.
+    """Render a picture of a scene.
 
     Parameters
     ----------
     scene : SyntheticScene
     rng : numpy.random.Generator
         For the direction of the light and the grain.
-    colours : sequence of (red, green, blue) from 0 to 255, optional
-        One a cable; by default random bright ones.
-    background : (red, green, blue)
+        Random generator of the direction of the light and the grain. One a cable; by default random bright ones.
+        Colour of each cable; by default random bright ones.
     shading : float
         How much darker the flank turned away from the lamp is, from 0 to 1.
-    grain : float
-        Standard deviation of the noise [grey levels].
+        Darkening of the flank that faces away from the lamp, from 0 to 1. Standard deviation of the noise [grey
+        levels].
     shadow : float
         How much the shadow of the upper strand darkens the lower one, from 0 to 1.
-
+        Darkening of the lower strand by the shadow of the upper one, from 0 to 1.
     Returns
     -------
     ndarray of uint8, shape (height, width, 3)

@@ -26,14 +26,14 @@ def refine_square(gray: NDArray[np.uint8], quad: Array, cells: int) -> Array:
     ----------
     gray : ndarray of shape (height, width), uint8
     quad : ndarray of shape (4, 2) [px]
-        Corners, clockwise in the picture, right to a pixel or two.
+        Corners, clockwise in the picture, accurate to a pixel or two.
     cells : int
-        How many cells of the tag a side is long: one is the width of the black border, and of the white around it.
+        Length of a side in cells of the tag. The black border, and the white around it, are one cell wide.
 
     Returns
     -------
     ndarray of shape (4, 2) [px]
-        The corners as they were where a side cannot be seen whole.
+        Corners. They are unchanged if a side is not fully visible.
     """
     corners = quad
     for _ in range(_ROUNDS):

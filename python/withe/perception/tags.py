@@ -1,4 +1,4 @@
-"""AprilTags in pictures, and where their plane is."""
+"""AprilTags in pictures, and the plane that they lie in."""
 
 from __future__ import annotations
 
@@ -32,15 +32,15 @@ class TagDetection(ShortRepr):
     ----------
     numbers : tuple of int
     corners : ndarray of shape (tags, 4, 2) [px]
-        Of the black squares, clockwise from the upper left of the tag; the middle of the first pixel is at (0, 0).
+        Corners of the black squares, clockwise from the upper left of the tag. The centre of the first pixel is (0, 0).
     centers : ndarray of shape (tags, 2) [px]
-        Where the diagonals meet.
+        Intersections of the diagonals.
     angles : ndarray of shape (tags,) [rad]
-        Of the tags' x axes in the picture, clockwise from its x axis.
+        Angles of the tags' x axes in the picture, clockwise from the x axis of the picture.
     positions : ndarray of shape (tags, 3) [m], or None
-        Of the centres, from the camera, on the plane that fits all tags. None without the camera's matrix.
+        Positions of the centres relative to the camera, on the plane that fits all tags. None without `camera_matrix`.
     normal : ndarray of shape (3,), or None
-        Of that plane, towards the camera.
+        Normal of that plane, towards the camera.
     """
 
     numbers: tuple[int, ...]
@@ -51,7 +51,7 @@ class TagDetection(ShortRepr):
     normal: Array | None
 
     def pixels(self, numbers: Sequence[int]) -> Array:
-        """Centres of the tags of these numbers, shape (n, 2) [px]; NaN for one that was not found.
+        """Return the centres of the tags with these numbers, shape (n, 2) [px]; NaN for tags that were not found.
 
         Parameters
         ----------
@@ -74,13 +74,13 @@ def detect_tags(
 ) -> TagDetection:
     """Find AprilTags in a picture [Olson 2011; Wang and Olson 2016], by OpenCV.
 
-    All tags are taken to lie in one plane: one small tag alone tells its depth and tilt badly.
+    All tags must lie in one plane, because one small tag alone determines its depth and tilt badly.
 
     Parameters
     ----------
     image : array_like of shape (height, width) or (height, width, 3), uint8, or path
     camera_matrix : array_like of shape (3, 3), optional [px]
-        For positions in metres.
+        Matrix of the camera, for positions in metres.
     size : float [m]
         Side of the tags' black squares.
     family : {"16h5", "25h9", "36h10", "36h11"}
@@ -90,12 +90,12 @@ def detect_tags(
     Returns
     -------
     TagDetection
-        Without any tag, if none was found.
+        Detection, which is empty if no tag was found.
 
     Raises
     ------
     ValueError
-        No picture, a singular matrix, a size that is not positive, or a tag where the lens shows no direction.
+        Not a picture, a singular matrix, a size that is not positive, or a tag outside of the range of the distortion.
     ImportError
         OpenCV is not installed.
     """

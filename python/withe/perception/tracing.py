@@ -1,4 +1,4 @@
-"""From an image or a mask to cables."""
+"""Tracing: from an image or a mask to cables."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def _as_array(values: ArrayLike, name: str) -> NDArray[Any]:
 
 
 def check_mask(mask: ArrayLike, name: str = "mask") -> NDArray[np.uint8]:
-    """A mask as bytes, row by row, or a ValueError that says what is wrong with it."""
+    """Return a mask as bytes, row by row, or raise ValueError with the reason."""
     array = _as_array(mask, name)
     if array.ndim != 2:
         raise ValueError(f"{name} must have shape (height, width), got {array.shape}")
@@ -58,7 +58,7 @@ def _tracing(found: dict[str, Any]) -> Tracing:
 
 
 def check_image(image: ArrayLike, name: str = "image") -> NDArray[np.uint8]:
-    """A picture as RGB bytes, row by row, or a ValueError that says what is wrong with it."""
+    """Return a picture as RGB bytes, row by row, or raise ValueError with the reason."""
     array = _as_array(image, name)
     shape = array.shape
     if array.ndim == 2:
@@ -77,12 +77,12 @@ def check_image(image: ArrayLike, name: str = "image") -> NDArray[np.uint8]:
 
 
 def read_image(path: str | os.PathLike[str], name: str = "image") -> NDArray[np.uint8]:
-    """The picture in a file as RGB bytes.
+    """Read a picture from a file as RGB bytes.
 
     Raises
     ------
     ValueError
-        No such file, or none that OpenCV can read.
+        The file does not exist, or OpenCV cannot read it.
     """
     cv2 = require("cv2", "vision")
     try:
@@ -157,19 +157,19 @@ def trace_mask(mask: ArrayLike, method: Method = "withe") -> Tracing:
     Parameters
     ----------
     mask : array_like of shape (height, width)
-        Booleans, or numbers of which zero is background.
+        Booleans, or numbers where zero is background.
     method : {"withe", "mbest"}
-        Ours, or the published one as it is described, for comparison.
+        Method of this package, or the published one for comparison.
 
     Returns
     -------
     Tracing
-        Empty where there is nothing like a cable: an empty or a full mask, single pixels.
+        Tracing, which is empty if nothing resembles a cable: an empty or a full mask, or single pixels.
 
     Raises
     ------
     ValueError
-        A mask of another shape or type, or not finite.
+        A mask of another shape or type, or values that are not finite.
 
     Examples
     --------
