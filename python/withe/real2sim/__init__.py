@@ -1,4 +1,4 @@
-"""Simulations that look like what a camera saw: logs, targets, fits and cameras.
+"""Fits of simulations to camera data: logs, targets, fits and cameras.
 
 >>> import withe
 >>> log = withe.real2sim.read_log("log.csv", tags=range(101, 110))  # doctest: +SKIP

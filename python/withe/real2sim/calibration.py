@@ -1,4 +1,4 @@
-"""The camera that sees tags of a robot that moves in a plane, found with the robot's own shapes."""
+"""Calibration of a camera that sees tags of a planar robot, together with the shapes of the robot."""
 
 from __future__ import annotations
 
@@ -38,23 +38,23 @@ _SIDE = "side of the plane on which the camera is"
 
 
 class Calibration(Camera):
-    """A camera at right angles to the plane in which a robot moves, and where its tags are.
+    """A camera perpendicular to the plane in which a robot moves, and the places of its tags.
 
     Attributes
     ----------
     roll : float [rad]
-        By which the picture is turned clockwise against the vertical.
+        Clockwise rotation of the picture against the vertical.
     scale : float [px/m]
     tilt : float [rad]
-        Of the base, towards positive curvature; 0 unless it was free.
+        Tilt of the base, towards positive curvature; 0 unless it was fitted.
     places : list of (str, float)
         Rod and length along it [m] of every tag, for `Tags`.
     gravity : ndarray of shape (3,) [m/s^2]
-        That the simulation is to have: turned back by the tilt.
+        Gravity for the simulation: turned back by the tilt.
     residuals : ndarray of shape (frames, tags, 2) [px]
-        Simulated less seen in the frames that were used.
+        Simulated minus observed positions in the frames that were used.
     unobservable : tuple of Unobservable
-        What these frames cannot tell apart: print them.
+        Combinations of unknowns that these frames do not determine. Print them.
     """
 
     roll: float
@@ -72,7 +72,7 @@ class Calibration(Camera):
 
     @property
     def rms(self) -> float:
-        """Root of the mean square distance of tags from where they were seen [px]."""
+        """Root mean square distance of tags from their observed positions [px]."""
         return float(np.sqrt(np.nanmean((self.residuals**2).sum(axis=2))))
 
 

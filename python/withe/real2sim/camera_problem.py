@@ -1,4 +1,4 @@
-"""Pixels of tags by the shape of a robot, how it is seen, and where on it the tags are."""
+"""Pixels of tags from the shape of a robot, its view, and the places of the tags."""
 
 from __future__ import annotations
 
@@ -34,27 +34,28 @@ class View:
         self.axes = np.array([[cosine, -sine], [sine, cosine]]) @ axes  # right and down in the picture, (2, 3)
 
     def scaled(self, points: FloatArray) -> FloatArray:
-        """Pixels of points, shape (n, 3) [m], from where the origin is seen."""
+        """Pixels of points, shape (n, 3) [m], relative to the pixel of the origin."""
         return np.asarray(self.scale * points @ self.axes.T)
 
 
 class CameraProblem:
     """Residuals of tags in pixels.
 
-    Coordinates: those of the unknowns, roll [rad], logarithm of scale [px/m], offset (2) [px], places of tags [m].
+    The coordinates are those of the unknowns, roll [rad], logarithm of scale [px/m], offset (2) [px], places of tags
+    [m].
 
     Parameters
     ----------
     side : {1, -1}
-        From which side the plane is seen: that from which tags are, on the mean, to the same side of the first as they
-        are drawn, or the other one.
+        Side from which the camera sees the plane. With 1, the mean of the tags is on the same side of the first tag as
+        drawn.
 
     Attributes
     ----------
     begin : ndarray of shape (coordinates,)
-        A level camera with the scale of the tags' distances in the picture.
+        Coordinates of a level camera whose scale follows from the distances of the tags in the picture.
     axes : ndarray of shape (2, 3)
-        Right and down in a level picture, in the world.
+        Directions right and down in a level picture, in the world.
     """
 
     def __init__(
@@ -81,7 +82,7 @@ class CameraProblem:
         self.names = [*self.equilibria.names, "roll of the camera", "scale", "offset right", "offset down", *tags]
 
     def free(self, words: Sequence[str]) -> BoolArray:
-        """Which coordinates are looked for."""
+        """Return True for the fitted coordinates."""
         free = np.ones(len(self.scales), bool)
         free[: self.count] = [name != Tilt.name or "tilt" in words for name in self.equilibria.names]
         free[self.count] = "roll" in words
@@ -97,7 +98,7 @@ class CameraProblem:
         return View(coordinates[self.count :], self.axes)
 
     def residual(self, coordinates: FloatArray, frame: int) -> tuple[FloatArray, FloatArray] | None:
-        """Pixels simulated less seen, and positions of nodes; None where there is no equilibrium."""
+        """Return simulated minus observed pixels, and positions of nodes; None if there is no equilibrium."""
         try:
             positions = self.equilibria.positions(coordinates[: self.count], frame)
         except (ConvergenceError, ValueError):

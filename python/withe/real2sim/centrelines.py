@@ -1,4 +1,4 @@
-"""Centrelines of rods as targets, and the rest shape of a rod that sags."""
+"""Centrelines of rods as targets, and the fit of the rest shape of a sagging rod."""
 
 from __future__ import annotations
 
@@ -33,25 +33,26 @@ _CHANCE = 1e-6  # probability below which a gain by more functions is none of ch
 
 @dataclass(eq=False, repr=False)
 class Centrelines(ShortRepr, Target):
-    """Points seen along rods, without knowing which point of the rod each is.
+    """Points seen along rods, without their arc lengths.
 
-    A residual is the way from a seen point to the nearest one of the simulated line; in pixels the distance, to the
-    left of the line positive. With `ends`, the first and the last point are the ends of the line, in either order.
+    A residual is the vector from an observed point to the nearest point of the simulated line. In pixels it is the
+    distance, positive to the left of the line. With `ends`, the first and the last point are the ends of the line, in
+    either order.
 
     Parameters
     ----------
     points : sequence of array_like of shape (n, 2) [px] or (n, 3) [m]
-        One a frame, such as the centrelines of `perception.trace`; without any point where nothing was seen. Pixels
+        Points of each frame, such as the centrelines of `perception.trace`. A frame without data has no points. Pixels
         need a camera.
     rods : Rod, str, or several
-        Rods that go on end to end.
+        Rods that continue each other end to end.
     camera : perception.Camera, optional
     ends : bool
-        Whether the whole line was seen.
+        True if the whole line was seen.
     samples : int
-        Points to use of each centreline at most, about evenly along it.
+        Largest number of points to use per centreline, about evenly spaced.
     sigma : float, optional [px or m]
-        Standard deviation of a coordinate; estimated from what a fit leaves where it is not given.
+        Standard deviation of a coordinate. By default estimated from the residuals.
     times : array_like of shape (frames,), optional [s]
 
     Raises
@@ -89,16 +90,17 @@ class Centrelines(ShortRepr, Target):
         return len(self.points)
 
     def told(self, frame: int) -> int:
-        """Numbers that a frame tells: a point tells where the line is across itself, an end all of it."""
+        """Number of observations in a frame. A point determines the line only across itself, an end in all
+        directions."""
         points = np.asarray(self.points[frame])
         return points.size - len(points) + (2 if self.ends and len(points) else 0)
 
     def across(self, normal: FloatArray) -> FloatArray:
-        """The normal at each point; none in pixels."""
+        """Return the normal at each point; nothing in pixels."""
         return across_of_points(self.samples, normal, self.camera is None)
 
     def bind(self, simulation: Simulation) -> Residual:
-        """The residual for the nodes of a simulation."""
+        """Return the residual for the nodes of a simulation."""
         given = [self.rods] if isinstance(self.rods, Rod | str) else list(self.rods)
         lines = lines_of(simulation, [rod_part(simulation, rod) for rod in given])
         if len(lines) != 1:

@@ -1,4 +1,4 @@
-"""Numbers for which a simulation looks like what a camera saw."""
+"""Fits of parameters to the equilibria that a camera saw."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From the solutions of frames to what a user gets: values, covariances, what was not told, what jumped."""
+"""Results of fits from the solutions of frames: values, covariances, unobservable combinations, outliers."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ def gather(
     frames: int,
     step_error: FloatArray | None = None,
 ) -> Fit:
-    """The result of a fit.
+    """Return the result of a fit.
 
     Parameters
     ----------
     step_error : ndarray of shape (residuals,), optional
-        Of a motion: error of its residuals that the time step makes.
+        For a motion: error of the residuals due to the time step.
     """
     count = len(stills.names)
     coordinates = np.full((frames, count), np.nan)
@@ -133,7 +133,7 @@ def _told(targets: list[Target], fitted: int, residuals: FloatArray, normal: Flo
 
 
 def persistence(rows: FloatArray) -> float:
-    """Correlation of residuals of successive frames or points, shape (n, numbers) -> [-]; 0: chance explains it."""
+    """Correlation of residuals of successive frames or points, shape (n, numbers) -> [-]; 0 if chance explains it."""
     first, second = rows[:-1].ravel(), rows[1:].ravel()
     both = np.isfinite(first) & np.isfinite(second) & ((first != 0.0) | (second != 0.0))
     first, second = first[both], second[both]

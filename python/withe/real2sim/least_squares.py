@@ -1,4 +1,4 @@
-"""Gauss-Newton: frame by frame, or all frames at once where they share unknowns."""
+"""Gauss-Newton: frame by frame, or all frames at once if they share unknowns."""
 
 from __future__ import annotations
 
@@ -42,16 +42,16 @@ _SMALL_AT_KINK, _USEFUL = 5e-2, 0.1
 
 
 class Problem(Protocol):
-    """Residuals of frames, in units of their standard deviation, NaN where there is none."""
+    """Residuals of frames, in units of their standard deviation; NaN for missing data."""
 
     scales: FloatArray
     per_frame: BoolArray
 
     def residual(self, coordinates: FloatArray, frame: int) -> tuple[FloatArray, FloatArray] | None:
-        """Residual and state of a frame, or None where there is none."""
+        """Return residual and state of a frame, or None if there is no solution."""
 
     def jacobian(self, coordinates: FloatArray, state: FloatArray, frame: int) -> FloatArray:
-        """Derivatives of the residual by the coordinates, at the state that was asked for last."""
+        """Return derivatives of the residual by the coordinates, at the state that was computed last."""
 
 
 @dataclass(eq=False)
@@ -69,7 +69,7 @@ class FrameSolution:
 
 @dataclass(eq=False)
 class Weakness:
-    """A direction of coordinates over their scales that the targets tell little or nothing about."""
+    """A direction of scaled coordinates that the targets determine badly or not at all."""
 
     direction: FloatArray
     effect: float  # of a change by one scale, root of the mean square over the residuals
@@ -129,7 +129,7 @@ class Secants:
 
 
 def seen(residual: FloatArray) -> FloatArray:
-    """A residual without gaps: zero where nothing was seen."""
+    """Replace gaps in a residual by zero."""
     return np.where(np.isnan(residual), 0.0, residual)
 
 
@@ -146,14 +146,14 @@ def _size(residual: FloatArray) -> float:
 
 
 class Decomposed:
-    """A matrix, by its singular values, for least squares with several right sides.
+    """A matrix with its singular value decomposition, for least squares with several right-hand sides.
 
     Attributes
     ----------
     matrix : ndarray
     range, values, vectors : ndarray
-        Left singular vectors as columns, an orthonormal basis of what it reaches; its singular values, but for those
-        that are zero to rounding; right singular vectors as rows.
+        Left singular vectors as columns, which are an orthonormal basis of the range; the singular values that are not
+        zero to rounding; right singular vectors as rows.
     """
 
     def __init__(self, matrix: FloatArray) -> None:
@@ -163,7 +163,7 @@ class Decomposed:
         self.range, self.values, self.vectors = u[:, :rank], values[:rank], vectors[:rank]
 
     def bounded(self, right: FloatArray, radius: float) -> FloatArray:
-        """The x of least |matrix x - right| among those with no coordinate beyond a radius, by Levenberg's damping."""
+        """Return the x of least |matrix x - right| whose coordinates are within a radius, by Levenberg's damping."""
         values, along = self.values, right @ self.range
 
         def step(damping: float) -> FloatArray:
@@ -189,10 +189,10 @@ def lone_frame(
     secants: Secants | None = None,
     first: Decomposed | None = None,
 ) -> FrameSolution:
-    """Fit one frame, with the coordinates that are not free as they are.
+    """Fit one frame, with fixed values of the coordinates that are not free.
 
-    No coordinate changes by more than its scale in one step, and by a quarter of that when a step brings nothing. The
-    first step may be taken with derivatives, over scales, that another frame has nearby; no search ends with them.
+    A step changes each coordinate by at most its scale, and by a quarter of that after a step without progress. The
+    first step may use scaled derivatives of a nearby frame, but no search ends with them.
     """
     which: BoolArray | slice = slice(None) if free.all() else free
     scales = problem.scales[which]
@@ -257,10 +257,10 @@ def all_frames(
     max_iterations: int,
     progress: Callable[[], None] = lambda: None,
 ) -> dict[int, FrameSolution]:
-    """Fit all frames at once, for coordinates that they share and those that each has of its own.
+    """Fit all frames at once, with shared coordinates and coordinates of each frame.
 
-    The latter are eliminated frame by frame: with U the range of J_local, shared coordinates solve the least squares of
-    (I - U U^T) (J_shared x + r), stacked over frames.
+    The coordinates of each frame are eliminated frame by frame. With U the range of J_local, the shared coordinates
+    minimise the squares of (I - U U^T) (J_shared x + r), stacked over frames.
     """
     local = problem.per_frame
     points = {frame: start[frame].copy() for frame in frames}
@@ -336,7 +336,7 @@ class _Frame:
 
 
 def reduced(solutions: dict[int, FrameSolution], local: BoolArray) -> tuple[FloatArray, FloatArray]:
-    """Derivatives by shared coordinates, and residuals, without what each frame's own coordinates make good."""
+    """Derivatives by shared coordinates, and residuals, after elimination of the coordinates of each frame."""
     return _stacked([_Frame(solution, local) for solution in solutions.values()], 0.0)
 
 
@@ -390,18 +390,18 @@ def spectra(matrices: Sequence[FloatArray]) -> list[Spectrum]:
 
 
 def weaknesses(spectrum: Spectrum, rows: int, misfit: float) -> list[Weakness]:
-    """Directions in which a change by one scale moves the targets by less than the misfit, or than rounding.
+    """Directions in which a change by one scale moves the targets by less than the misfit, or than rounding errors.
 
-    Were the misfit systematic, the least squares could be off by more than the scale there.
+    If the misfit were systematic, the error of the fit in these directions could exceed the scale.
 
     Parameters
     ----------
     spectrum : Spectrum
-        Of derivatives by coordinates over their scales.
+        Spectrum of the derivatives by scaled coordinates.
     rows : int
-        Residuals that were seen.
+        Number of observed residuals.
     misfit : float
-        Root of the mean square of the residuals.
+        Root mean square of the residuals.
     """
     if rows == 0:
         return []

@@ -1,4 +1,4 @@
-"""Logs of experiments: where a camera saw which tag, and when."""
+"""Logs of experiments: pixels and times of tags."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ class Log(ShortRepr):
     Attributes
     ----------
     times : ndarray of shape (frames,) [s]
-        Since the first frame.
+        Times since the first frame.
     pixels : ndarray of shape (frames, tags, 2) [px]
-        Centres of the tags, x to the right and y down; NaN where a tag was not seen.
+        Centres of the tags, x to the right and y down; NaN for tags that were not seen.
     valid : ndarray of bool of shape (frames, tags)
-        Where it was.
+        True for tags that were seen.
     tags : tuple of int
         Numbers of the tags, in the order of the arrays.
     """
@@ -51,10 +51,10 @@ def read_log(
     time: str | None = None,
     time_unit: float = 1e-3,
 ) -> Log:
-    """Read a log of tags in pixels, a row a frame, from a file of comma-separated values.
+    """Read a log of tags in pixels from a file of comma-separated values, with one row per frame.
 
-    Columns are named in the first row: tagid_x_101 and tagid_y_101 for tag 101. A tag was not seen where they are empty
-    or both 0. Empty rows at the end are no frames.
+    The first row names the columns: tagid_x_101 and tagid_y_101 for tag 101. A tag without values, or with two zeros,
+    was not seen. Empty rows at the end are ignored.
 
     Parameters
     ----------
@@ -62,11 +62,11 @@ def read_log(
     tags : iterable of int
         Numbers of the tags to read, along the rod.
     skip : int
-        Rows after the names to leave out.
+        Number of rows to skip after the names.
     time : str, optional
-        Name of the column of times; the first one by default.
+        Name of the column of times. By default the first column.
     time_unit : float [s]
-        What 1 means there; milliseconds by default.
+        Unit of the times. By default milliseconds.
 
     Returns
     -------
@@ -75,8 +75,7 @@ def read_log(
     Raises
     ------
     ValueError
-        No such file, a column that is missing, something that is no number, times that do not grow, or no frame in
-        which a tag was seen.
+        The file or a column is missing, a value is not a number, times do not increase, or no frame shows a tag.
 
     Examples
     --------

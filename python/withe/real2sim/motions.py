@@ -1,4 +1,4 @@
-"""Numbers for which a run looks like what a camera saw of a motion."""
+"""Fits of parameters to a motion that a camera saw."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tags that jump in one frame against what a fit leaves of them in the frames around."""
+"""Outliers: tags that jump in one frame relative to their residuals in the neighbouring frames."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def find_outliers(
     -------
     outliers : tuple of Outlier
     checked : ndarray of bool of shape (frames, tags)
-        False for tags that were not seen, or that too few frames around or too few other tags tell of.
+        False for tags that were not seen, or that too few neighbouring frames or other tags can check.
     """
     own = {
         frame: s.jacobian[:, per_frame] if s.jacobian.shape[1] == len(per_frame) else s.jacobian

@@ -1,4 +1,4 @@
-"""Unknowns of fits, as users give them, checked."""
+"""Parsing and checks of the unknowns of fits."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ __all__ = ["parse_unknowns"]
 def parse_unknowns(
     simulation: Simulation, unknowns: Sequence[Any], what: str = "unknowns", others: Sequence[Unknown] = ()
 ) -> list[Unknown]:
-    """Unknowns of what a user gave: tuples (part, word) or (rod, "points", basis).
+    """Return the unknowns of a user's tuples (part, word) or (rod, "points", basis).
 
     Raises
     ------
     ValueError
-        Something else, a word that cannot be unknown, the same one twice, or one beside others that set all it sets.
+        Another type, a word that cannot be fitted, an unknown given twice, or one that others replace completely.
     """
     if isinstance(unknowns, str) or not isinstance(unknowns, Sequence):
         raise ValueError(f"{what} must be a list such as [(arm, 'natural_curvature', 'constant')], got {unknowns!r}")

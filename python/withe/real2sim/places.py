@@ -1,4 +1,4 @@
-"""Points of rods that a camera knows: nodes, and places between them."""
+"""Points of rods that a camera identifies: nodes, and places between nodes."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ def rod_part(simulation: Simulation, rod: Rod | str) -> RodPart:
 
 
 def node_count(simulation: Simulation) -> int:
-    """Nodes of the whole scene."""
+    """Number of nodes of the scene."""
     return simulation._session.directory.layout.node_count
 
 
 @dataclass(eq=False)
 class Line:
-    """Rods that go on end to end, as one line of nodes."""
+    """Rods that continue each other end to end, as one line of nodes."""
 
     rods: list[RodPart]
     offsets: list[float]  # length at which each rod begins [m]
@@ -40,7 +40,7 @@ class Line:
 
 
 def lines_of(simulation: Simulation, rods: Sequence[RodPart]) -> list[Line]:
-    """Rods, in the order given, as few lines as they make where one starts at the end of the one before it."""
+    """Join rods, in the given order, to as few lines as possible; a rod may start at the end of the previous one."""
     layout = simulation._session.directory.layout
     lines: list[Line] = []
     for part in rods:
@@ -65,14 +65,14 @@ class Places:
     ----------
     simulation : Simulation
     places : sequence
-        Each a node, or a rod and a length along it from its start as drawn [m].
+        Nodes, or pairs of a rod and a length along it from its start as drawn [m].
 
     Attributes
     ----------
     lines : list of Line
-        One of each place.
+        Line of each place.
     arcs : ndarray of shape (places,) [m]
-        Where on its line each place lies.
+        Arc length of each place on its line.
     """
 
     def __init__(self, simulation: Simulation, places: Sequence[Place]) -> None:
@@ -105,7 +105,7 @@ class Places:
     def weights(self, arcs: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
         """Weights of nodes, and their derivatives by the lengths along the lines.
 
-        Places lie on the straight edges between nodes, and beyond the ends on the line of the last edge.
+        Places lie on the straight edges between nodes; beyond the ends, on the line of the last edge.
 
         Returns
         -------
@@ -124,7 +124,7 @@ class Places:
 
 
 def turning_axis(simulation: Simulation, part: RodPart) -> tuple[FloatArray, FloatArray] | None:
-    """In a plane: the components of curvature in it, shape (2,), and the axis about which positive curvature turns.
+    """Components of curvature in the plane, shape (2,), and the axis of positive curvature, for a planar scene.
 
     None in space.
     """

@@ -21,16 +21,16 @@ _ROWS_SHOWN = 8  # of each kind, in print
 
 @dataclass(frozen=True)
 class Outlier:
-    """A tag that jumped in one frame against what the fit left of it in the frames around.
+    """A tag that jumped in one frame relative to its residuals in the neighbouring frames.
 
-    That is a tag whose error, were it left out of the fit of its frame, is more than four times the usual one. Errors
-    count over the standard deviation that is to be expected: where few other tags or frames tell, more is needed. With
-    normal errors the limit is 7 sigma in pixels and 9 in metres; below it, a tag biases its frame unnamed.
+    A tag is an outlier if its error in a fit without the tag exceeds four times the usual error. Errors are relative to
+    their expected standard deviation, so the limit is higher if few other tags or frames can check the tag. For normal
+    errors the limit is 7 sigma in pixels and 9 sigma in metres. Smaller errors bias the frame without being reported.
 
     Attributes
     ----------
     frame, tag : int
-        From 0.
+        Indices, from 0.
     jump : float
         Distance between the residual of the tag and its prediction from the neighbouring frames, for a fit without the
         tag, in the unit of the target [px or m].
@@ -166,12 +166,12 @@ class Fit:
 
     @property
     def skipped(self) -> tuple[int, ...]:
-        """Frames in which nothing was seen."""
+        """Frames without observations."""
         return tuple(int(i) for i in np.flatnonzero(np.isnan(self.residuals).all(axis=1)))
 
     @property
     def rms(self) -> FloatArray:
-        """Root of the mean square of every frame's residuals, shape (frames,); NaN where nothing was seen."""
+        """Root mean square of every frame's residuals, shape (frames,); NaN without observations."""
         known = np.isfinite(self.residuals)
         sums = np.where(known, self.residuals, 0.0) ** 2
         counts = known.sum(axis=1)
@@ -180,33 +180,33 @@ class Fit:
         )
 
     def value(self, rod: Rod | str, word: str = "natural_curvature") -> FloatArray:
-        """Values of one unknown, shape (frames, n): of a rod, or `value("delay")`.
+        """Return the values of one unknown, shape (frames, n): of a rod, or `value("delay")`.
 
         Raises
         ------
         ValueError
-            It was none.
+            It was not an unknown of the fit.
         """
         return self.values[:, self._place(rod, word)]
 
     def sigma(self, rod: Rod | str, word: str = "natural_curvature") -> FloatArray:
-        """Standard deviations of one unknown, shape (frames, n)."""
+        """Return the standard deviations of one unknown, shape (frames, n)."""
         deviations = np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
         return np.asarray(deviations[:, self._place(rod, word)])
 
     def apply(self, simulation: Simulation, frame: int = -1) -> None:
-        """Set in a simulation what was found for a frame.
+        """Set the values of a frame in a simulation.
 
         Parameters
         ----------
         simulation : Simulation
-            The one that was fitted, or another of the same scene.
+            The fitted simulation, or another one of the same scene.
         frame : int
 
         Raises
         ------
         ValueError
-            A frame that was skipped, or another scene.
+            A skipped frame, or another scene.
         """
         coordinates = self._coordinates[frame]
         if not np.isfinite(coordinates).all():
@@ -217,12 +217,12 @@ class Fit:
             unknown.write(simulation, coordinates[end - len(unknown) : end])
 
     def points(self, rod: Rod | str, frame: int = -1) -> FloatArray:
-        """Nodes of a rod as it was drawn, shape (nodes, 3) [m], for what was found of its ``points``.
+        """Return the drawn nodes of a rod, shape (nodes, 3) [m], from its fitted ``points``.
 
         Raises
         ------
         ValueError
-            They were not unknown.
+            The ``points`` of the rod were not fitted.
         """
         place = self._place(rod, "points")
         name = rod if isinstance(rod, str) else rod.name

@@ -1,4 +1,4 @@
-"""Other ways to fit a frame: L-BFGS, and the gradient descent that was published."""
+"""Other methods to fit a frame: L-BFGS, and the published gradient descent."""
 
 from __future__ import annotations
 
@@ -15,20 +15,21 @@ __all__ = ["Slope", "descend", "minimise", "minimise_by"]
 
 FloatArray = npt.NDArray[np.float64]
 Slope = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
-"""Derivatives of half the sum of squared residuals: by coordinates, from them, the state, and the residuals seen."""
+"""Derivatives of half the sum of squared residuals by coordinates, from coordinates, state, and residuals without
+gaps."""
 
 _FIRST_STEP = 0.1  # of Algorithm 6
 _INCREMENT = 1e-3  # its epsilon, which is not printed [rad]; 1e-6 to 1e-2 all do
 
 
 class Counted(Problem, Protocol):
-    """Says how many equilibria or runs it has solved."""
+    """A problem that counts its solved equilibria or runs."""
 
     solves: int
 
 
 def minimise(stills: Stills, frame: int, start: FloatArray, tolerance: float, max_iterations: int) -> FrameSolution:
-    """Half the sum of squared residuals by SciPy's L-BFGS-B."""
+    """Minimise half the sum of squared residuals by SciPy's L-BFGS-B."""
 
     def slope(coordinates: FloatArray, state: FloatArray, residual: FloatArray) -> FloatArray:
         return residual @ np.nan_to_num(stills.jacobian(coordinates, state, frame))
@@ -39,7 +40,7 @@ def minimise(stills: Stills, frame: int, start: FloatArray, tolerance: float, ma
 def minimise_by(
     problem: Counted, frame: int, start: FloatArray, slope: Slope, change: float, max_iterations: int
 ) -> FrameSolution:
-    """The same for any problem; ends when an iteration changes the sum by no more than so much of it."""
+    """Minimise a problem; end when an iteration changes the sum relatively by at most `change`."""
     from scipy.optimize import minimize
 
     def loss(unit: FloatArray) -> tuple[float, FloatArray]:
@@ -57,10 +58,10 @@ def minimise_by(
 
 
 def descend(stills: Stills, frame: int, start: FloatArray, tolerance: float, max_iterations: int) -> FrameSolution:
-    """Gradient descent on the sum of absolute residuals, by forward differences [Algorithm 6].
+    """Minimise the sum of absolute residuals by gradient descent with forward differences [Algorithm 6].
 
-    The unknowns are whole turns, natural curvature times a limb's length [rad]. The step begins at 0.1 in every frame,
-    and is halved whenever the loss grew.
+    The unknowns are the total rotations of limbs, natural curvature times length [rad]. The step begins at 0.1 in every
+    frame, and is halved whenever the loss grows.
     """
     turns = start / stills.scales
     step, previous = _FIRST_STEP, np.inf

@@ -1,4 +1,4 @@
-"""Shapes and places that are looked for: natural curvature, rods as they were drawn, poses of supports."""
+"""Unknown shapes and poses: natural curvature, drawn shapes of rods, poses of supports."""
 
 from __future__ import annotations
 
@@ -89,10 +89,10 @@ class NaturalTwist(_NaturalStrain):
 
 
 class DrawnShape(Unknown):
-    """The shape of a rod in a plane as it was drawn: by how much each edge is turned [rad].
+    """The drawn shape of a rod in a plane, by the rotations of its edges [rad].
 
-    As if the scene were built anew: natural curvature follows, and supports go where the nodes are drawn. Edges keep
-    their lengths, and the first node its place.
+    It acts as if the scene were built again: natural curvature and supports follow the drawing. Edges keep their
+    lengths, and the first node its position.
     """
 
     word, per_frame = "points", False
@@ -124,11 +124,11 @@ class DrawnShape(Unknown):
 
     @property
     def supports(self) -> tuple[str, ...]:
-        """Names of those that hold the rod."""
+        """Names of the supports of the rod."""
         return tuple(support.name for support in self._held)
 
     def points(self, coordinates: FloatArray) -> FloatArray:
-        """Nodes as they are drawn, shape (nodes, 3) [m]."""
+        """Return the drawn nodes, shape (nodes, 3) [m]."""
         return self._drawn(coordinates)[0]
 
     def _drawn(self, coordinates: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -144,11 +144,11 @@ class DrawnShape(Unknown):
         return start + np.concatenate([np.zeros((1, 3)), ways]), turned
 
     def read(self, simulation: Simulation) -> FloatArray:
-        """As it was drawn."""
+        """Return the coordinates of the drawing."""
         return np.zeros(len(self))
 
     def write(self, simulation: Simulation, coordinates: FloatArray) -> None:
-        """Bend it, and move its supports."""
+        """Set the natural curvature, and move the supports."""
         simulation.set(self._rod, natural_curvature=self._first + self._by_turns @ coordinates)
         shift = self.points(coordinates) - self._part.points
         for support, (position, rotation) in zip(self._held, self._poses, strict=True):
@@ -159,7 +159,7 @@ class DrawnShape(Unknown):
 
     @property
     def words(self) -> list[Any]:
-        """Natural curvature, and poses of what holds the rod."""
+        """Natural curvature, and poses of the supports."""
         poses = [
             (support.name, word)
             for support in self._held
@@ -168,7 +168,7 @@ class DrawnShape(Unknown):
         return [(self._rod, "natural_curvature"), *poses]
 
     def chain(self, coordinates: FloatArray, found: list[list[Any]]) -> FloatArray:
-        """Edges before a node carry it about, and turn what holds it."""
+        """Derivatives by rotations of edges, which move all later nodes and turn their supports."""
         total = np.tensordot(np.array(found[0]), self._by_turns, axes=([1, 2], [0, 1]))
         by_words = dict(zip(self.words, found, strict=True))
         turned = self._drawn(coordinates)[1] * self._part.lengths[:, None]
@@ -216,7 +216,7 @@ class Pose(Unknown):
         self.names = tuple(f"{word} of {part.name!r} {_along(axis, word)}" for axis in self._axes)
 
     def read(self, simulation: Simulation) -> FloatArray:
-        """The first guess."""
+        """Return the initial guess."""
         return np.zeros(len(self))
 
     def write(self, simulation: Simulation, coordinates: FloatArray) -> None:
@@ -228,11 +228,11 @@ class Pose(Unknown):
 
     @property
     def words(self) -> list[Any]:
-        """The support."""
+        """Position or rotation of the support."""
         return [(self._name, self.word)]
 
     def chain(self, coordinates: FloatArray, found: list[list[Any]]) -> FloatArray:
-        """The way itself; of a rotation vector what it turns by further."""
+        """Derivatives by the position, or by the rotation vector through its left Jacobian."""
         by_way = np.array(found[0])
         if self.word == "rotation":
             by_way = by_way @ _further_turn(coordinates @ self._axes)

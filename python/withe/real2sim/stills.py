@@ -1,4 +1,4 @@
-"""Equilibria for unknown numbers, how far they are from what was seen, and how that changes with the numbers."""
+"""Equilibria for given unknowns, their residuals, and the derivatives of the residuals."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ class Equilibria(Coordinates):
         It is changed.
     unknowns : list of Unknown
     conditions : callable, optional
-        Called with the simulation and the frame before an equilibrium is looked for.
+        Function of the simulation and the frame that is called before each equilibrium.
 
     Attributes
     ----------
     solves : int
-        Equilibria so far.
+        Number of equilibria so far.
     """
 
     def __init__(
@@ -54,9 +54,9 @@ class Equilibria(Coordinates):
         Raises
         ------
         ConvergenceError
-            Nowhere; the simulation is then where it was before, with other numbers.
+            No equilibrium was found. The simulation keeps its previous state, with other parameters.
         ValueError
-            There are no such numbers.
+            The unknowns are out of range.
         """
         try:
             return self._go(coordinates, frame)
@@ -77,14 +77,14 @@ class Equilibria(Coordinates):
     def derivatives(self, by_positions: FloatArray, coordinates: FloatArray, frame: int) -> FloatArray:
         """Derivatives of m scalars of the present equilibrium by the coordinates, shape (m, n).
 
-        By the adjoint method; by central differences of equilibria where the engine knows no gradient.
+        The adjoint method computes them, or central differences of equilibria if the engine has no gradient.
 
         Parameters
         ----------
         by_positions : ndarray of shape (m, nodes, 3)
             Derivatives of the scalars by positions.
         coordinates : ndarray of shape (n,)
-            Of that equilibrium.
+            Coordinates of that equilibrium.
         frame : int
 
         Raises
@@ -116,7 +116,7 @@ class Equilibria(Coordinates):
 
 
 class Stills(Equilibria):
-    """The equilibrium of every frame, and how far it is from a target."""
+    """The equilibrium of every frame, and its residual."""
 
     def __init__(
         self,
@@ -129,7 +129,7 @@ class Stills(Equilibria):
         self._residual = residual
 
     def residual(self, coordinates: FloatArray, frame: int) -> tuple[FloatArray, FloatArray] | None:
-        """Residual of a frame and positions; None where there is no equilibrium, or none of such numbers."""
+        """Residual of a frame, and positions; None if there is no equilibrium or the unknowns are out of range."""
         try:
             positions = self.positions(coordinates, frame)
         except (ConvergenceError, ValueError):

@@ -33,15 +33,15 @@ FloatArray = npt.NDArray[np.float64]
 
 
 class Residual(ABC):
-    """Distance of positions from a frame of a target, in units of `sigma`, or of 1; NaN where nothing was seen."""
+    """Distance of positions from a frame of a target, in units of `sigma`, or of 1; NaN for missing data."""
 
     @abstractmethod
     def value(self, positions: FloatArray, frame: int) -> FloatArray:
-        """Shape (residuals,), of positions of shape (nodes, 3) [m]."""
+        """Return the residual, shape (residuals,), of positions of shape (nodes, 3) [m]."""
 
     @abstractmethod
     def derivative(self, positions: FloatArray, frame: int) -> FloatArray:
-        """By the positions, shape (residuals, nodes, 3)."""
+        """Return the derivatives by positions, shape (residuals, nodes, 3)."""
 
 
 class Target(ABC):
@@ -57,20 +57,20 @@ class Target(ABC):
 
     @abstractmethod
     def bind(self, simulation: Simulation) -> Residual:
-        """The residual for the nodes of a simulation."""
+        """Return the residual for the nodes of a simulation."""
 
     @abstractmethod
     def told(self, frame: int) -> int:
-        """Numbers that a frame tells."""
+        """Number of observations in a frame."""
 
     @abstractmethod
     def across(self, normal: FloatArray) -> FloatArray:
-        """Directions of a frame's residual that no motion in a plane reaches, as columns: (residuals, n), orthonormal.
+        """Directions of a frame's residual that no motion in a plane changes, as columns: (residuals, n), orthonormal.
 
         Parameters
         ----------
         normal : ndarray of shape (3,)
-            Of the plane.
+            Normal of the plane.
         """
 
 
@@ -96,22 +96,22 @@ class Curvatures(ShortRepr, Target):
     Parameters
     ----------
     values : array_like of shape (frames, groups)
-        NaN where a frame does not tell. Positive where natural curvature along the first material director in the plane
-        bends the rod so; about `normal` in space.
+        Curvatures, NaN for missing data. The sign is that of natural curvature along the first material director in the
+        plane; in space, positive curvature turns about `normal`.
     places : sequence
-        Where on the rods the tags are: nodes, or pairs of a rod and a length along it [m].
+        Places of the tags on the rods: nodes, or pairs of a rod and a length along it [m].
     groups : sequence of sequences of int
-        Tags over which each value is a mean, counted from 0; the first and the last have no turn.
+        Indices of the tags over which each value is averaged, from 0. The first and the last tag have no curvature.
     normal : array_like of shape (3,), optional
-        Axis about which positive turns go; not needed in a planar simulation.
+        Axis of positive rotations; not needed in a planar simulation.
     sigma : float, optional
-        Standard deviation of the values; estimated from what a fit leaves where it is not given.
+        Standard deviation of the values. By default estimated from the residuals.
     times : array_like of shape (frames,), optional [s]
 
     Raises
     ------
     ValueError
-        Wrong shapes, or a group without tags or with one that has no turn.
+        Wrong shapes, or a group without tags or with the first or last tag.
     """
 
     values: npt.ArrayLike
@@ -132,15 +132,15 @@ class Curvatures(ShortRepr, Target):
     def from_pixels(
         cls, pixels: npt.ArrayLike, places: Sequence[Place], groups: Sequence[Sequence[int]], **options: Any
     ) -> Curvatures:
-        """Curvatures that a picture of tags shows, seen at right angles to the plane in which they move.
+        """Compute curvatures from a picture of tags, seen perpendicular to the plane in which they move.
 
         Parameters
         ----------
         pixels : array_like of shape (frames, tags, 2) [px]
-            x to the right, y down; NaN where a tag was not seen. What turns counter-clockwise in the picture counts as
+            x to the right, y down; NaN for tags that were not seen. Counter-clockwise rotations in the picture are
             positive.
         places, groups, **options
-            As in `Curvatures`.
+            Arguments of `Curvatures`.
         """
         seen = _with_gaps(pixels, "pixels", (None, len(places), 2))
         curvature = 2.0 * np.tan(turns(seen * (1.0, -1.0)) / 2.0)
@@ -154,15 +154,15 @@ class Curvatures(ShortRepr, Target):
         return len(np.asarray(self.values))
 
     def told(self, frame: int) -> int:
-        """Numbers that a frame tells."""
+        """Number of observations in a frame."""
         return int(np.isfinite(np.asarray(self.values)[frame]).sum())
 
     def across(self, normal: FloatArray) -> FloatArray:
-        """None: turns are about one axis."""
+        """Return nothing: rotations are about one axis."""
         return np.zeros((len(self.groups), 0))
 
     def bind(self, simulation: Simulation) -> Residual:
-        """The residual for the nodes of a simulation."""
+        """Return the residual for the nodes of a simulation."""
         places = Places(simulation, self.places)
         axis = self.normal
         if axis is None:
@@ -218,12 +218,12 @@ class Tags(ShortRepr, Target):
     Parameters
     ----------
     points : array_like of shape (frames, tags, 2) [px] or (frames, tags, 3) [m]
-        Pixels need a camera, which `calibrate` finds. NaN where a tag was not seen.
+        Positions. Pixels need a camera, which `calibrate` finds. NaN for tags that were not seen.
     places : sequence
-        Where on the rods the tags are: nodes, or pairs of a rod and a length along it [m].
+        Places of the tags on the rods: nodes, or pairs of a rod and a length along it [m].
     camera : perception.Camera, optional
     sigma : float, optional [px or m]
-        Standard deviation of a coordinate; estimated from what a fit leaves where it is not given.
+        Standard deviation of a coordinate. By default estimated from the residuals.
     times : array_like of shape (frames,), optional [s]
 
     Raises
@@ -251,20 +251,20 @@ class Tags(ShortRepr, Target):
         return len(np.asarray(self.points))
 
     def told(self, frame: int) -> int:
-        """Numbers that a frame tells."""
+        """Number of observations in a frame."""
         return int(np.isfinite(np.asarray(self.points)[frame]).sum())
 
     def across(self, normal: FloatArray) -> FloatArray:
-        """The normal at each tag; none in pixels."""
+        """Return the normal at each tag; nothing in pixels."""
         return across_of_points(len(self.places), normal, self.camera is None)
 
     def without(self, outliers: Sequence[tuple[int, int]]) -> Tags:
-        """The same without some tags in some frames.
+        """Return these tags without some tags in some frames.
 
         Parameters
         ----------
         outliers : sequence of (frame, tag)
-            Such as `Fit.outliers`.
+            Frames and tags to leave out, such as `Fit.outliers`.
         """
         points = np.array(self.points)
         for frame, tag, *_ in outliers:
@@ -272,7 +272,7 @@ class Tags(ShortRepr, Target):
         return Tags(points, self.places, self.camera, self.sigma, self.times)
 
     def bind(self, simulation: Simulation) -> Residual:
-        """The residual for the nodes of a simulation."""
+        """Return the residual for the nodes of a simulation."""
         if self.camera is None and np.shape(self.points)[2] == 2:
             raise ValueError("camera must be given for tags in pixels; real2sim.calibrate finds one")
         return _TagResidual(self, Places(simulation, self.places))
@@ -298,7 +298,7 @@ class _TagResidual(Residual):
 
 
 def across_of_points(count: int, normal: FloatArray, in_metres: bool) -> FloatArray:
-    """`Target.across` of points, (3 count, count) of those in metres, (2 count, 0) in pixels."""
+    """Return `Target.across` of points, (3 count, count) in metres, (2 count, 0) in pixels."""
     return np.asarray(np.kron(np.eye(count), normal[:, None])) if in_metres else np.zeros((2 * count, 0))
 
 
@@ -324,12 +324,12 @@ class _Together(Residual):
 
 
 def frames_of(targets: Target | Sequence[Target]) -> list[Target]:
-    """Targets as a list; all have as many frames.
+    """Return targets as a list; all must have the same number of frames.
 
     Raises
     ------
     ValueError
-        None, something else than targets, or unlike numbers of frames.
+        No target, another type, or different numbers of frames.
     """
     listed = [targets] if isinstance(targets, Target) else list(targets)
     for target in listed:
@@ -348,7 +348,7 @@ def frames_of(targets: Target | Sequence[Target]) -> list[Target]:
 
 
 def bind(targets: list[Target], simulation: Simulation) -> Residual:
-    """The residual of all targets for the nodes of a simulation."""
+    """Return the residual of all targets for the nodes of a simulation."""
     bound = [target.bind(simulation) for target in targets]
     return bound[0] if len(bound) == 1 else _Together(bound)
 
@@ -382,7 +382,7 @@ def _with_gaps(values: npt.ArrayLike, what: str, shape: tuple[int | None, ...]) 
 
 
 def checked_times(times: Any, frames: int) -> FloatArray | None:
-    """Times of frames, if they are given: numbers that grow."""
+    """Check times of frames, if given: they must increase."""
     if times is None:
         return None
     array = validation.number_array(times, "times", (frames,))

@@ -25,16 +25,16 @@ POSITIVE = tuple(dict.fromkeys(word.name for kind in KINDS for word in kind.word
 
 
 class Unknown(ABC):
-    """Some numbers of a simulation.
+    """Fitted numbers of a simulation.
 
     Attributes
     ----------
     word, rods : str, tuple of str
-        What it is, and of which rods.
+        Name of the parameter, and its rods.
     names : tuple of str
-        Of each number.
+        Name of each number.
     scales : ndarray of shape (n,)
-        A change of each coordinate that counts as large: all it may do must be visible.
+        A change of each coordinate that counts as large: its whole effect must be visible.
     """
 
     word: str
@@ -52,7 +52,7 @@ class Unknown(ABC):
 
     @abstractmethod
     def write(self, simulation: Simulation, coordinates: FloatArray) -> None:
-        """Set them."""
+        """Set the value of coordinates."""
 
     @property
     @abstractmethod
@@ -73,7 +73,7 @@ class Unknown(ABC):
 
 
 def order_of_writing(simulation: Simulation, unknowns: Sequence[Unknown]) -> list[int]:
-    """Places of unknowns in the order in which to write them, so that none undoes one before it."""
+    """Places of unknowns in the order of writing, in which none overwrites an earlier one."""
     session = simulation._session
     ranks = [max((setting_rank(session, word) for word in unknown.words), default=(0, 0)) for unknown in unknowns]
     return sorted(range(len(ranks)), key=ranks.__getitem__)
@@ -85,13 +85,13 @@ class Coordinates:
     Attributes
     ----------
     names, scales
-        Of all coordinates, in the order of the unknowns.
+        Names and scales of all coordinates, in the order of the unknowns.
     slices : list of slice
-        Those of each unknown.
+        Slice of each unknown.
     per_frame : ndarray of bool
-        Which of them every frame has of its own.
+        True for coordinates that differ from frame to frame.
     words : list
-        What to ask the engine for derivatives by: those of all unknowns, without what another unknown replaces.
+        Arguments for derivatives by all unknowns, without values that another unknown replaces.
     """
 
     def __init__(self, simulation: Simulation, unknowns: Sequence[Unknown]) -> None:
@@ -108,11 +108,11 @@ class Coordinates:
         self._arrays = [{array for word in u.words for array in arrays_of(session, word)} for u in self.unknowns]
 
     def begin(self) -> FloatArray:
-        """Those of what the simulation has now."""
+        """Return the coordinates of the present values."""
         return np.concatenate([unknown.read(self.simulation) for unknown in self.unknowns])
 
     def write(self, coordinates: FloatArray) -> None:
-        """Set what is not set yet, and once more what that has made anew."""
+        """Set changed values, and again the values that these changes have reset."""
         made: set[Array] = set()
         for index in self._order:
             place, arrays = self.slices[index], self._arrays[index]
@@ -134,7 +134,7 @@ class Coordinates:
 
 
 class Parameter(Unknown):
-    """A positive parameter of one or several parts, as the logarithm of what it is multiplied by."""
+    """A positive parameter of one or several parts; the coordinate is the logarithm of its factor."""
 
     per_frame = False
 
@@ -162,12 +162,12 @@ class Parameter(Unknown):
         self.scales = np.ones(1)
 
     def read(self, simulation: Simulation) -> FloatArray:
-        """Logarithm of the present value over the first."""
+        """Return the logarithm of the present value over the first."""
         name = self.rods[0]
         return np.array([np.log(np.mean(simulation.get(name, self.word)) / np.mean(self._first[name]))])
 
     def write(self, simulation: Simulation, coordinates: FloatArray) -> None:
-        """Multiply what it was at first."""
+        """Multiply the first value."""
         for name, first in self._first.items():
             simulation.set(name, **{self.word: first * float(np.exp(coordinates[0]))})
 
@@ -177,22 +177,22 @@ class Parameter(Unknown):
         return [(name, self.word) for name in self.rods]
 
     def chain(self, coordinates: FloatArray, found: list[list[Any]]) -> FloatArray:
-        """All values grow with the factor."""
+        """Derivatives by the common factor of all values."""
         factor, firsts = float(np.exp(coordinates[0])), self._first.values()
         shares = [[np.sum(one * first * factor) for one in by] for by, first in zip(found, firsts, strict=True)]
         return np.asarray(np.sum(shares, axis=0))[:, None]
 
     def value(self, coordinates: FloatArray) -> FloatArray:
-        """Its mean over the parts, in SI units."""
+        """Return the mean over the parts, in SI units."""
         return np.asarray(self._mean * np.exp(coordinates))
 
     def slope(self, coordinates: FloatArray) -> FloatArray:
-        """The value itself, as the coordinate is a logarithm."""
+        """Return the value itself, because the coordinate is a logarithm."""
         return self.value(coordinates)
 
 
 class Tilt(Unknown):
-    """Angle by which the base of a robot in a plane is tilted: gravity is turned the other way."""
+    """Tilt of the base of a robot in a plane, as an opposite rotation of gravity."""
 
     word, per_frame = "gravity", False
     name = "tilt of the base"
@@ -205,7 +205,7 @@ class Tilt(Unknown):
         self.rods, self.names, self.scales = (), (self.name,), np.ones(1)
 
     def read(self, simulation: Simulation) -> FloatArray:
-        """None yet."""
+        """Return zero, the initial guess."""
         return np.zeros(1)
 
     def write(self, simulation: Simulation, coordinates: FloatArray) -> None:
@@ -218,12 +218,12 @@ class Tilt(Unknown):
         return ["gravity"]
 
     def chain(self, coordinates: FloatArray, found: list[list[Any]]) -> FloatArray:
-        """As gravity turns."""
+        """Derivatives by the rotation of gravity."""
         change = -np.cross(self._axis, self.gravity(float(coordinates[0])))
         return np.asarray(np.array(found[0]) @ change)[:, None]
 
     def gravity(self, tilt: float) -> FloatArray:
-        """Gravity as a base that is tilted feels it [m/s^2]."""
+        """Return gravity relative to a tilted base [m/s^2]."""
         along = self._axis * (self._axis @ self._first)
         across = np.cross(self._axis, self._first)
         return np.asarray(along + np.cos(tilt) * (self._first - along) - np.sin(tilt) * across)
@@ -239,17 +239,17 @@ class Delay(Unknown):
         self.rods, self.names, self.scales = (), ("delay",), np.array([duration / 100.0])
 
     def read(self, simulation: Simulation) -> FloatArray:
-        """The first guess."""
+        """Return the initial guess."""
         return np.array([self._first])
 
     def write(self, simulation: Simulation, coordinates: FloatArray) -> None:
-        """It is none of the simulation's."""
+        """Do nothing: the delay is not part of the simulation."""
 
     @property
     def words(self) -> list[Any]:
-        """The engine knows none."""
+        """Return nothing: the delay is not a parameter of the engine."""
         return []
 
     def chain(self, coordinates: FloatArray, found: list[list[Any]]) -> FloatArray:
-        """No equilibrium depends on it."""
+        """Return zero: equilibria do not depend on the delay."""
         return np.zeros((0, 1))

@@ -43,12 +43,12 @@ def nodal_values(record: Frames, rod: Any, color_by: ColorBy) -> FloatArray:
 
 
 def color_limits(values: Sequence[FloatArray]) -> tuple[float, float]:
-    """The ends of a scale for all values: zero in the middle where they go both ways, and never what rounding leaves.
+    """Return the limits of a scale for all values, symmetric about zero if both signs occur, without rounding errors.
 
     Parameters
     ----------
     values : sequence of ndarray
-        One a rod.
+        Values of each rod.
     """
     low, high = min(float(v.min()) for v in values), max(float(v.max()) for v in values)
     least = 1e-9 * max(-low, high)
@@ -59,20 +59,20 @@ def color_limits(values: Sequence[FloatArray]) -> tuple[float, float]:
 
 
 def nice_limits(low: float, high: float) -> tuple[float, float, int, str]:
-    """Ends of a scale that begins and ends at round numbers.
+    """Return the limits of a scale that begins and ends at round numbers.
 
     Parameters
     ----------
     low, high : float
-        What it must hold.
+        Range that the scale must contain.
 
     Returns
     -------
     low, high : float
     labels : int
-        How many, ends among them, stand at round numbers.
+        Number of labels at round numbers, ends included.
     format : str
-        With the digits that they need.
+        Format with the needed digits.
     """
     size = max(abs(low), abs(high), high - low)
     if not (1e-9 * size < high - low and 1e-290 < size < 1e290):

@@ -1,4 +1,4 @@
-"""Figures of recorded frames: shapes and energies, by matplotlib, which is imported when first used."""
+"""Figures of recorded frames: shapes and energies, by matplotlib, which is imported on first use."""
 
 from __future__ import annotations
 
@@ -24,20 +24,21 @@ FloatArray = npt.NDArray[np.float64]
 def plot(record: Frames, *, shapes: int = 6) -> Any:
     """Draw the shapes of the rods at several times, and the energies over time.
 
-    Obstacles near the rods are drawn too: in two dimensions planes as lines, spheres and capsules as outlines, in three
-    see-through. Those that move, springs and tendons are drawn at the same times as the rods, in the same colours.
+    Obstacles near the rods are drawn too: in two dimensions planes as lines, and spheres and capsules as outlines; in
+    three dimensions transparent. Moving obstacles, springs and tendons are drawn at the same times as the rods, in the
+    same colours.
 
     Parameters
     ----------
     record : Record
     shapes : int
-        At how many times, evenly chosen, the first and last among them.
+        Number of times, evenly chosen, with the first and last among them.
 
     Returns
     -------
     matplotlib.figure.Figure
-        In two dimensions where the motion stays in a coordinate plane, to a twentieth of the thickness of the thinnest
-        rod, else in three.
+        Figure in two dimensions if the motion stays in a coordinate plane, to a twentieth of the thickness of the
+        thinnest rod; otherwise in three dimensions.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Films: which moments of a record they show, and how pictures become a file."""
+"""Films: the moments of a record that they show, and the file from their pictures."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def film_places(times: FloatArray, interval: float) -> FloatArray:
     Returns
     -------
     ndarray of shape (pictures,)
-        The frames themselves where time does not pass.
+        Frame numbers; the numbers of the frames themselves if time does not advance.
     """
     duration = float(times[-1] - times[0])
     if duration <= 0.0 or np.any(np.diff(times) <= 0.0):

@@ -1,4 +1,4 @@
-"""Which parts of earlier poses are drawn: surfaces that lie in each other are speckled with the colours of both."""
+"""Visible parts of earlier poses. Coincident surfaces would be speckled with the colours of both."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ _NEAR = 0.1  # of the radius of a rod
 
 
 def stands_out(rod: RodOutline, pose: FloatArray, others: Sequence[FloatArray]) -> npt.NDArray[np.bool_]:
-    """Which nodes of a pose are away from the centrelines of all other poses of the rod, shape (nodes,).
+    """Return True for nodes that are away from the centrelines of all other poses of the rod, shape (nodes,).
 
-    What slides along itself is where it was, though its nodes have moved.
+    A rod that slides along itself keeps its place, although its nodes move.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Off-screen rendering on this machine.
 
-That takes a graphics library that wheels do not bring. VTK may end the process where it is missing, so the first render
-is tried in another one.
+Rendering needs a graphics library that wheels do not contain. Without it VTK may end the process, so a subprocess tests
+the first render.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def probe_rendering() -> str:
     Raises
     ------
     RuntimeError
-        None works; the message names the package to install.
+        No way works; the message names the package to install.
     """
     windows = ["vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow"] if sys.platform == "linux" else []
     if sys.platform != "linux" or os.environ.get("DISPLAY") or os.environ.get(_WINDOW):
@@ -77,7 +77,7 @@ def _advice(output: str) -> str:
 
 @contextlib.contextmanager
 def render_window(off_screen: bool) -> Iterator[None]:
-    """Have VTK make the window that the probe found, and leave the environment as it was."""
+    """Select the render window that the probe found, and restore the environment afterwards."""
     if not off_screen:
         yield
         return

@@ -1,4 +1,4 @@
-"""Pictures, films and a viewer of recorded frames, by PyVista, which is imported when first used."""
+"""Pictures, films and a viewer of recorded frames, by PyVista, which is imported on first use."""
 
 from __future__ import annotations
 
@@ -41,44 +41,43 @@ def picture(
 ) -> Path:
     """Render one frame into a .png file: rods as tubes, and planes, spheres and capsules.
 
-    Of a plane a square around the rods is drawn, and what is far away, or much larger than the rods, does not move
+    A plane is drawn as a square around the rods. Objects that are far away, or much larger than the rods, do not move
     the camera.
 
     Parameters
     ----------
     record : Record
     path : path
-        The file, ending in .png.
+        File to write, ending in .png.
     frame : int
-        Which frame; negative numbers count from the last one.
+        Index of the frame; negative numbers count from the last one.
     ghosts : sequence of int
-        Other frames, drawn faintly where rods have moved by more than a tenth of their radius since.
+        Other frames, drawn faintly where rods differ from `frame` by more than a tenth of their radius.
     size : pair of int [px]
     color_by : {"rod", "tension", "curvature", "twist", "speed"}
-        One colour a rod, or the quantity with its scale, the same for all frames.
+        One colour per rod, or the quantity with its scale, which is the same for all frames.
     camera : str, array_like of shape (3,) or Camera, optional
-        From where to look: "front", "side", "top", "oblique" or a direction. By default along the
-        normal of a planar motion, and obliquely at any other. Or a `withe.perception.Camera` without
-        distortion, of whose picture `size` then is the size: pixels are where its `project` says, and
-        its `to_plane` turns them into metres.
+        Direction of view: "front", "side", "top", "oblique" or a vector. By default along the normal of a planar
+        motion, and oblique otherwise. Or a `withe.perception.Camera` without distortion, whose picture has the given
+        `size`. Pixels then agree with its `project`, and its `to_plane` converts them to metres.
     ground : float, optional [m]
-        Height at which the shadow falls; by default a level plane near the rods, or a little below them.
+        Height of the shadow. By default a level plane near the rods, or a little below them.
     label : str, optional
         Text in the lower left corner.
 
     Returns
     -------
     pathlib.Path
-        The file.
+        The written file.
 
     Raises
     ------
     ValueError
-        A record without frames, a frame that it has not, another suffix, or an option out of range.
+        A record without frames, a missing frame, another suffix, or an option out of range.
     ImportError
         PyVista is not installed.
     RuntimeError
-        Nothing can be rendered here; the message names the package to install.
+        Rendering is not possible here; the message names the package to install.
     """
     path = validation.file_path(path, ".png")
     number = _frame(record, frame)
@@ -117,27 +116,27 @@ def animate(
     ground: float | None = None,
     progress: bool = True,
 ) -> Path:
-    """Render the rods as tubes into a film, with planes, spheres and capsules, which move as they did.
+    """Render a film: rods as tubes, with planes, spheres and capsules in motion.
 
     Parameters
     ----------
     record : Record
     path : path
-        The file, ending in .mp4 or .gif.
+        File to write, ending in .mp4 or .gif.
     fps : float, optional
-        Pictures a second of film; 30 for .mp4, 20 for .gif. Between two frames of the record the rods
-        are drawn in between.
+        Pictures per second of film; 30 for .mp4, 20 for .gif. The rods are interpolated between two frames of the
+        record.
     speed : float
         Seconds of the simulation shown in one second of film.
     size, color_by, camera, ground
-        As in `picture`; the camera stands still and has all frames in view.
+        As in `picture`. The camera stands still, with all frames in view.
     progress : bool
-        Whether to show a progress bar, as in `Simulation.run`.
+        True to show a progress bar, as in `Simulation.run`.
 
     Returns
     -------
     pathlib.Path
-        The file.
+        The written file.
 
     Raises
     ------
@@ -146,8 +145,8 @@ def animate(
     ImportError
         PyVista or imageio-ffmpeg is not installed.
     RuntimeError
-        Nothing can be rendered here, or ffmpeg fails, as on a full disk; the message says why, and what was in
-        the file before is left.
+        Rendering is not possible here, or ffmpeg fails, for example on a full disk. The message gives the reason, and
+        the previous content of the file is kept.
     """
     path = validation.file_path(path, ".mp4", ".gif")
     fps = float(fps if fps is not None else (30.0 if path.suffix.lower() == ".mp4" else 20.0))
@@ -183,20 +182,20 @@ def view(
     ground: float | None = None,
     backend: str | None = None,
 ) -> Any:
-    """Turn the rods about and slide through time, in a notebook or a window.
+    """Show the rods in a notebook or a window, with controls for the view and the time.
 
     Parameters
     ----------
     record : Record
     size, color_by, camera, ground
-        As in `picture`; the camera has all frames in view at first.
+        As in `picture`. At first the camera has all frames in view.
     backend : str, optional
-        PyVista's way to show it in a notebook, such as "trame" or "static"; its own choice by default.
+        PyVista's backend in a notebook, such as "trame" or "static". By default PyVista chooses.
 
     Returns
     -------
     widget
-        In a notebook, what displays the viewer; None elsewhere.
+        The viewer in a notebook; None elsewhere.
 
     Raises
     ------

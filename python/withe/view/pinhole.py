@@ -1,4 +1,4 @@
-"""Pictures as a camera of given pose and matrix takes them, so that its pixels can be turned into metres again."""
+"""Pictures for a camera of given pose and matrix, whose pixels can be converted to metres."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ def check_pinhole(camera: Pinhole) -> None:
 
 
 def towards(camera: Pinhole) -> FloatArray:
-    """Unit vector from what is seen in the middle to the camera."""
+    """Unit vector from the centre of the view to the camera."""
     return np.asarray(-camera.rotation[2], np.float64)
 
 
 def look_through(view: Any, camera: Pinhole, size: tuple[int, int], points: FloatArray) -> None:
-    """Make PyVista's camera one of a given pose and matrix.
+    """Give PyVista's camera a pose and a matrix.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def look_through(view: Any, camera: Pinhole, size: tuple[int, int], points: Floa
     camera : Pinhole
     size : pair of int [px]
     points : ndarray of shape (n, 3) [m]
-        What is there to be seen, by which depth is resolved.
+        Points in view, which determine the resolved range of depth.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Rods as tubes, and what they touch, on a light ground, rendered by PyVista.
+"""Rods as tubes and obstacles on a light ground, rendered by PyVista.
 
 This is the stage that pictures, films and the viewer share.
 """
@@ -49,27 +49,27 @@ class Stage:
     size : pair of int [px]
     color_by : {"rod", "tension", "curvature", "twist", "speed"}
     camera : str, array_like of shape (3,) or Camera, optional
-        From where to look: "front", "side", "top", "oblique" or a direction, or a camera of given pose and matrix. By
-        default along the normal of a planar motion, and obliquely at any other.
+        Direction of view: "front", "side", "top", "oblique" or a vector; or a camera of given pose and matrix. By
+        default along the normal of a planar motion, and oblique otherwise.
     frame : int
-        What is shown at first.
+        First frame to show.
     frames : sequence of int, optional
-        What the camera has in view; all frames by default.
+        Frames that the camera has in view; all frames by default.
     ghosts : sequence of int
-        Frames that stand behind `frame`, faintly, the first one most: what of them is elsewhere than there.
+        Frames drawn faintly behind `frame`, the first one strongest, where they differ from it.
     ground : float, optional [m]
-        Height at which the shadow falls; by default a level plane near the rods, or a little below them.
+        Height of the shadow. By default a level plane near the rods, or a little below them.
     off_screen : bool
-        Render into memory rather than into a window.
+        True to render into memory, False into a window.
     supersampling : int
-        Pixels rendered for one pixel shown, along each side.
+        Rendered pixels per shown pixel, along each side.
 
     Raises
     ------
     ValueError
         A record without frames, or an argument out of range.
     RuntimeError
-        Nothing can be rendered off-screen here.
+        Off-screen rendering is not possible here.
     """
 
     def __init__(
@@ -148,7 +148,7 @@ class Stage:
         self._places = [record.obstacle_position(obstacle) for obstacle in record.obstacles]
 
     def show(self, frame: float) -> None:
-        """Move the rods to a frame; between two frames, in between."""
+        """Move the rods to a frame; fractional frames are interpolated."""
         before = min(int(frame), len(self.times) - 1)
         after = min(before + 1, len(self.times) - 1)
         share = frame - before
@@ -177,7 +177,7 @@ class Stage:
             self._cast_shadow(meshed)
 
     def label(self, text: str) -> None:
-        """Write a line of text in the lower left corner, in place of the one before."""
+        """Write a line of text in the lower left corner, in place of the previous one."""
         if self._label is None:
             size = max(7, self.size[1] * self._fineness // 55)
             self._label = self.plotter.add_text(text, position=(0.03, 0.04), viewport=True, color=_INK, font_size=size)
@@ -195,7 +195,7 @@ class Stage:
         return np.asarray(sums // area, np.uint8)
 
     def close(self) -> None:
-        """Free the window."""
+        """Close the window."""
         self.plotter.close()
 
     @staticmethod

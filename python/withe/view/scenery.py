@@ -1,4 +1,4 @@
-"""Obstacles and springs as pictures show them: a patch of each plane, spheres and capsules, zigzags. Pure functions."""
+"""Obstacles and springs in pictures: a patch of each plane, spheres and capsules, zigzags. Pure functions."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ def _box(points: FloatArray) -> tuple[FloatArray, float]:
 
 
 def ends(outline: ObstacleOutline, place: FloatArray) -> FloatArray:
-    """Both ends of the axis of a sphere or capsule that is at a place, shape (2, 3) [m]."""
+    """Both ends of the axis of a sphere or capsule at a position, shape (2, 3) [m]."""
     return np.stack([place, place + outline.axis])
 
 
 def patch(outline: ObstacleOutline, place: FloatArray, points: FloatArray, share: float = 0.75) -> FloatArray:
-    """Corners of the square of a plane that lies under, or behind, points.
+    """Corners of the square of a plane that lies under or behind points.
 
     Parameters
     ----------
     outline : ObstacleOutline
-        Of a plane.
+        Outline of a plane.
     place : ndarray of shape (3,) [m]
-        Where it is.
+        Position of the plane.
     points : ndarray of shape (points, 3) [m]
-        What is in view.
+        Points in view.
     share : float
-        Half a side of the square, over the diagonal of what is in view.
+        Half a side of the square, over the diagonal of the view.
 
     Returns
     -------
@@ -61,7 +61,7 @@ def framing(outline: ObstacleOutline, places: FloatArray, points: FloatArray) ->
     outline : ObstacleOutline
     places : ndarray of shape (frames, 3) [m]
     points : ndarray of shape (points, 3) [m]
-        Where rods are.
+        Points of rods.
 
     Returns
     -------
@@ -113,18 +113,18 @@ def surface(outline: ObstacleOutline, place: FloatArray) -> FloatArray:
 
 
 def profile(first: FloatArray, second: FloatArray, radius: float) -> FloatArray:
-    """Outline of a capsule in a plane: two half circles and what joins them.
+    """Outline of a capsule in a plane: two half circles and the lines between them.
 
     Parameters
     ----------
     first, second : ndarray of shape (2,) [m]
-        Ends of its axis; the same for a circle.
+        Ends of its axis, which are equal for a circle.
     radius : float [m]
 
     Returns
     -------
     ndarray of shape (points, 2) [m]
-        Closed.
+        Closed outline.
     """
     along = second - first
     start = float(np.arctan2(along[1], along[0])) + 0.5 * np.pi
@@ -134,20 +134,20 @@ def profile(first: FloatArray, second: FloatArray, radius: float) -> FloatArray:
 
 
 def zigzag(ends: FloatArray, width: float, normal: FloatArray) -> FloatArray:
-    """A spring between two points as a line that goes to and fro.
+    """A spring between two points as a zigzag line.
 
     Parameters
     ----------
     ends : ndarray of shape (2, 3) [m]
     width : float [m]
-        From one side to the other.
+        Width of the zigzag.
     normal : ndarray of shape (3,)
-        Of the plane that it lies in, as near as its ends allow.
+        Normal of the plane of the zigzag, as nearly as its ends allow.
 
     Returns
     -------
     ndarray of shape (points, 3) [m]
-        The same number of points wherever it is.
+        Points, whose number does not depend on the position.
     """
     turns = 8
     along = ends[1] - ends[0]

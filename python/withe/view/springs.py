@@ -24,7 +24,7 @@ class SpringLines:
     plotter : pyvista.Plotter
     record : Frames
     direction : ndarray of shape (3,)
-        From which the camera looks.
+        Direction from which the camera looks.
     """
 
     def __init__(self, pyvista: Any, plotter: Any, record: Frames, direction: FloatArray) -> None:
@@ -37,7 +37,7 @@ class SpringLines:
             plotter.add_mesh(mesh, color="#6b7680", line_width=4.0, reset_camera=False)
 
     def show(self, positions: FloatArray) -> None:
-        """Move the springs to where the nodes of the scene are, shape (nodes, 3) [m]."""
+        """Move the springs to the nodes of the scene, shape (nodes, 3) [m]."""
         for mesh, points in zip(self._meshes, self._points(positions), strict=True):
             mesh.points = points
 

@@ -1,7 +1,7 @@
 """Surfaces of rods: a section swept along a smooth centreline. Pure functions of positions and directors.
 
-The centreline is a cubic spline through the nodes, so few nodes look as smooth as many. What depends on
-the mesh only, the interpolation and the faces, is made once; a frame then costs two small products.
+The centreline is a cubic spline through the nodes, so few nodes look as smooth as many. The interpolation and the faces
+depend on the mesh only, and are computed once. A frame then costs two small products.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class Surface:
     ----------
     rod : RodOutline
     nodes : ndarray of shape (nodes, 3) [m]
-        A shape of the rod, for the spacing of its nodes.
+        A shape of the rod, which determines the spacing of its nodes.
     samples_per_edge : int
         Rings of the surface between two nodes.
     sides : int
@@ -98,7 +98,7 @@ class Surface:
         return points.reshape(-1, 3), normals.reshape(-1, 3)
 
     def footprint(self, nodes: FloatArray) -> FloatArray:
-        """Area of the rod seen from the side that falls to each point of the surface [m^2]."""
+        """Area of the rod, seen from the side, that belongs to each point of the surface [m^2]."""
         centres = self._position_weights @ nodes
         steps = np.linalg.norm(np.diff(centres, axis=0, append=centres[:1] if self.closed else centres[-1:]), axis=1)
         areas = 2.0 * self._half_widths.max(axis=1) * steps
@@ -107,7 +107,7 @@ class Surface:
         return np.repeat(padded / len(self._section), len(self._section))
 
     def on_surface(self, nodal: FloatArray) -> FloatArray:
-        """Values at the nodes, shape (nodes,), carried to the points of the surface."""
+        """Interpolate nodal values, shape (nodes,), to the points of the surface."""
         values = np.clip(self._position_weights @ nodal, nodal.min(), nodal.max())
         return np.repeat(values[self._ring_samples], len(self._section))
 
