@@ -1,4 +1,4 @@
-"""Many simulations of one shape that go side by side: stepped in one call, read out into one array."""
+"""Many simulations of one shape in parallel: stepped in one call, read into one array."""
 
 from withe.batch.batch import Batch
 

@@ -1,4 +1,4 @@
-"""The simulations of a batch, by number: which ones a call is about, and values that have a row for each."""
+"""The simulations of a batch, by number: selection for a call, and values with a row for each."""
 
 from __future__ import annotations
 
@@ -44,23 +44,23 @@ class Lanes:
 
     @property
     def first(self) -> Simulation:
-        """Has the shape of all."""
+        """Return the first simulation, which has the shape of all."""
         return self.simulations[0]
 
     def replace(self, number: int, simulation: Simulation) -> None:
-        """Another simulation of the same shape takes the place of one."""
+        """Replace a simulation by another one of the same shape."""
         self.engine.replace(number, simulation._session.world)
         self.simulations[number] = simulation
         self._rods.clear()
         self._voronoi.clear()
 
     def rod(self, rod: Rod | str) -> RodPart:
-        """The rod of the first simulation that a handle or a name stands for; names are looked up once.
+        """Return the rod of the first simulation for a handle or a name. Each name is searched once.
 
         Raises
         ------
         ValueError
-            There is no such rod.
+            The rod does not exist.
         """
         if not isinstance(rod, str):
             return self.first._session.directory.rod(rod)
@@ -82,12 +82,12 @@ class Lanes:
         return found
 
     def chosen(self, given: npt.ArrayLike | None, what: str = "lanes") -> IntArray:
-        """Numbers of the simulations that an argument names: None for all, a mask, or numbers.
+        """Return the numbers of selected simulations: None for all, a mask, or numbers.
 
         Raises
         ------
         ValueError
-            A mask of another length, a number that there is not or that comes twice.
+            A mask of another length, or a number that does not exist or is given twice.
         """
         if given is None or given is self._all:
             return self._all
@@ -117,23 +117,23 @@ class Lanes:
         return self._all
 
     def each(self, numbers: IntArray) -> Iterator[tuple[int, Simulation]]:
-        """Place in a call's values, and simulation, of the lanes of a call."""
+        """Yield the place in a call's values, and the simulation, of each lane of a call."""
         for place, number in enumerate(numbers):
             yield place, self.simulations[number]
 
     def note_failures(self) -> None:
-        """After a step: what has failed is passed over until it is restored, from here on."""
+        """Note simulations that have failed in a step; they are skipped until they are restored."""
         for number in self.engine.failed().nonzero()[0]:
             self._restorations[number] = self.simulations[number]._session.restorations
 
     def forgive_restored(self) -> None:
-        """Let simulations go on that had failed, and were restored by themselves since."""
+        """Continue failed simulations that were restored individually."""
         for number in self.engine.failed().nonzero()[0]:
             if self.simulations[number]._session.restorations != self._restorations[number]:
                 self.engine.forgive(number)
 
     def refuse_in_run(self, what: str) -> None:
-        """Refuse what would change a simulation behind the back of its run."""
+        """Refuse a change of a simulation during its run."""
         for simulation in self.simulations:
             simulation._stepping.refuse_in_run(what)
 
@@ -143,12 +143,12 @@ class Lanes:
 
 
 def row(value: Any, index: int, count: int, what: str) -> Any:
-    """Return one simulation's share of a value: its row of an array; numbers, words, functions and None are for all.
+    """Return the value for one simulation: its row of an array; or a number, word, function or None that is for all.
 
     Raises
     ------
     ValueError
-        An array without a row for each.
+        An array without a row for each simulation.
     """
     if value is None or isinstance(value, str | float | int) or callable(value):
         return value
@@ -162,7 +162,7 @@ def row(value: Any, index: int, count: int, what: str) -> Any:
 
 
 def stacked(answers: list[Any]) -> Any:
-    """Answers of one kind with one more axis in front: arrays, numbers, or objects of these."""
+    """Stack results of one kind along a new first axis: arrays, numbers, or objects of these."""
     first = answers[0]
     if is_dataclass(first) and not isinstance(first, type):
         return type(first)(**{f.name: stacked([getattr(a, f.name) for a in answers]) for f in fields(first)})

@@ -17,7 +17,7 @@ FloatArray = npt.NDArray[np.float64]
 
 
 class Reading:
-    """Methods of `Batch` that read; `out`, where there is one, is an array of the user that is filled and returned."""
+    """Methods of `Batch` that read. An argument `out` is an array of the user that is filled and returned."""
 
     _lanes: Lanes
 
@@ -37,6 +37,7 @@ class Reading:
         Parameters
         ----------
         rod : Rod or str, optional
+            Rod to read. By default all nodes of the scene.
         out : ndarray of shape (n, nodes, 3), float64, optional
             Array that is filled and returned.
 
@@ -145,7 +146,7 @@ class Reading:
         Returns
         -------
         ndarray of shape (n, ...)
-            Or a tuple, if the values are not numbers.
+            Values; a tuple if they are not numbers.
         """
         return self._lanes.gathered(lambda s: s.get(target, word))
 

@@ -1,4 +1,4 @@
-"""Records and equilibria of batches: those of every simulation, and arrays with one more axis in front."""
+"""Records and equilibria of batches, with one more axis in front of the arrays."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ FloatArray = npt.NDArray[np.float64]
 class BatchRecord(Sequence[Record]):
     """The frames of a run of a batch, made by `Batch.run`: a `Record` of each simulation.
 
-    Read-outs have the simulations as their first axis and the frames as their second; a string names what ``record=``
-    of the run added. They need equally many frames: where a simulation has failed, or was ended by itself, the records
-    are read one by one, ``run[3]``.
+    In read-outs, the first axis is the simulation and the second axis is the frame. A string names a quantity of
+    ``record=`` of the run. Read-outs need equal numbers of frames. If a simulation failed or ended early, read the
+    records one by one, ``run[3]``.
 
     Examples
     --------
@@ -109,12 +109,12 @@ class BatchRecord(Sequence[Record]):
 
 @dataclass(frozen=True, eq=False)
 class Equilibria(Sequence[Equilibrium]):
-    """Equilibria of the simulations of a batch, made by `Batch.equilibrium`; ``equilibria[i]`` is that of one.
+    """Equilibria of the simulations of a batch, made by `Batch.equilibrium`; ``equilibria[i]`` is one of them.
 
     Attributes
     ----------
     failures : tuple of ConvergenceError or None
-        What went wrong in each simulation; it is in the state before.
+        Error of each simulation without an equilibrium, which keeps its previous state.
     """
 
     failures: tuple[ConvergenceError | None, ...]
@@ -132,12 +132,12 @@ class Equilibria(Sequence[Equilibrium]):
 
     @property
     def iterations(self) -> npt.NDArray[np.intp]:
-        """Iterations of Newton's method, shape (n,); 0 where none was found."""
+        """Iterations of Newton's method, shape (n,); 0 if no equilibrium was found."""
         return np.array([0 if each is None else each.iterations for each in self._found])
 
     @property
     def residual(self) -> FloatArray:
-        """Greatest force out of balance that is left, shape (n,) [N]; NaN where none was found."""
+        """Greatest residual force, shape (n,) [N]; NaN if no equilibrium was found."""
         return np.array([np.nan if each is None else each.residual for each in self._found])
 
     def __len__(self) -> int:

@@ -1,4 +1,4 @@
-"""The loop of a batch's run: frames, callbacks, who has ended."""
+"""The loop of a batch's run: frames, callbacks, ends of simulations."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ B = TypeVar("B", bound=Stepped)
 
 
 class BatchRun(Generic[B]):
-    """One run: checked arguments, and the loop; callbacks are given the batch."""
+    """One run: checked arguments, and the loop. Callbacks receive the batch."""
 
     def __init__(
         self,
@@ -86,7 +86,7 @@ class BatchRun(Generic[B]):
         return lambda _: np.asarray(self._rows[name][number])
 
     def go(self, advance: Callable[[IntArray, int], None], report: Callable[[float], object]) -> None:
-        """Run to the end: `advance` steps simulations of some numbers, and `report` hears how much is done [s]."""
+        """Run to the end: `advance` steps simulations by numbers, and `report` receives the completed time [s]."""
         with ExitStack() as runs:
             for number, recorder in self._recorders.items():
                 stepping = self._simulation(number)._stepping
@@ -138,5 +138,5 @@ class BatchRun(Generic[B]):
 
     @property
     def record(self) -> BatchRecord:
-        """The frames taken so far."""
+        """Return the frames recorded so far."""
         return BatchRecord([recorder.record for recorder in self._recorders.values()])

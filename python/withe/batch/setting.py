@@ -1,4 +1,4 @@
-"""Actuation and parameters of a batch: the methods of `Simulation` that set, with a row for each simulation."""
+"""Actuation and parameters of a batch: the methods of `Simulation` that set values, with a row for each simulation."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ FloatArray = npt.NDArray[np.float64]
 
 @keyword_hints
 class Setting:
-    """Methods of `Batch` that actuate and set. `lanes` says which simulations: a mask of all, or numbers."""
+    """Methods of `Batch` that actuate and set. `lanes` selects simulations: a mask of all, or numbers."""
 
     _lanes: Lanes
 
@@ -56,26 +56,26 @@ class Setting:
     def set(
         self, target: Any = None, /, *, over: float = 0.0, lanes: npt.ArrayLike | None = None, **values: Any
     ) -> None:
-        """Change parameters of every simulation, such as a modulus for each (domain randomisation).
+        """Set parameters of every simulation, such as a modulus for each (domain randomisation).
 
         Parameters
         ----------
         target : handle or str
-            As `Simulation.set` takes it.
+            Target, as in `Simulation.set`.
         over : float [s]
-            Duration over which what `Simulation.set` leads evenly goes to its value; 0: at once.
+            Duration of a linear ramp to the values that `Simulation.set` can ramp. By default the change is immediate.
         lanes : array_like, optional
-            Mask or numbers of the simulations; all by default.
+            Mask or numbers of the simulations. By default all.
         **values
-            Words of `Simulation.set`. An array has a row for each simulation; a number, a function or None is for all.
-            Natural shapes of a rod are arrays with a row for each simulation: natural_curvature of shape (n, 2) or
+            Words of `Simulation.set`. An array has one row per simulation; a number, a function or None is for all.
+            Natural shapes of a rod are arrays with one row per simulation: natural_curvature of shape (n, 2) or
             (n, stencils, 2) [1/m], natural_twist (n,) or (n, stencils) [rad/m], natural_stretch (n,) or (n, edges) [-].
 
         Raises
         ------
         ValueError
             A word that the target does not have, a value out of range, or an array without a row for each simulation.
-            Simulations before the one that refuses keep what was set.
+            Simulations before the one that refuses its value keep their new values.
 
         Examples
         --------
@@ -121,22 +121,25 @@ class Setting:
         Parameters
         ----------
         support : Support, NodeHandle, Obstacle or str
+            Support, node or obstacle, as in `Simulation.move`.
         position : array_like of shape (n, 3) [m]
+            Target positions.
         rotation : array_like of shape (n, 3, 3)
-            Relative to the orientation as drawn.
+            Target rotations, relative to the drawn orientation.
         tangent : array_like of shape (n, 3)
-            Where the rod is to point, instead; of a sphere, the axis about which it rolls.
+            Target directions of the rod, instead of rotations. For a sphere, the axes of `roll`.
         roll : float or array_like of shape (n,) [rad]
-            A turn about the tangent, or of an obstacle about its axis; one number is for all simulations.
+            Rotations about the tangent, or about the axis of an obstacle; one number is for all simulations.
         over : float [s]
-            Reached after so long, evenly; within the next step by default.
+            Duration of the ramp to the targets. By default they are reached within the next step.
         lanes : array_like, optional
-            Which simulations; all by default. For paths move one: ``batch[i].move(..., path=path)``.
+            Simulations to move. By default all. For paths move one: ``batch[i].move(..., path=path)``.
 
         Raises
         ------
         ValueError
-            See `Simulation.move`; or not a row for each simulation. Simulations before the one that refuses move.
+            See `Simulation.move`; or an array without a row for each simulation. Simulations before the one that
+            refuses its target do move.
 
         Examples
         --------

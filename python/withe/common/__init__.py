@@ -1,1 +1,1 @@
-"""Tools for every folder: checks of user input, hints, geometry of polylines, recorded frames, extras, the bar."""
+"""Tools for every folder: checks of input, hints, geometry of polylines, recorded frames, extras, progress bars."""

@@ -1,4 +1,4 @@
-"""Objects to which nothing new can be assigned: a misspelt name would act on nothing."""
+"""Objects that refuse new attributes, because a misspelt name would have no effect."""
 
 from __future__ import annotations
 
@@ -67,16 +67,16 @@ SIMULATION_WORDS = frozenset(
 
 
 def of_a_simulation(owner: str, name: str, call: str) -> AttributeError:
-    """The error of an attribute that a scene or a handle has not: where a simulation has it, how to get there.
+    """Return the error for an attribute that a scene or a handle lacks, and the way to get it from a simulation.
 
     Parameters
     ----------
     owner : str
-        What was asked, such as "rod 'arm'".
+        Name of the object in the message, such as "rod 'arm'".
     name : str
-        The attribute.
+        Name of the attribute.
     call : str
-        How the simulation is called, with {} for the attribute, such as "simulation.{}(arm)".
+        Call on a simulation, with {} for the attribute, such as "simulation.{}(arm)".
     """
     if name not in SIMULATION_WORDS:
         return AttributeError(f"{owner} has no attribute {name!r}")
@@ -85,17 +85,17 @@ def of_a_simulation(owner: str, name: str, call: str) -> AttributeError:
 
 
 def known_attributes(instead: str) -> Callable[[T], T]:
-    """Let a class, but not those that derive from it, refuse public attributes that it does not define.
+    """Make a class, but not its subclasses, refuse public attributes that it does not define.
 
     Parameters
     ----------
     instead : str
-        What to do, where no name of the class is near.
+        Advice for the message if no name of the class is similar.
 
     Returns
     -------
     callable
-        Of the class, which it returns.
+        Decorator of the class.
 
     Examples
     --------

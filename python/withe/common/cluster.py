@@ -1,4 +1,4 @@
-"""Work handed to a client of Dask, as `concurrent.futures` has it."""
+"""Execution on a client of Dask, with the interface of `concurrent.futures`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["cluster_executor", "require_client"]
 
 
 def require_client(client: Any) -> None:
-    """Refuse what is no client.
+    """Refuse an object that is not a client.
 
     Raises
     ------
@@ -28,7 +28,7 @@ def require_client(client: Any) -> None:
 
 @contextmanager
 def cluster_executor(client: Any) -> Iterator[Executor]:
-    """Workers of a client; what they have not ended is dropped where an exception leaves the context."""
+    """Yield the workers of a client. If an exception leaves the context, unfinished work is dropped."""
     executor: Executor = client.get_executor(pure=False)
     try:
         yield executor

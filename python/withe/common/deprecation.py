@@ -150,8 +150,8 @@ def old_names(module: str, **places: str) -> Callable[[str], Any]:
     Returns
     -------
     callable
-        Of an old name it returns the object and warns with `DeprecationWarning`; of any other name it raises
-        `AttributeError`.
+        Function that returns the object of an old name and warns with `DeprecationWarning`. For any other name it
+        raises `AttributeError`.
     """
 
     def find(name: str) -> Any:

@@ -1,7 +1,7 @@
-"""Diagrams of knots: crossings of a closed curve seen from one side, in the order in which the curve goes through them.
+"""Diagrams of knots: crossings of a closed curve seen from one side, in their order along the curve.
 
-What tells knots apart is read off them: the Alexander polynomial [Alexander 1928, by Fox's calculus], and the signature
-from a checkerboard surface [Gordon and Litherland 1978].
+A diagram determines two invariants of the knot: the Alexander polynomial [Alexander 1928, by Fox's calculus], and the
+signature, from a checkerboard surface [Gordon and Litherland 1978].
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ class Diagram:
     Attributes
     ----------
     crossing : ndarray of shape (2 crossings,)
-        Which one each passage goes through.
+        Crossing of each passage.
     over : ndarray of bool, shape (2 crossings,)
-        Whether above the other.
+        True if the passage is above the other one.
     sign : ndarray of shape (crossings,)
-        1 where the lower strand goes to the left of the upper one's way, else -1.
+        1 if the lower strand goes to the left of the upper strand's direction, else -1.
     """
 
     crossing: IntArray
@@ -40,7 +40,7 @@ class Diagram:
     sign: IntArray
 
     def passages(self) -> tuple[IntArray, IntArray]:
-        """For each crossing the passage above and that below."""
+        """Return for each crossing its upper and its lower passage."""
         count = len(self.sign)
         above, below = np.empty(count, int), np.empty(count, int)
         above[self.crossing[self.over]] = np.flatnonzero(self.over)
@@ -49,7 +49,7 @@ class Diagram:
 
 
 def closed_far_away(points: FloatArray) -> FloatArray:
-    """Join the ends of an open curve outside: straight away from its middle, and round far from it; shape (n, 3)."""
+    """Join the ends of an open curve on the outside, straight away from its middle and around at a distance, (n, 3)."""
     middle = points.mean(0)
     size = float(np.linalg.norm(points - middle, axis=1).max())
     ways = []
@@ -112,15 +112,15 @@ def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
 
 
 def alexander(found: Diagram) -> IntArray:
-    """Coefficients of the Alexander polynomial, from the lowest power, that sum to 1.
+    """Return the coefficients of the Alexander polynomial, from the lowest power on; they sum to 1.
 
-    Each crossing relates the arc above to those that meet below it; a minor of these relations is the polynomial, up to
-    a power of t and a sign. It is found from its values at roots of unity.
+    Each crossing relates its upper arc to the two arcs below it. A minor of these relations is the polynomial, up to a
+    power of t and a sign. Its values at roots of unity determine the coefficients.
 
     Raises
     ------
     ValueError
-        So many crossings that rounding hides the coefficients.
+        Too many crossings: rounding hides the coefficients.
     """
     count = len(found.sign)
     if count < 3:
@@ -148,11 +148,11 @@ def alexander(found: Diagram) -> IntArray:
 
 
 def signature(found: Diagram) -> int:
-    """Signature of the knot.
+    """Return the signature of the knot.
 
-    Faces of the diagram are coloured like a chessboard. The white ones carry Goeritz's form; from its signature go the
-    crossings where the black surface cannot follow the curve's direction. Signs are those that give the right-handed
-    trefoil -2.
+    Faces of the diagram are coloured like a chessboard. The white faces determine Goeritz's form. The result is its
+    signature, minus the crossings where the black surface cannot follow the direction of the curve. With these signs
+    the right-handed trefoil has -2.
     """
     count = len(found.sign)
     if count < 3:

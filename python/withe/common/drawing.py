@@ -1,4 +1,4 @@
-"""Geometry of a rod as it is drawn: centreline, directors, and the curvature and twist built into them."""
+"""Geometry of a drawn rod: centreline, directors, and its curvature and twist."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ def edge_vectors(points: FloatArray, closed: bool) -> FloatArray:
 
 
 def check_edges(points: FloatArray, closed: bool, owner: str) -> FloatArray:
-    """Lengths of the edges, shape (edges,) [m].
+    """Return the lengths of the edges, shape (edges,) [m].
 
     Raises
     ------
     ValueError
-        An edge without length, or one that folds straight back on the one before it, which leaves the
-        direction of its bend open.
+        An edge of zero length, or one that folds straight back onto the previous edge, so that the direction of the
+        bend is undetermined.
     """
     edges = edge_vectors(points, closed)
     lengths = np.sqrt(np.sum(edges**2, axis=1))
@@ -55,7 +55,7 @@ def check_edges(points: FloatArray, closed: bool, owner: str) -> FloatArray:
 
 
 def resample(points: FloatArray, nodes: int, closed: bool) -> tuple[FloatArray, float]:
-    """Points evenly spaced by arc length along a polyline, and how far apart [m]; the ends of an open one are kept."""
+    """Return evenly spaced points along a polyline, and their distance [m]; the ends of an open polyline are kept."""
     chain = np.concatenate([points, points[:1]]) if closed else points
     arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(chain, axis=0), axis=1))])
     edges = nodes if closed else nodes - 1
@@ -68,7 +68,7 @@ def resample(points: FloatArray, nodes: int, closed: bool) -> tuple[FloatArray, 
 
 
 def default_normal(tangent: FloatArray) -> FloatArray:
-    """A unit normal to any direction: the first coordinate axis that is not close to it, made normal."""
+    """Return a unit normal to a direction, from the first coordinate axis that is not close to it."""
     axis = np.eye(3)[int(np.flatnonzero(np.abs(tangent) <= 0.6)[0])]
     normal = axis - tangent * (tangent @ axis)
     return np.asarray(normal / np.linalg.norm(normal), np.float64)
@@ -92,7 +92,7 @@ def _transport(d: FloatArray, t0: FloatArray, t1: FloatArray) -> FloatArray:
 
 
 def voronoi_lengths(lengths: FloatArray, closed: bool) -> FloatArray:
-    """Rest length that belongs to each stencil, the mean of its two edges, shape (stencils,) [m]."""
+    """Return the rest length of each stencil, the mean of its two edges, shape (stencils,) [m]."""
     if closed:
         return 0.5 * (np.roll(lengths, 1) + lengths)
     return 0.5 * (lengths[:-1] + lengths[1:])
@@ -112,7 +112,7 @@ def smooth_curvature(discrete: FloatArray, voronoi: FloatArray) -> FloatArray:
 def natural_shape(
     tangents: FloatArray, directors: FloatArray, voronoi: FloatArray, closed: bool, rounding: float = 0.0
 ) -> tuple[FloatArray, FloatArray]:
-    """Curvature and twist of a rod as it is drawn.
+    """Return curvature and twist of a rod as drawn.
 
     Parameters
     ----------
@@ -121,13 +121,12 @@ def natural_shape(
     voronoi : ndarray of shape (stencils,) [m]
     closed : bool
     rounding : float [rad]
-        Turns and twists below it are taken for zero: what rounding leaves of a straight rod must not
-        make it curved.
+        Angles below it are set to zero, so that rounding errors of a straight rod do not make it curved.
 
     Returns
     -------
     curvature : ndarray of shape (stencils, 2) [1/m]
-        Of the smooth rod, towards d1 and d2.
+        Curvature of the smooth rod, towards d1 and d2.
     twist : ndarray of shape (stencils,) [rad/m]
     """
     strains = np.asarray(_core.drawn_strains(tangents, directors, closed))
@@ -148,7 +147,7 @@ def rotation_about(vector: FloatArray) -> FloatArray:
 
 
 def rotation_between(start: FloatArray, end: FloatArray, spare: FloatArray) -> FloatArray:
-    """The smallest rotation that takes one unit vector to another; about `spare` where they are opposite."""
+    """Return the smallest rotation from one unit vector to another; about `spare` if they are opposite."""
     axis = np.cross(start, end)
     sine, cosine = float(np.sqrt(axis @ axis)), float(start @ end)
     if sine < 1e-12:
@@ -159,7 +158,7 @@ def rotation_between(start: FloatArray, end: FloatArray, spare: FloatArray) -> F
 def drawn_frame(
     tangents: FloatArray, directors: FloatArray, lengths: FloatArray, node: int, closed: bool
 ) -> tuple[FloatArray, FloatArray]:
-    """Tangent and first director at a node, between those of its edges or half an edge beyond the last."""
+    """Return tangent and first director at a node, between its two edges, or half an edge beyond the last edge."""
     edges = len(tangents)
     before = node - 1 if node > 0 else (edges - 1 if closed else -1)
     after = node if node < edges else -1

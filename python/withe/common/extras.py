@@ -1,4 +1,4 @@
-"""Packages that are installed on demand, imported when first used."""
+"""Optional packages, imported on first use."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ def require(module: str, extra: str) -> Any:
     Parameters
     ----------
     module : str
-        What to import, such as "matplotlib.pyplot".
+        Module to import, such as "matplotlib.pyplot".
     extra : str
-        The extra that installs it, such as "view".
+        Extra that installs it, such as "view".
 
     Returns
     -------

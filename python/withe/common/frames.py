@@ -1,4 +1,4 @@
-"""Recorded frames, as files and pictures read them: whatever answers to the read-outs of a `Record`."""
+"""Recorded frames for files and pictures: any object with the read-outs of a `Record`."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ ENERGIES = tuple(field.name for field in fields(EnergyHistory))
 
 
 class Frames(Protocol):
-    """The motion of a scene, frame by frame; a rod or an obstacle is given by its outline, its handle or its name."""
+    """Motion of a scene, frame by frame. A rod or an obstacle is given by its outline, its handle or its name."""
 
     def __len__(self) -> int:
         """Number of frames."""
@@ -52,19 +52,19 @@ class Frames(Protocol):
 
     @property
     def rods(self) -> tuple[RodOutline, ...]:
-        """In the order of the scene."""
+        """Rods in the order of the scene."""
 
     @property
     def obstacles(self) -> tuple[ObstacleOutline, ...]:
-        """In the order of the scene."""
+        """Obstacles in the order of the scene."""
 
     @property
     def springs(self) -> tuple[SpringOutline, ...]:
-        """In the order of the scene."""
+        """Springs in the order of the scene."""
 
     @property
     def tendons(self) -> tuple[TendonOutline, ...]:
-        """In the order of the scene."""
+        """Tendons in the order of the scene."""
 
     def positions(self, rod: Named | None = None) -> FloatArray:
         """Positions of the nodes of a rod, or of all, shape (frames, nodes, 3) [m]."""
@@ -76,10 +76,10 @@ class Frames(Protocol):
         """Material frames of the edges, shape (frames, edges, 3, 3), rows d1, d2, tangent."""
 
     def curvatures(self, rod: Named) -> FloatArray:
-        """Towards d1 and d2, shape (frames, stencils, 2) [1/m]."""
+        """Curvatures towards d1 and d2, shape (frames, stencils, 2) [1/m]."""
 
     def twists(self, rod: Named) -> FloatArray:
-        """Shape (frames, stencils) [rad/m]."""
+        """Twists per length, shape (frames, stencils) [rad/m]."""
 
     def tensions(self, rod: Named) -> FloatArray:
         """Axial forces of the edges, shape (frames, edges) [N]."""
@@ -88,11 +88,11 @@ class Frames(Protocol):
         """Positions of an obstacle: a plane's point, a sphere's centre or a capsule's start, shape (frames, 3) [m]."""
 
     def energy(self) -> EnergyHistory:
-        """Every one an array of shape (frames,) [J]."""
+        """Energies, each an array of shape (frames,) [J]."""
 
 
 def edges_to_nodes(values: npt.NDArray[np.float64], closed: bool) -> npt.NDArray[np.float64]:
-    """Mean of the two edges at each node; the end nodes of an open rod take that of their one edge.
+    """Return the mean of the two edges at each node. The end nodes of an open rod take the value of their only edge.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def edges_to_nodes(values: npt.NDArray[np.float64], closed: bool) -> npt.NDArray
 
 
 def stencils_to_nodes(values: npt.NDArray[np.float64], closed: bool) -> npt.NDArray[np.float64]:
-    """Values at the inner nodes of an open rod, carried on to its ends; shape (frames, nodes, ...)."""
+    """Extend the values at the inner nodes of an open rod to its ends; shape (frames, nodes, ...)."""
     if closed:
         return values
     padding = [(0, 0), (1, 1)] + [(0, 0)] * (values.ndim - 2)

@@ -1,6 +1,6 @@
-"""Arguments that a call does not take: what the user may have meant.
+"""Hints for wrong arguments: the argument that the user may have meant.
 
-Words are compared with those of other packages and for near misses.
+Words are compared with the words of other packages, and with similar words.
 """
 
 from __future__ import annotations
@@ -114,16 +114,16 @@ _COUNTED_OTHERWISE: dict[str, tuple[str, str]] = {
 
 
 def keyword_hints(target: T) -> T:
-    """Let a function, or a class in its constructor and public methods, say what an unknown keyword may have meant.
+    """Make a function, or the constructor and public methods of a class, suggest a keyword for an unknown one.
 
-    And by which names to give what was given by position and has no place there. What a call costs grows by one more
-    call and nothing else: signatures are looked at only after Python has refused the arguments. What the function
-    itself raises, TypeErrors too, passes through.
+    For too many positional arguments, the message names the keywords. The decorator costs one additional call:
+    signatures are inspected only after Python has refused the arguments. Exceptions of the function itself, also
+    TypeErrors, pass through.
 
     Parameters
     ----------
     target : function or class
-        A decorated function keeps its signature and docstring; of a class the functions defined in it do.
+        A decorated function keeps its signature and docstring. For a class, the functions defined in it are decorated.
 
     Examples
     --------

@@ -33,9 +33,9 @@ class RodOutline:
     ----------
     name : str
     rows : ndarray of int, shape (nodes,)
-        The rod's rows among the nodes of the scene.
+        Rows of the rod among the nodes of the scene.
     closed : bool
-        Whether the last node is joined to the first by an edge.
+        True if an edge joins the last node to the first.
     radii : ndarray of shape (edges,) [m]
     widths : ndarray of shape (edges, 2) [m], or None
         Sides of a rectangular section along d1 and d2; None for a round one.
@@ -66,9 +66,9 @@ class ObstacleOutline:
     ----------
     name : str
     kind : {"plane", "capsule"}
-        A sphere is a capsule without length.
+        Kind of the obstacle; a sphere is a capsule of length zero.
     axis : ndarray of shape (3,)
-        Normal of a plane; from the start of a capsule's axis to its end [m].
+        Normal of a plane; or the vector from the start of a capsule's axis to its end [m].
     radius : float [m]
     """
 
@@ -86,7 +86,7 @@ class SpringOutline:
     ----------
     name : str
     rows : pair of int
-        Rows of its nodes among those of the scene.
+        Rows of its nodes among the nodes of the scene.
     """
 
     name: str
@@ -101,9 +101,9 @@ class TendonOutline:
     ----------
     name : str
     guides : tuple of (int, int, float)
-        Of each guide: rod, among those of the scene, edge of the rod, and place along it, from 0 to 1.
+        Position of each guide: index of the rod in the scene, edge of the rod, and place along the edge, from 0 to 1.
     offsets : ndarray of shape (guides, 2) [m]
-        Along the directors of its edge.
+        Offsets along the directors of the edge.
     """
 
     name: str
@@ -116,7 +116,7 @@ class TendonOutline:
         Parameters
         ----------
         positions : mapping of int to ndarray of shape (..., nodes, 3) [m]
-            Of each rod with a guide.
+            Positions of the nodes of each rod with a guide.
         directors : mapping of int to ndarray of shape (..., edges, 3, 3)
 
         Returns
@@ -131,7 +131,7 @@ class TendonOutline:
 
 
 def index_of(outlines: tuple[RodOutline, ...] | tuple[ObstacleOutline, ...], handle: Named, what: str) -> int:
-    """Place of a rod or an obstacle among those of a record, by its name or its handle."""
+    """Return the index of a rod or an obstacle in a record, by its name or its handle."""
     name = handle if isinstance(handle, str) else getattr(handle, "name", None)
     names = [outline.name for outline in outlines]
     if name not in names:

@@ -1,7 +1,7 @@
-"""A progress bar on stderr: drawn by rich where it is installed, as plain text where it is not.
+"""A progress bar on stderr, drawn by rich if it is installed, and otherwise as plain text.
 
 Nothing is drawn when stderr is not a terminal, so that a log file stays readable. One bar may serve many threads: each
-takes a task, a share of the bar's total.
+has a task, which is a share of the bar's total.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _drawn = threading.Lock()  # held by the one bar on the screen; a nested bar sta
 
 
 class Progress:
-    """Counts what is done of a total, from any thread, and draws nothing. See `progress`."""
+    """Counter of completed work from any thread, which draws nothing. See `progress`."""
 
     def __init__(self, total: float, description: str = "", unit: str = "s") -> None:
         if not total >= 0.0:
@@ -46,19 +46,19 @@ class Progress:
         return self.completed / self.total if self.total > 0.0 else 1.0
 
     def advance(self, amount: float) -> None:
-        """Add to what is done."""
+        """Add to the completed part."""
         with self._lock:
             self._completed += amount
             self._draw_when_due()
 
     def update(self, completed: float) -> None:
-        """Replace what is done."""
+        """Set the completed part."""
         with self._lock:
             self._completed = float(completed)
             self._draw_when_due()
 
     def task(self, total: float) -> Task:
-        """Take a share of the bar, for one of several things that run side by side."""
+        """Return a share of the bar, for one of several parallel tasks."""
         return Task(self, total)
 
     def _draw_when_due(self) -> None:
@@ -86,13 +86,13 @@ class Task:
         self._completed = 0.0
 
     def update(self, completed: float) -> None:
-        """Replace what is done of this share; more than the share counts as the whole of it."""
+        """Set the completed part of this share, at most the whole share."""
         completed = min(float(completed), self._total)
         self._bar.advance(completed - self._completed)
         self._completed = completed
 
     def finish(self) -> None:
-        """Count the whole share as done: what is left will not be run."""
+        """Complete the whole share: the rest of it will not run."""
         self.update(self._total)
 
 
@@ -172,12 +172,12 @@ def progress(
     *,
     unit: str = "s",
 ) -> Iterator[Progress]:
-    """Show how much of a total is done while the body runs.
+    """Show the completed part of a total while the body runs.
 
     Parameters
     ----------
     total : float
-        What counts as all of it, such as the duration of a run.
+        Amount of the whole work, such as the duration of a run.
     description : str
         Text before the bar.
     enabled : bool
@@ -188,8 +188,8 @@ def progress(
     Yields
     ------
     Progress
-        Its `update(completed)` and `advance(amount)` may be called as often as one likes, from any
-        thread; `task(total)` takes a share for one of several runs.
+        Its `update(completed)` and `advance(amount)` may be called often and from any thread. `task(total)` returns a
+        share for one of several runs.
 
     Raises
     ------

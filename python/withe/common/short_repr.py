@@ -14,7 +14,7 @@ _LISTED = 60  # characters of anything else
 
 
 class ShortRepr:
-    """Base of dataclasses, made with ``repr=False``, that show long arrays by their shapes and ranges."""
+    """Base of dataclasses with ``repr=False`` that shows long arrays by their shapes and ranges."""
 
     def __repr__(self) -> str:
         shown = [f"{f.name}={_short(getattr(self, f.name))}" for f in fields(self) if f.repr]  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""Warnings located at the line of the user that led to them, and each cause once where many simulations share it."""
+"""Warnings at the line of the user that caused them, with each cause once if many simulations share it."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _place: ContextVar[Place | None] = ContextVar("place", default=None)
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """A line of code, as `warnings.warn_explicit` takes it."""
+    """A line of code, in the form of `warnings.warn_explicit`."""
 
     filename: str
     line: int
@@ -48,10 +48,10 @@ def warn(message: str, category: type[Warning] = UserWarning, cause: str = "") -
     Parameters
     ----------
     message : str
-        Its first clause says in at most twelve words what is wrong.
+        Message whose first clause names the problem in at most twelve words.
     category : type of Warning
     cause : str
-        Tells apart what has one category: within `each_cause_once` each cause is reported once.
+        Distinguishes warnings of one category: within `each_cause_once` each cause is reported once.
     """
     heard = _heard.get()
     if heard is not None:
@@ -64,7 +64,7 @@ def warn(message: str, category: type[Warning] = UserWarning, cause: str = "") -
 
 @contextmanager
 def each_cause_once(heard: set[Cause]) -> Iterator[None]:
-    """Leave out the warnings whose cause is in `heard`, and add those that are given."""
+    """Omit the warnings whose cause is in `heard`, and add the causes of the others."""
     token = _heard.set(heard)
     try:
         yield
@@ -74,7 +74,7 @@ def each_cause_once(heard: set[Cause]) -> Iterator[None]:
 
 @contextmanager
 def located_at(place: Place) -> Iterator[None]:
-    """Locate warnings at a line, as those of a thread at the line that started it."""
+    """Locate warnings at a line; those of a thread at the line that started the thread."""
     token = _place.set(place)
     try:
         yield

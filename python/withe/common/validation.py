@@ -1,4 +1,4 @@
-"""Checks of what users hand in, at the border: each says which argument, what was expected and what came."""
+"""Checks of user input at the border. Each message names the argument, the expected value and the given value."""
 
 from __future__ import annotations
 
@@ -46,12 +46,12 @@ _ORTHONORMAL = 1e-15  # to which rotations and their products are rounded
 
 
 def number(value: Any, what: str) -> float:
-    """A finite real number.
+    """Return a finite real number.
 
     Raises
     ------
     ValueError
-        Not a real number, or not finite.
+        The value is not a real number, or not finite.
     """
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
@@ -69,7 +69,7 @@ def number(value: Any, what: str) -> float:
 
 
 def positive(value: Any, what: str) -> float:
-    """A finite number above zero."""
+    """Return a finite number above zero."""
     result = number(value, what)
     if result <= 0.0:
         raise ValueError(f"{what} must be positive, got {result:g}")
@@ -77,7 +77,7 @@ def positive(value: Any, what: str) -> float:
 
 
 def non_negative(value: Any, what: str) -> float:
-    """A finite number, zero or more."""
+    """Return a finite number, zero or more."""
     result = number(value, what)
     if result < 0.0:
         raise ValueError(f"{what} must not be negative, got {result:g}")
@@ -85,7 +85,7 @@ def non_negative(value: Any, what: str) -> float:
 
 
 def share(value: Any, what: str) -> float:
-    """A number from 0 to 1, both included."""
+    """Return a number from 0 to 1, both included."""
     result = number(value, what)
     if not 0.0 <= result <= 1.0:
         raise ValueError(f"{what} must be from 0 to 1, got {result:g}")
@@ -93,7 +93,7 @@ def share(value: Any, what: str) -> float:
 
 
 def integer(value: Any, what: str, low: int, high: int) -> int:
-    """A whole number in low..high, both included."""
+    """Return a whole number in low..high, both included."""
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
     if isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Integral):
@@ -105,14 +105,14 @@ def integer(value: Any, what: str, low: int, high: int) -> int:
 
 
 def truth(value: Any, what: str) -> bool:
-    """True or False, and nothing that merely counts as one of them."""
+    """Return True or False; other values that count as true or false are refused."""
     if not isinstance(value, bool | np.bool_):
         raise ValueError(f"{what} must be True or False, got {_short(value)}")
     return bool(value)
 
 
 def choice(value: Any, what: str, options: Sequence[str]) -> str:
-    """One of several words."""
+    """Return one of several words."""
     if not isinstance(value, str) or value not in options:
         near = near_word(value, options) if isinstance(value, str) else None
         meant = "" if near is None else f"; did you mean {near!r}?"
@@ -121,7 +121,7 @@ def choice(value: Any, what: str, options: Sequence[str]) -> str:
 
 
 def near_word(value: str, options: Iterable[str]) -> str | None:
-    """The word that was probably meant: spelt alike, or of which a part was given."""
+    """Return the word that was probably meant: one with a similar spelling, or one that contains the value."""
     known = list(options)
     plain = value.strip().lower().replace("-", "_").replace(" ", "_")
     near = get_close_matches(plain, known, 1) or [word for word in known if len(plain) > 2 and plain in word]
@@ -137,27 +137,27 @@ def file_path(value: str | os.PathLike[str], *suffixes: str, instead: str = "") 
 
 
 def function(value: Any, what: str) -> Callable[..., Any]:
-    """Something that can be called."""
+    """Return an object that can be called."""
     if not callable(value):
         raise ValueError(f"{what} must be a function, got {_short(value)}")
     return value  # type: ignore[no-any-return]
 
 
 def number_array(value: Any, what: str, *shapes: tuple[int | str, ...]) -> FloatArray:
-    """A copy of an array of finite numbers in one of several shapes.
+    """Return a copy of an array of finite numbers in one of several shapes.
 
     Parameters
     ----------
     value : array_like
     what : str
-        Named in errors.
+        Name for errors.
     *shapes : tuple of int or str
-        Sizes; a word stands for any size, and is used in errors.
+        Allowed shapes. A word stands for any size, and appears in errors.
 
     Raises
     ------
     ValueError
-        Not numbers, another shape, or not finite.
+        Not numbers, another shape, or values that are not finite.
     """
     plain = type(value) is np.ndarray and value.dtype.kind in "iuf" and value.shape in shapes
     result = np.array(value if plain else _raw_numbers(value, what, shapes), np.float64, order="C")
@@ -209,7 +209,7 @@ def _in_range(values: FloatArray) -> bool:
 
 
 def broadcast_arrays(**values: Any) -> tuple[FloatArray, ...]:
-    """Arrays of real, finite numbers of whatever shape, broadcast together; names are those of the arguments."""
+    """Return arrays of real, finite numbers of any shape, broadcast together; names are those of the arguments."""
     arrays = [
         number_array(value, name, tuple(f"n{i}" for i in range(np.ndim(value)))) for name, value in values.items()
     ]
@@ -232,18 +232,18 @@ def has_masked(value: Any) -> bool:
 
 
 def per_item(value: Any, what: str, count: int, item: str, *, zero: bool = False, sign: bool = False) -> FloatArray:
-    """One number for all, or one an item, as an array of shape (count,).
+    """Return one number for all, or one per item, as an array of shape (count,).
 
     Parameters
     ----------
     value : float or array_like of shape (count,)
     what : str
-        Named in errors.
+        Name for errors.
     count : int
     item : str
-        What the items are, in the plural: "edges".
+        Name of the items, in the plural: "edges".
     zero, sign : bool
-        Whether zero is allowed, and negative numbers too.
+        True if zero is allowed, and if negative numbers are allowed.
     """
     if is_scalar(value):
         check = number if sign else non_negative if zero else positive
@@ -258,12 +258,12 @@ def per_item(value: Any, what: str, count: int, item: str, *, zero: bool = False
 
 
 def vector(value: Any, what: str) -> FloatArray:
-    """Three finite numbers."""
+    """Return three finite numbers."""
     return number_array(value, what, (3,))
 
 
 def unit_vector(value: Any, what: str) -> FloatArray:
-    """A direction, scaled to unit length."""
+    """Return a direction, scaled to unit length."""
     direction = vector(value, what)
     largest = np.abs(direction).max()
     if largest == 0.0:
@@ -273,12 +273,12 @@ def unit_vector(value: Any, what: str) -> FloatArray:
 
 
 def rotation_matrix(value: Any, what: str) -> FloatArray:
-    """A rotation, as a matrix of shape (3, 3), from a unit quaternion (w, x, y, z), a SciPy Rotation or such a matrix.
+    """Return a rotation matrix of shape (3, 3), from a unit quaternion (w, x, y, z), a SciPy Rotation or a matrix.
 
     Raises
     ------
     ValueError
-        None of these, not orthogonal to 1e-6, or a reflection.
+        Another type, a matrix that is not orthogonal to 1e-6, or a reflection.
     """
     as_matrix = getattr(value, "as_matrix", None)
     given = as_matrix() if callable(as_matrix) else value
@@ -304,7 +304,7 @@ def rotation_matrix(value: Any, what: str) -> FloatArray:
 
 
 def quaternion_matrix(quaternion: FloatArray, what: str) -> FloatArray:
-    """Rotation of a unit quaternion w, x, y, z."""
+    """Return the rotation of a unit quaternion w, x, y, z."""
     size = float(np.linalg.norm(quaternion))
     if abs(size - 1.0) > 1e-6:
         raise ValueError(f"{what} must have a quaternion qw, qx, qy, qz of length 1, got one of {size:g}")

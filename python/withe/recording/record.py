@@ -1,7 +1,7 @@
 """Records: the read-outs of a simulation, frame by frame.
 
-A `Record` answers to the same read-outs as a `Simulation`, with one more axis in front: the frames. It
-holds NumPy arrays only, so it pickles, saves to one file, and needs no engine to be looked at.
+A `Record` has the same read-outs as a `Simulation`, with one more axis in front: the frames. It holds NumPy arrays
+only, so it can be pickled and saved to one file, and reading it needs no engine.
 """
 
 from __future__ import annotations
@@ -439,7 +439,7 @@ class Record:
         return view.plot(self, **options)
 
     def view(self, **options: Any) -> Any:
-        """Turn the rods about and slide through time, in a notebook or a window.
+        """Show the rods in a notebook or a window, with controls for the view and the time.
 
         See `withe.view.view` for the options.
         """
@@ -453,7 +453,7 @@ class Record:
         return view.animate(self, path, **options)
 
     def picture(self, path: str | os.PathLike[str], **options: Any) -> Path:
-        """Render one frame, the last one unless `frame=` says otherwise, into a .png file.
+        """Render one frame into a .png file, by default the last one.
 
         See `withe.view.picture` for the options.
         """

@@ -1,4 +1,4 @@
-"""Takes the frames of a record from a simulation while it runs."""
+"""Recorder of frames from a running simulation."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ __all__ = ["Recorder", "present"]
 
 
 class Energies(Protocol):
-    """Energies of a moment, by the names of `ENERGIES`."""
+    """Energies of a moment, with the names of `ENERGIES`."""
 
     @property
     def total(self) -> float:
-        """Sum of those that a scene stores [J]."""
+        """Sum of the stored energies [J]."""
 
 
 class Drawn(Protocol):
-    """A rod's handle."""
+    """Handle of a rod."""
 
     @property
     def name(self) -> str:
@@ -33,7 +33,7 @@ class Drawn(Protocol):
 
     @property
     def rows(self) -> npt.NDArray[np.int64]:
-        """Its rows among the nodes of the scene, shape (nodes,)."""
+        """Rows of the rod among the nodes of the scene, shape (nodes,)."""
 
     @property
     def closed(self) -> bool:
@@ -45,15 +45,15 @@ class Drawn(Protocol):
 
 
 class Moving(Protocol):
-    """Object with the read-outs of `Simulation`; also to those of `ROD_READOUTS`, given a rod's name."""
+    """Object with the read-outs of `Simulation`, also those of `ROD_READOUTS` by the name of a rod."""
 
     @property
     def time(self) -> float:
-        """Now [s]."""
+        """Present time [s]."""
 
     @property
     def rods(self) -> Sequence[Drawn]:
-        """In the order of the scene."""
+        """Rods in the order of the scene."""
 
     def positions(self) -> npt.NDArray[np.float64]:
         """Positions of all nodes, shape (nodes, 3) [m]."""
@@ -62,7 +62,7 @@ class Moving(Protocol):
         """Velocities of all nodes, shape (nodes, 3) [m/s]."""
 
     def obstacle_position(self, obstacle: str, /) -> npt.NDArray[np.float64]:
-        """Shape (3,) [m]."""
+        """Position of an obstacle, shape (3,) [m]."""
 
     def energy(self) -> Energies:
         """Energies of the whole scene."""

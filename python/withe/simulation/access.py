@@ -1,7 +1,7 @@
 """Setting, reading and differentiating the words of each kind of part during a simulation.
 
-Kinds with one number a part in the engine need no row here: see `withe.simulation.numbers`. Which words a kind has is
-said in `withe.parts.table`.
+Kinds of parts with one number per part in the engine need no row here: see `withe.simulation.numbers`. The table
+`withe.parts.table` lists the words of each kind.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ def owner_of(target: Target) -> str:
 
 
 def set_words(session: Session, target: Target, values: dict[str, Any], over: float) -> None:
-    """Change numbers of a target, all or none, reached after so long [s].
+    """Change values of a target, all or none, over a duration [s].
 
     Raises
     ------
@@ -124,12 +124,12 @@ def get_word(session: Session, target: Target, word: str) -> Any:
 
 
 def reader_of(session: Session, target: Target, word: str, shape: Shape | None = None) -> Reader:
-    """Return the reader of the derivative by a word, shaped like `get` or like a value that was given.
+    """Return the reader of the derivative by a word, shaped like `get` or like a given value.
 
     Raises
     ------
     ValueError
-        No gradient is known by it.
+        The word has no gradient.
     """
     if isinstance(target, RodPart):
         return rods.rod_reader(session, target, word)  # which knows "points" too, and refuses with all its words

@@ -37,17 +37,17 @@ class CallGradient:
     Attributes
     ----------
     time : float [s]
-        When it was called.
+        Time of the call.
     call : {"set", "move"}
     target : str or None
         Name of the part, or of both bodies ("arm, floor"); None: the scene.
     over : float [s]
-        After which the value was reached; 0: at once.
+        Duration of the ramp to the value; 0 without a ramp.
     gradients : dict
-        By each word that was set, shaped like the value that it was given: dL over that value, as long as it acted. A
-        discrete_curvature is under natural_curvature, by the curvature [1/m] of every stencil; a rotation is by a
-        rotation vector, (3,) [1/rad], that turns the target. Words that have no gradient (functions of time, paths,
-        tangents and rolls, a friction of 0) are left out.
+        For each word: the derivative of L by the value of the call, while it acted, shaped like this value. A
+        discrete_curvature is under natural_curvature, by the curvature [1/m] of every stencil. A rotation is by a
+        rotation vector, (3,) [1/rad], that turns the target. Words without a gradient are missing (functions of time,
+        paths, tangents and rolls, a friction of 0).
     """
 
     time: float
@@ -58,12 +58,12 @@ class CallGradient:
 
 
 class Gradients(list[Any]):
-    """Derivatives of a scalar of a run, for each of `wrt` one.
+    """Derivatives of a scalar of a run, one for each of `wrt`.
 
     Attributes
     ----------
     calls : list of CallGradient
-        By what calls of `set` and `move` gave while the run went, in their order.
+        Derivatives by the values of calls of `set` and `move` during the run, in their order.
     """
 
     def __init__(self, values: Sequence[Any], calls: list[CallGradient]) -> None:
@@ -83,7 +83,7 @@ class _Call:
 
 
 class RunJournal:
-    """Notes what is set while a run goes; see `Session.journal`."""
+    """Journal of the values that are set during a run; see `Session.journal`."""
 
     def __init__(self, tape: _core.Tape, session: Session) -> None:
         self._tape = tape
@@ -93,7 +93,7 @@ class RunJournal:
     def note(
         self, session: Session, method: str, part: Part | BodyPair | None, values: Mapping[str, Any], over: float
     ) -> None:
-        """A call has set these."""
+        """Note the values of a call."""
         self._tape.divide()
         after = replace(session, settings=session.settings.copy(), journal=None)
         self.calls.append(_Call(self._tape.count, session.world.time, method, part, dict(values), over, after))
@@ -191,7 +191,7 @@ class _Epoch:
 
 
 class Ledger:
-    """Adds up derivatives by what acted, step by step: by what a run began with, and by what calls set."""
+    """Sums of derivatives, step by step: by initial values, and by the values of calls."""
 
     def __init__(
         self,
@@ -204,7 +204,7 @@ class Ledger:
         drawn: Sequence[DrawnNodes],
         by_moves: bool,
     ) -> None:
-        """`frames`: how many calls came before each; `by_moves`: whether derivatives by poses are known."""
+        """`frames` counts the calls before each frame. `by_moves` is true if derivatives by poses are available."""
         calls = journal.calls
         self._session, self._calls, self._frames, self._drawn = session, calls, frames, drawn
         self._unknowns = list(zip(wrt, readers, strict=True))
@@ -239,7 +239,7 @@ class Ledger:
         self.moves = by_moves and (moved or bool(self._poses))
 
     def visit(self, step: int, moment: int, time: float, found: _core.ParameterGradient) -> None:
-        """Derivatives by what acted from a step on, or in a read-out at a moment."""
+        """Add derivatives by parameters from a step on, or of a read-out at a moment."""
         after = self._frames[moment] if moment >= 0 else int(np.searchsorted(self._steps, step, side="right"))
         epoch = self._epochs[after]
         for place, (unknown, reader) in enumerate(self._unknowns):
@@ -259,7 +259,7 @@ class Ledger:
                     self._add(index, key[1], weight * np.asarray(read(OfRun(found))))
 
     def visit_poses(self, step: int, reached: _core.Reached, found: _core.PoseAdjoint) -> None:
-        """Derivatives by poses of supports and obstacles at the end of a step."""
+        """Add derivatives by poses of supports and obstacles at the end of a step."""
         epoch = self._epochs[int(np.searchsorted(self._steps, step, side="right"))]
         for key, way in epoch.ways.items():
             by = self._by_pose(epoch.session, key, found)
@@ -274,7 +274,7 @@ class Ledger:
             self._add_pose(key, self._by_pose(epoch.session, key, found))
 
     def add_start(self, found: _core.PoseAdjoint) -> None:
-        """Derivatives by where supports hold what the run began with."""
+        """Add derivatives by the initial poses of supports."""
         for key in set(self._poses.values()):
             self._add_pose(key, self._by_pose(self._session, key, found))
 

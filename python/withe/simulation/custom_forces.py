@@ -1,4 +1,4 @@
-"""Custom forces as the engine asks for them: forces, moments, and their derivatives, given or by differences."""
+"""Custom forces for the engine: forces, moments, and their derivatives, given or by finite differences."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ class CustomForces:
     ----------
     parts : sequence of CustomForcePart
     length : float [m]
-        Differences are taken over a small part of it: that of the shortest edge.
+        Length of the shortest edge. Finite differences use a small part of it.
     check_forces, check_moments : callable
-        Given an array and what to call it, refuse what leaves the plane of the scene.
+        Functions of an array and its name that refuse components out of the plane of the scene.
     """
 
     def __init__(
@@ -65,12 +65,12 @@ class CustomForces:
         return total[0], moments, _sum(by_positions), _sum(by_velocities)
 
     def check(self, part: CustomForcePart, time: float, positions: FloatArray, velocities: FloatArray) -> None:
-        """Compare a Jacobian with differences of its function.
+        """Compare a Jacobian with finite differences of its function.
 
         Raises
         ------
         ValueError
-            The entry that is farthest off.
+            The Jacobian differs; the message names the entry with the greatest error.
         """
         if part.jacobian is None:
             raise ValueError(f"custom force {part.name!r} has no jacobian to check")

@@ -1,4 +1,4 @@
-"""Gradients of equilibria and of runs by the nodes of a rod as it was drawn."""
+"""Gradients of equilibria and of runs by the drawn nodes of a rod."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ class Moment:
     ----------
     positions : ndarray of shape (nodes, 3) [m]
     directors : list of ndarray of shape (edges, 3)
-        The first ones, rod by rod.
+        First directors, rod by rod.
     natural_curvature, natural_twist : list of ndarray
-        Rod by rod.
+        Natural shapes, rod by rod.
     supports : dict
-        Place and rotation of each, by its index.
+        Position and rotation of each support, by its index.
     spring_lengths : list of float [m]
-        At rest.
+        Rest lengths of springs.
     frames_as_drawn : bool
-        Whether joints and clamps are turned as they were drawn.
+        True if joints and clamps are oriented as drawn.
     """
 
     positions: FloatArray
@@ -49,7 +49,7 @@ class Moment:
 
     @classmethod
     def now(cls, session: Session) -> Moment:
-        """The present one."""
+        """Return the present moment."""
         world, rods = session.world, range(len(session.directory.all(RodPart)))
         return cls(
             np.array(world.positions()),

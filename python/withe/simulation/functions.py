@@ -1,4 +1,4 @@
-"""Functions that a user gave: loads and paths that vary with time, and custom forces."""
+"""Functions of the user: loads and paths that vary with time, and custom forces."""
 
 from __future__ import annotations
 

@@ -72,11 +72,10 @@ def equilibrium_gradient(session: Session, by: Loss, wrt: Sequence[Unknown]) -> 
 
 
 def equilibrium_gradients(session: Session, by_positions: FloatArray, wrt: Sequence[Unknown]) -> list[list[Any]]:
-    """Derivatives of several scalars of the present equilibrium, for each of `wrt` one a scalar.
+    """Derivatives of several scalars of the present equilibrium: for each of `wrt`, one per scalar.
 
-    `by_positions` of shape (scalars, nodes, 3), finite, in the plane of a planar scene.
-
-    The stiffness is factorised once for all of them.
+    `by_positions` has the shape (scalars, nodes, 3), is finite, and lies in the plane of a planar scene. The stiffness
+    is factorised once for all scalars.
     """
     return _gradients(session, [_by_positions(each) for each in by_positions], wrt)
 
@@ -231,13 +230,13 @@ class RunDerivatives:
         self._calls: list[int] = []
 
     def note_frame(self) -> None:
-        """A frame has been taken."""
+        """Note that a frame was recorded."""
         self._running.world.note_moment()
         self._steps.append(self._tape.count)
         self._calls.append(len(self._journal.calls))
 
     def end(self) -> None:
-        """The run is over."""
+        """End the run."""
         self._running.world.stop_tape()
         self._running.journal = None
 

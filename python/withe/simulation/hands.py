@@ -1,4 +1,4 @@
-"""Hands of a simulation: put on, moved, read and taken off by their own methods."""
+"""Hands of a simulation, with methods to move, read and release them."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class HeldPose(NamedTuple):
     ----------
     position : ndarray of shape (3,) [m]
     rotation : ndarray of shape (3, 3)
-        Of a hand: its axes as columns. Of a clamp: from the orientation as drawn.
+        For a hand: its axes as columns. For a clamp: its rotation since the drawing.
     """
 
     position: FloatArray
@@ -57,16 +57,16 @@ class HeldPose(NamedTuple):
 
 
 class Deflection(NamedTuple):
-    """Displacement of the held part of the rod relative to the hand, in the hand's axes; the mean of a long hand.
+    """Displacement of the held part of the rod relative to the hand, in the axes of the hand; the mean for a long hand.
 
     Attributes
     ----------
     shift : ndarray of shape (3,) [m]
-        Which the stiffness resists.
+        Elastic displacement, which the stiffness resists.
     turn : ndarray of shape (3,) [rad]
-        As a rotation vector.
+        Elastic rotation, as a rotation vector.
     slip : ndarray of shape (3,) [m]
-        By how much it has slipped besides, beyond the force limit.
+        Additional slip beyond the force limit.
     """
 
     shift: FloatArray
@@ -80,13 +80,13 @@ class Passage(NamedTuple):
     Attributes
     ----------
     at : float [m]
-        Arc length of the rod where the ring is, undeformed.
+        Undeformed arc length of the rod at the ring.
     pull : float [N]
-        Of friction or a drive, backwards along the rod; negative: forwards. 0 where nothing holds the rod along itself.
+        Force of friction or a drive along the rod, positive backwards. 0 if nothing holds the rod along itself.
     press : float [N]
-        Force across the rod.
+        Transverse force on the rod.
     feed_rate : float or None [m/s]
-        Of the drive; None without one.
+        Feed rate of the drive; None without a drive.
     """
 
     at: float
@@ -98,7 +98,7 @@ class Passage(NamedTuple):
 @keyword_hints
 @dataclass(frozen=True)
 class RunningHand(Hand):
-    """A hand of a simulation, as `Simulation.grasp` returns it: its handle, which acts on that simulation.
+    """A hand of a simulation, as `Simulation.grasp` returns it: a handle with methods that act on this simulation.
 
     Copies and pickles are plain handles. A copy of the simulation has a hand of the same name:
     ``copy.hand(hand.name)``.
@@ -133,11 +133,11 @@ class RunningHand(Hand):
         over: float = 0.0,
         path: PathLike | None = None,
     ) -> None:
-        """Move the hand. See `Simulation.move`; its rotation is that of its axes in the world."""
+        """Move the hand. See `Simulation.move`; the rotation is that of the hand's axes in the world."""
         move_support(self.session, self, position, rotation, tangent, roll, over, path)
 
     def wrench(self, about: npt.ArrayLike | None = None) -> Reaction:
-        """Force and moment of the hand on the rod, as one. See `Simulation.wrench`."""
+        """Return the total force and moment of the hand on the rod. See `Simulation.wrench`."""
         return hand_wrench(self.session, self, about)
 
     @property
@@ -151,21 +151,21 @@ class RunningHand(Hand):
         return ring_passage(self.session, self)
 
     def feed(self, rate: float) -> None:
-        """Feed the rod at a rate from now on. See `Simulation.feed`."""
+        """Set the feed rate. See `Simulation.feed`."""
         feed_ring(self.session, self, rate)
 
     def release(self) -> None:
-        """Let go. See `Simulation.release`."""
+        """Release the rod. See `Simulation.release`."""
         release(self.session, self)
 
 
 def find_hand(session: Session, hand: Handle | str) -> int:
-    """Index of a hand in the engine.
+    """Return the index of a hand in the engine.
 
     Raises
     ------
     ValueError
-        No hand, or released.
+        Not a hand, or a released one.
     """
     index, part = find_support(session, hand)
     if part.grasp is None:
@@ -198,7 +198,7 @@ def ring_passage(session: Session, hand: Handle | str) -> Passage:
 
 
 def feed_ring(session: Session, hand: Handle | str, rate: float) -> None:
-    """Set what a drive feeds; see `Simulation.feed`."""
+    """Set the feed rate of a ring; see `Simulation.feed`."""
     index, grasp = _find_ring(session, hand)
     name = hand if isinstance(hand, str) else hand.name
     if grasp.feed_rate is None:
@@ -207,12 +207,12 @@ def feed_ring(session: Session, hand: Handle | str, rate: float) -> None:
 
 
 def ring_friction(session: Session, ring: Handle | str) -> float:
-    """Coefficient of friction of a ring."""
+    """Return the friction coefficient of a ring."""
     return _find_ring(session, ring)[1].friction
 
 
 def set_ring_friction(session: Session, ring: Handle | str, friction: float) -> None:
-    """Set it, of a ring without a drive."""
+    """Set the friction coefficient of a ring without a drive."""
     index, grasp = _find_ring(session, ring)
     session.world.set_ring_friction(index, friction)
     name = ring if isinstance(ring, str) else ring.name
@@ -222,7 +222,7 @@ def set_ring_friction(session: Session, ring: Handle | str, friction: float) -> 
 
 
 def forget_left_rings(session: Session, left: Iterable[tuple[int, float]]) -> None:
-    """Note that the engine has released rings, by their index and when, since rods have left them."""
+    """Note rings that the engine has released, by index and time, because their rods have left them."""
     for released, time in left:
         name, part = next((n, part) for n, (index, part) in session.settings.supports.items() if index == released)
         forget(session, part)
@@ -244,7 +244,7 @@ def support_pose(session: Session, support: Handle | str) -> HeldPose:
 
 
 def set_support(session: Session, part: SupportPart, values: dict[str, Any], over: float) -> None:
-    """Move a support, there after so long [s] or within the next step; change the friction of a ring."""
+    """Move a support over a duration [s], or within the next step; or change the friction of a ring."""
     friction = None
     if "friction" in values:
         friction = validation.non_negative(values["friction"], f"friction of {part.name!r}")
@@ -264,7 +264,7 @@ def support_value(session: Session, part: SupportPart, word: str) -> Any:
 
 
 def support_reader(session: Session, part: SupportPart, word: str) -> Reader:
-    """Return the reader of the derivative by where a support is, or by how a hand yields."""
+    """Return the reader of the derivative by the pose of a support, or by the stiffness of a hand."""
     if word in POSE_WORDS:
         return _pose_reader(session, part, word)
     return _hand_reader(session, part, word)

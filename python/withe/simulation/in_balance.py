@@ -1,4 +1,4 @@
-"""Rods that hang as they are drawn: the natural shape with which nothing moves."""
+"""Rods that are in balance as drawn: the natural shape for which the drawn rod does not move."""
 
 from __future__ import annotations
 

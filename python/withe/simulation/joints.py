@@ -1,4 +1,4 @@
-"""Revolute joints while a simulation runs: what is read."""
+"""Revolute joints of a running simulation: read-outs."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["find_joint"]
 
 
 def find_joint(session: Session, joint: Joint | str) -> int:
-    """The engine's number of a revolute joint, by its handle or name.
+    """Return the index of a revolute joint in the engine, by its handle or name.
 
     Raises
     ------

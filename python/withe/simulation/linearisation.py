@@ -1,15 +1,16 @@
 """Natural frequencies, modes and stability of the equations of motion linearised about a configuration.
 
-Slow motions bend N edges by 1 / N^2 of what the motion of a single node would, so their energy is 1 / N^4 of the
-entries of the stiffness matrix, which therefore rounds them away. Stiffness is kept as strains and their stiffnesses
-instead, K = Kg + G^T D G, and inverted with the forces D G x as unknowns of their own:
+Slow motions bend N edges by 1 / N^2 of the bending of a single node's motion. Their energy is 1 / N^4 of the entries of
+the stiffness matrix, and is therefore lost to rounding. The stiffness is stored as strains with their stiffnesses
+instead, K = Kg + G^T D G, and is inverted with the forces D G x as unknowns:
 
-    [Kg + s M, G^T; G, -D^-1] [x; f] = [b; 0],
+    [Kg + s M, G^T; G, -D^-1] [x; f] = [b; 0].
 
-where no large number hides a small one [Hellinger and Reissner's principle; Golub and Van Loan: Matrix computations,
-2013, 4.4 on what such systems lose]. Eigenvalues nearest to -s are those of the inverse that are greatest, found in a
-block Krylov space that M-orthogonal vectors span [Saad: Numerical methods for large eigenvalue problems, 2011, ch. 6];
-blocks, since a round rod has every mode of bending twice, a free one six at zero, and equal rods have equal ones.
+No large number hides a small one here [Hellinger and Reissner's principle; Golub and Van Loan: Matrix computations,
+2013, 4.4 on the accuracy of such systems]. The eigenvalues nearest to -s are the greatest ones of the inverse. They are
+found in a block Krylov space with an M-orthogonal basis [Saad: Numerical methods for large eigenvalue problems, 2011,
+ch. 6]. Blocks are needed for multiple eigenvalues: a round rod has every bending mode twice, a free rod has six modes
+at zero, and equal rods have equal modes.
 """
 
 from __future__ import annotations
@@ -42,21 +43,21 @@ _LOST = 0.01  # of its square, a direction that one orthonormalisation has left 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Linearisation:
-    """Equations linearised about a configuration, mass x'' + stiffness x = 0, without what supports hold.
+    """Equations linearised about a configuration, mass x'' + stiffness x = 0, for the unknowns that no support holds.
 
-    Drag and viscosity have no part in it. Loads that turn with the rod (follower forces, moments in space) make the
-    stiffness unsymmetric; then its frequencies may be complex, see `frequencies`.
+    Drag and viscosity are not included. Loads that turn with the rod (follower forces, moments in space) make the
+    stiffness unsymmetric. The frequencies may then be complex; see `frequencies`.
 
     Attributes
     ----------
     stiffness : ndarray of shape (unknowns, unknowns)
-        Tangent stiffness: node positions [m] and angles [rad] against forces [N] and moments [N m]. Made when asked
-        for; frequencies need no full matrix, and have digits that this one does not.
+        Tangent stiffness: node positions [m] and angles [rad] against forces [N] and moments [N m]. Computed on first
+        use. `frequencies` does not use this matrix, and is more accurate.
     mass : ndarray of shape (unknowns, unknowns)
-        Masses [kg] and moments of inertia [kg m^2]. Velocity varies linearly along an edge, so the matrix couples its
-        nodes; with integrator "verlet" half of each edge's mass sits at either node.
+        Masses [kg] and moments of inertia [kg m^2]. Velocity varies linearly along an edge, so the matrix couples the
+        nodes of an edge. With integrator "verlet" half of each edge's mass is at either node.
     displacement : ndarray of shape (3 nodes, unknowns)
-        Displacement of every node [m] that goes with each unknown.
+        Displacement of every node [m] for each unknown.
     """
 
     _geometric: Any
@@ -87,14 +88,13 @@ class Linearisation:
         return np.asarray(self._displacement.toarray())
 
     def frequencies(self, count: int = 6) -> npt.NDArray[Any]:
-        """Lowest natural frequencies, shape (count,) [Hz].
+        """Return the lowest natural frequencies, shape (count,) [Hz].
 
-        Of a scene that is solved in a plane, as its `plan` says, those of motions in it; ``build(planar=False)`` gives
-        all.
-
-        Negative where the configuration diverges: such a mode grows with exp(2 pi |f| t). Complex where modes flutter,
-        in pairs f and its conjugate: they swing at the real part, and grow with exp(2 pi |imaginary part| t). Sorted
-        by the real part of the square, so that what diverges comes first.
+        For a scene that is solved in a plane, these are the frequencies of motions in the plane;
+        ``build(planar=False)`` gives all. A negative frequency f means divergence: the mode grows with
+        exp(2 pi |f| t). Complex pairs of f and its conjugate mean flutter: the modes oscillate at the real part, and
+        grow with exp(2 pi |imaginary part| t). The order is by the real part of the square, so diverging modes come
+        first.
 
         Raises
         ------
@@ -109,9 +109,9 @@ class Linearisation:
         return np.asarray(np.sign(squares) * np.sqrt(np.abs(squares)) / (2.0 * np.pi))
 
     def modes(self, count: int = 6) -> npt.NDArray[Any]:
-        """Node displacements of the lowest modes, greatest one scaled to 1, shape (count, nodes, 3).
+        """Return node displacements of the lowest modes, with the greatest scaled to 1, shape (count, nodes, 3).
 
-        Complex where modes flutter: nodes swing with different phases.
+        Modes that flutter are complex: their nodes oscillate with different phases.
 
         Raises
         ------
@@ -127,10 +127,10 @@ class Linearisation:
     def stability(self) -> Stability:
         """Return "stable" if small motions stay small, or else the kind of the fastest growing motion.
 
-        "diverges" grows steadily, "flutters" swings and grows, which only loads that turn with the rod can do. Without
-        damping, which may make things better or worse [Ziegler 1952]. Neutral motions (of a rod that may spin about its
-        axis) do not count. Looked for among the lowest 16 modes; where loads that turn with the rod make the stiffness
-        unsymmetric, of each of the parts that nothing connects.
+        "diverges" grows steadily. "flutters" oscillates and grows, which needs loads that turn with the rod. Damping is
+        not included; it may stabilise or destabilise [Ziegler 1952]. Neutral motions (of a rod that may spin about its
+        axis) do not count. The search covers the lowest 16 modes. With an unsymmetric stiffness it covers the lowest 16
+        modes of each connected part.
         """
         if self._mass.shape[0] == 0:
             return "stable"

@@ -1,4 +1,4 @@
-"""Loads put on, changed and taken off while a simulation runs."""
+"""Loads that are added, changed and removed during a simulation."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ FloatArray = npt.NDArray[np.float64]
 
 
 class RunningLoads:
-    """A simulation as loads see it: they act from now on, until it is reset."""
+    """A simulation as the methods for loads use it: new loads act from now on, until a reset."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
@@ -42,11 +42,11 @@ class RunningLoads:
 
     @property
     def time(self) -> float:
-        """Now [s]."""
+        """Present time [s]."""
         return self._session.world.time
 
     def take(self, part: LoadPart) -> Load:
-        """Let a load act from now on."""
+        """Add a load that acts from now on."""
         self._session.world.add_load(describe_load(part))
         self._session.settings.loads[part.name] = part
         if part.function is not None:
@@ -60,18 +60,18 @@ def load_index(session: Session, part: LoadPart) -> int:
 
 
 def load_rows(session: Session, part: LoadPart) -> slice:
-    """Its rows among those of all loads."""
+    """Rows of a load among the rows of all loads."""
     first = sum(len(np.atleast_2d(other.value)) for other in session.loads[: load_index(session, part)])
     return slice(first, first + len(np.atleast_2d(part.value)))
 
 
 def new_values(session: Session, part: LoadPart, value: npt.ArrayLike, what: str) -> FloatArray:
-    """A value for a load, with as many rows as it was put on with.
+    """Return a value for a load, with as many rows as its first value.
 
     Raises
     ------
     ValueError
-        One of another shape, or one row an edge where it was put on with one for all.
+        A value of another shape, or one row per edge if the first value had one row for all.
     """
     rows = len(np.atleast_2d(part.value)) if part.value.ndim == 2 else None
     values = load_values(value, part.axis, rows, what)
@@ -79,7 +79,7 @@ def new_values(session: Session, part: LoadPart, value: npt.ArrayLike, what: str
 
 
 def remove_load(session: Session, load: Load | str) -> None:
-    """Take a load off; see `Simulation.remove`."""
+    """Remove a load; see `Simulation.remove`."""
     part = session.directory.find(load, LoadPart, "load")
     if part.name not in session.settings.loads:
         raise ValueError(
@@ -93,7 +93,7 @@ def remove_load(session: Session, load: Load | str) -> None:
 
 
 def set_load(session: Session, part: LoadPart, values: dict[str, Any]) -> None:
-    """Change a load that acts, to a constant or a function of time."""
+    """Change a load to a constant or a function of time."""
     value = values[part.kind]
     what = f"{part.kind} {part.name!r}"
     function = value if callable(value) else None
@@ -106,7 +106,7 @@ def set_load(session: Session, part: LoadPart, values: dict[str, Any]) -> None:
 
 
 def load_value(session: Session, part: LoadPart, word: str) -> Any:
-    """Return the present value of a load, shaped as it was put on."""
+    """Return the present value of a load, in the shape of its first value."""
     value = np.array(session.world.load(load_index(session, part))).reshape(part.value.shape)
     if part.axis is None:
         return value

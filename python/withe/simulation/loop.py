@@ -25,7 +25,7 @@ _MAX_FRAMES = 10_000_000
 
 
 class Run(Generic[S]):
-    """One run: checked arguments, and the loop around `stepping`; callbacks are given the simulation."""
+    """One run: checked arguments, and the loop around `stepping`. Callbacks receive the simulation."""
 
     def __init__(
         self,
@@ -75,7 +75,7 @@ class Run(Generic[S]):
         self._differentiable = validation.truth(differentiable, "differentiable")
 
     def go(self, report: Callable[[float], object], stopped: Callable[[], bool]) -> None:
-        """Run to the end; `report` hears how much is done [s], and `stopped` may end it."""
+        """Run to the end; `report` receives the completed time [s], and `stopped` may end the run."""
         with self._stepping.in_run():
             self._go(report, stopped)
 
@@ -170,5 +170,5 @@ class Run(Generic[S]):
 
     @property
     def record(self) -> Record:
-        """The frames taken so far."""
+        """Return the frames recorded so far."""
         return self._recorder.record

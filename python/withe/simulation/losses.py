@@ -27,7 +27,7 @@ READOUTS = (*_NODAL, *_OF_EDGES, *_OF_STENCILS, *_OF_SUPPORTS)
 
 
 def readout_shape(session: Session, of: Rod | Support | NodeHandle | str, word: str) -> tuple[int, ...]:
-    """Shape of a read-out of a rod or a support at a moment."""
+    """Return the shape of a read-out of a rod or a support at a moment."""
     if word in _OF_SUPPORTS:
         find_support(session, of)
         return _OF_SUPPORTS[word]
@@ -44,9 +44,9 @@ def readout_shape(session: Session, of: Rod | Support | NodeHandle | str, word: 
 def readout_adjoints(
     session: Session, by: Mapping[str, Any], frames: int, *, in_plane: bool = False
 ) -> list[_core.ReadoutAdjoint]:
-    """One a frame, from arrays by words of read-outs whose first axis is the frame.
+    """Return one adjoint per frame, from arrays by words of read-outs whose first axis is the frame.
 
-    `in_plane`: of nodes of a planar scene, within its plane.
+    `in_plane` refuses derivatives by nodes of a planar scene that point out of its plane.
     """
     if not isinstance(by, Mapping) or not by or not set(by) <= set(READOUTS):
         got = ", ".join(map(repr, by)) or "none" if isinstance(by, Mapping) else type(by).__name__

@@ -39,7 +39,7 @@ PathLike = Path | npt.ArrayLike | tuple[Path, Path]
 
 
 class HasMatrix(Protocol):
-    """A rotation as SciPy has them."""
+    """A rotation of SciPy."""
 
     def as_matrix(self) -> npt.NDArray[Any]:
         """Shape (3, 3)."""
@@ -49,21 +49,21 @@ RotationLike = npt.ArrayLike | HasMatrix
 
 
 def oriented(drawn_tangent: FloatArray, drawn_director: FloatArray, tangent: FloatArray, roll: float) -> FloatArray:
-    """Rotation that takes the drawn tangent to another by the smallest turn, and then rolls about it."""
+    """Rotation from the drawn tangent to another one by the smallest turn, followed by a roll about the new tangent."""
     swing = drawing.rotation_between(drawn_tangent, tangent, drawn_director)
     return np.asarray(drawing.rotation_about(roll * tangent) @ swing, np.float64)
 
 
 @dataclass(frozen=True, eq=False)
 class Turn:
-    """A rotation on its way to a tangent and a roll; unlike a rotation matrix, it counts full turns.
+    """A ramp of rotation to a tangent and a roll. Unlike a rotation matrix, it counts full turns.
 
     Attributes
     ----------
     tangents : shape (2, 3)
     rolls : shape (2,) [rad]
     times : shape (2, 2) [s]
-        When the tangent sets out and is there, and when the roll.
+        Start and end of the ramp of the tangent, and of the roll.
     drawn : shape (2, 3)
         Tangent and first director as drawn.
     """
@@ -82,12 +82,12 @@ class Turn:
         return oriented(self.drawn[0], self.drawn[1], tangent, self.roll_at(time))
 
     def roll_at(self, time: float) -> float:
-        """Roll at a time [rad]."""
+        """Return the roll at a time [rad]."""
         share = self._share(1, time)
         return (1.0 - share) * float(self.rolls[0]) + share * float(self.rolls[1])
 
     def arrived(self, time: float) -> Turn:
-        """One that came to its end by then, and leads nowhere: it tells full turns."""
+        """Return the end of the ramp at a time, as a ramp without further motion that still counts full turns."""
         return Turn(
             tangents=np.stack([self.tangents[1]] * 2),
             rolls=np.full(2, self.rolls[1]),
@@ -103,7 +103,7 @@ class Turn:
         return drawing.default_normal(self.tangents[0])
 
     def arrays(self) -> dict[str, FloatArray]:
-        """Its numbers, for a file."""
+        """Return all numbers, for a file."""
         return {
             "tangents": self.tangents,
             "rolls": self.rolls,
@@ -114,13 +114,13 @@ class Turn:
 
 @dataclass(frozen=True, eq=False)
 class Waypoints:
-    """A support on its way through poses at given times: evenly from one to the next, turning at an even rate.
+    """Motion of a support through poses at given times, with constant velocity and rate of rotation in between.
 
     Attributes
     ----------
     times : shape (poses,) [s]
     positions : shape (poses, 3) [m]
-    rotations : shape (poses, 3, 3), or (0, 3, 3) where only positions are given
+    rotations : shape (poses, 3, 3), or (0, 3, 3) if only positions are given
     """
 
     times: FloatArray
@@ -140,12 +140,12 @@ class Waypoints:
         return position, drawing.rotation_about(share * angle * axis) @ before
 
     def arrays(self) -> dict[str, FloatArray]:
-        """Its numbers, for a file."""
+        """Return all numbers, for a file."""
         return {"times": self.times, "positions": self.positions, "rotations": self.rotations}
 
 
 def paths_by_owner(paths: PathTable) -> list[tuple[str, Path, set[PoseWord]]]:
-    """Each path once: whose it is, and what it moves of that."""
+    """Return each path once, with its owner and the words that it moves."""
     found: dict[tuple[str, int], tuple[str, Path, set[PoseWord]]] = {}
     for (name, word), path in paths.items():
         found.setdefault((name, id(path)), (name, path, set()))[2].add(word)
@@ -158,8 +158,8 @@ def make_path(path: PathLike, turns: bool, owner: str) -> Path:
     Raises
     ------
     ValueError
-        No motion: not a function, a pair of functions, or rows (t, x, y, z) or (t, x, y, z, qw, qx, qy, qz) in which
-        time grows.
+        Not a path: it must be a function, a pair of functions, or rows (t, x, y, z) or (t, x, y, z, qw, qx, qy, qz)
+        with increasing times.
     """
     if callable(path):
         return path
@@ -194,7 +194,7 @@ class Both:
 
 
 def axis_angle(rotation: FloatArray) -> tuple[FloatArray, float]:
-    """Unit vector and angle of a rotation, from 0 to pi."""
+    """Return unit vector and angle of a rotation, from 0 to pi."""
     cosine = min(max(0.5 * (float(np.trace(rotation)) - 1.0), -1.0), 1.0)
     axis = np.array([rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]])
     size = float(np.linalg.norm(axis))
@@ -207,22 +207,22 @@ def axis_angle(rotation: FloatArray) -> tuple[FloatArray, float]:
 
 
 def evaluate_path(path: Path, time: float, turns: bool, owner: str) -> Pose:
-    """Position and rotation that a path gives, checked.
+    """Return the checked position and rotation of a path.
 
     Parameters
     ----------
     path : callable
-        Returns a position, a position and a rotation, or seven numbers x, y, z, qw, qx, qy, qz.
+        Function that returns a position, a position and a rotation, or seven numbers x, y, z, qw, qx, qy, qz.
     time : float [s]
     turns : bool
-        Whether the support holds a direction at all.
+        True if the support holds a direction.
     owner : str
-        Named in errors.
+        Name for errors.
 
     Raises
     ------
     ValueError
-        Anything else, or a rotation for a support that holds none.
+        Another result, or a rotation for a support that does not hold a direction.
     """
     if isinstance(path, Turn):
         return None, path(time)

@@ -18,17 +18,17 @@ _Weights = dict[int, FloatArray]  # of calls: (3, 3), from a change of what they
 
 @dataclass(frozen=True, eq=False)
 class Way:
-    """Way of a position, or of a rotation, at an even rate.
+    """Ramp of a position, or of a rotation, at a constant rate.
 
     Attributes
     ----------
     call : int or None
-        Which gave the target; None: it stays where it was, or is where no call has a share.
+        Call that set the target. None for a constant pose, or one that no call determines.
     begin, over : float [s]
     turn : ndarray of shape (3,)
         Rotation vector from the start to the target.
     start : dict
-        Weights of calls in where it began; -1: what it was at the start of the run.
+        Weights of calls in the start of the ramp; -1 stands for the value at the start of the run.
     """
 
     word: Literal["position", "rotation"]
@@ -39,13 +39,13 @@ class Way:
     start: _Weights = field(default_factory=dict)
 
     def reached(self, time: float) -> float:
-        """Return the completed share of the way at the end of a time step, from 0 to 1."""
+        """Return the completed share of the ramp at the end of a time step, from 0 to 1."""
         if self.over == 0.0:
             return float(time > self.begin)
         return min(max((time - self.begin) / self.over, 0.0), 1.0)
 
     def weights(self, share: float) -> _Weights:
-        """Return the weight of every call, after a share of the way."""
+        """Return the weight of every call, for a completed share."""
         if self.call is None:
             return self.start
         if self.word == "position":

@@ -1,4 +1,4 @@
-"""Numbers of parts that have one each in the engine: set, read and differentiated by the table of parts alone."""
+"""Parameters with one number per part in the engine: set, read and differentiated by the table of parts alone."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def number_reader(session: Session, part: Part, word: str) -> Reader:
 
 
 def number_of(session: Session, part: Part) -> int:
-    """Place of a part among those of its kind, as the engine numbers them."""
+    """Return the index of a part among the parts of its kind in the engine."""
     if isinstance(part, JoinPart):
         return revolute_joints(session.scene.all(JoinPart)).index(part)
     return session.scene.all(type(part)).index(part)

@@ -1,4 +1,4 @@
-"""Obstacles that are moved while a simulation runs."""
+"""Motion of obstacles during a simulation."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ FloatArray = npt.NDArray[np.float64]
 
 
 def find_obstacle(directory: Directory, handle: Handle | str) -> tuple[int, str] | None:
-    """Index and name of an obstacle; None where it is something else."""
+    """Return index and name of an obstacle; None if the handle is not an obstacle."""
     name = directory.find(handle, ObstaclePart, "obstacle").name if isinstance(handle, Obstacle) else handle
     names = [part.name for part in directory.all(ObstaclePart)]
     return (names.index(name), name) if isinstance(name, str) and name in names else None

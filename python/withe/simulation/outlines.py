@@ -13,7 +13,7 @@ __all__ = ["Outlines", "outlines_of"]
 
 
 class Outlines(NamedTuple):
-    """Outlines of obstacles, of springs and of what runs through guides."""
+    """Outlines of obstacles, springs and tendons."""
 
     obstacles: list[ObstacleOutline]
     springs: list[SpringOutline]
@@ -21,7 +21,7 @@ class Outlines(NamedTuple):
 
 
 def outlines_of(directory: Directory) -> Outlines:
-    """Outlines of all parts that have one, each sort in the order of the scene."""
+    """Return the outlines of all parts that have one, each kind in the order of the scene."""
     drawn = [
         outline(part, directory.row)
         for part in directory.parts.values()

@@ -1,4 +1,4 @@
-"""Words that set what other words set too: the order in which they are set together, and what each then acts on."""
+"""Words that set values of other words: the order in which they are set, and the values on which each then acts."""
 
 from __future__ import annotations
 

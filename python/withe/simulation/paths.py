@@ -1,4 +1,4 @@
-"""Paths of equilibria: what `Simulation.equilibrium` answers with path="arc_length"."""
+"""Paths of equilibria: results of `Simulation.equilibrium` with path="arc_length"."""
 
 from __future__ import annotations
 
@@ -29,20 +29,19 @@ class EquilibriumPath(ShortRepr):
     Attributes
     ----------
     load_factors : ndarray of shape (points,)
-        By which loads are multiplied; or, of supports that move and of what was out of balance at the start, the
-        fraction that is reached.
+        Factor of the loads. Without loads: the completed share of moved supports, changed shapes, and of the initial
+        imbalance.
     stable : ndarray of shape (points,) of bool
-        Whether every small motion would be pushed back, at the point's loads and supports; those out of the plane of a
-        planar scene too, as in `Equilibrium`. With follower loads or moments in space that
-        says no more than that the stiffness can be inverted.
+        True if every small motion is resisted, at the loads and supports of the point. Motions out of the plane of a
+        planar scene count too, as in `Equilibrium`. With follower loads or moments in space, True means only that the
+        stiffness can be inverted.
     limit_points : ndarray of shape (limits,) of int
-        Points at which the load factor has an extremum: they are found to nine digits of the load factor. A
-        bifurcation, where a symmetric branch only becomes unstable, is none: `stable` tells of it.
+        Points at which the load factor has an extremum, accurate to nine digits of the load factor. A bifurcation, at
+        which a symmetric branch only becomes unstable, is not a limit point; `stable` shows it.
     finished : bool
-        Whether the path came to the load factor or to the number of points that were asked for; False where it was
-        lost on the way.
+        True if the path reached the requested load factor or number of points. False if the solver lost the path.
     iterations : int
-        Of Newton's method.
+        Number of iterations of Newton's method.
     """
 
     load_factors: FloatArray
@@ -88,12 +87,12 @@ def path_options(
     steps: int,
     turn: float,
 ) -> PathOptions:
-    """Check what path is wanted; `functions` has the names of loads that are functions of time.
+    """Check the arguments of a path; `functions` has the names of loads that are functions of time.
 
     Raises
     ------
     ValueError
-        A load that is none or a function of time, or numbers out of range.
+        An object that is not a load, a load that is a function of time, or numbers out of range.
     """
     handles = [] if load is None else [load] if isinstance(load, Load | str) else list(load)
     parts = [directory.find(handle, LoadPart, "load") for handle in handles]
@@ -114,7 +113,7 @@ def path_of(
     rows: Callable[[Rod | str], npt.NDArray[np.int64]],
     support: Callable[[Support | NodeHandle | str], int],
 ) -> EquilibriumPath:
-    """The engine's path; `rows` of a rod's nodes in all positions, and the index of a support."""
+    """Return the path of the engine, with the rows of a rod's nodes in all positions, and the index of a support."""
     points = found.points
     return EquilibriumPath(
         load_factors=np.array([point.factor for point in points]),

@@ -1,4 +1,4 @@
-"""Numbers of a scene that are possible, and point to a slip together: a `PlausibilityWarning` each."""
+"""Values of a scene that are possible but suggest a mistake: each gives a `PlausibilityWarning`."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _UNRESOLVED = 10.0  # periods in a time step; a few are taken on purpose, by bac
 
 
 def check_scene(stepping: Stepping) -> None:
-    """Warn of materials and of a time step that are no more than possible, at the time of `Scene.build`."""
+    """Warn of implausible materials and of an implausible time step, at the time of `Scene.build`."""
     session = stepping.session
     gravity = float(np.linalg.norm(session.gravity))
     for rod in session.directory.all(RodPart):

@@ -1,4 +1,4 @@
-"""Reads derivatives by a word of a part from what the engine finds."""
+"""Readers of derivatives by a word of a part from the results of the engine."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ __all__ = ["OfRun", "Reader", "of_equilibrium"]
 
 @dataclass(frozen=True)
 class OfRun:
-    """Derivatives of a scalar of a run by what acted in it, or in a part of it."""
+    """Derivatives of a scalar of a run by parameters of the run, or of a part of it."""
 
     parameters: _core.ParameterGradient
 
 
 Reader = Callable[[_core.EquilibriumGradient | OfRun], Any]
-"""Reads a derivative, shaped like `get`."""
+"""Function that reads a derivative, shaped like `get`."""
 
 
 def of_equilibrium(gradient: _core.EquilibriumGradient | OfRun, name: str) -> _core.EquilibriumGradient:
-    """Derivatives of an equilibrium, by where a support or an obstacle is.
+    """Return derivatives of an equilibrium, by the pose of a support or an obstacle.
 
     Raises
     ------
     ValueError
-        Derivatives of a step.
+        The derivatives belong to a step.
     """
     if isinstance(gradient, OfRun):
         raise ValueError(

@@ -28,7 +28,7 @@ def run_on(
     progress: bool,
     options: dict[str, Any],
 ) -> list[Record | Exception]:
-    """Run each on a worker of the client, and bring back its record and its state.
+    """Run each simulation on a worker of the client, and return its record and its state.
 
     Parameters
     ----------
@@ -36,9 +36,9 @@ def run_on(
     simulations : list of Simulation
     duration : float [s]
     errors, progress
-        As in `run_many`.
+        Arguments of `run_many`.
     options : dict
-        Of `Simulation.run`.
+        Options of `Simulation.run`.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Numbers of rods while a simulation runs: set, read and differentiated."""
+"""Parameters of rods in a running simulation: set, read and differentiated."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ FloatArray = npt.NDArray[np.float64]
 
 
 def set_rod(session: Session, part: RodPart, values: dict[str, Any], over: float = 0.0) -> None:
-    """Change numbers of a rod, all or none; natural shapes are reached after so long [s]."""
+    """Change parameters of a rod, all or none; natural shapes ramp over a duration [s]."""
     before = parameters = session.settings.rods[part.index]
     natural = {}
     for word, value in in_order(part, values).items():
@@ -54,12 +54,12 @@ def _lead(session: Session, part: RodPart, natural: dict[str, Any], over: float)
 
 
 def in_order(part: RodPart, values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return values in the order in which none undoes one before it, a discrete curvature as a smooth one.
+    """Return values in the order in which none overwrites an earlier one, with discrete curvature converted to smooth.
 
     Raises
     ------
     ValueError
-        Both curvatures, or a discrete one of another shape or not finite.
+        Both curvatures, or a discrete curvature of a wrong shape or not finite.
     """
     found = {word: values[word] for word in in_order_of_setting(values)}
     if "discrete_curvature" in found:
@@ -80,7 +80,7 @@ def rod_value(session: Session, part: RodPart, word: str) -> Any:
 
 
 def edges_of(session: Session, rod: int) -> tuple[int, int]:
-    """First edge of a rod among those of the scene, and the one after its last."""
+    """Return the first edge of a rod among the edges of the scene, and the edge after its last one."""
     counts = [len(part.section.area) for part in session.directory.all(RodPart)]
     return sum(counts[:rod]), sum(counts[: rod + 1])
 
@@ -127,7 +127,7 @@ def rod_reader(session: Session, part: RodPart, word: str, arrays: Iterable[str]
 
 
 def rod_slopes(session: Session, part: RodPart, word: str) -> dict[str, FloatArray]:
-    """Derivatives of what the engine works with by a word, or the radius, of a rod as it is set now, edge by edge."""
+    """Derivatives of the engine's arrays by a word, or the radius, of a rod with its present values, edge by edge."""
     parameters = session.settings.rods[part.index]
     return _radius_slopes(session, part, parameters) if word == "radius" else _slopes(parameters, word)
 

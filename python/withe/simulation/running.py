@@ -1,4 +1,4 @@
-"""Many simulations side by side."""
+"""Parallel runs of many simulations."""
 
 from __future__ import annotations
 
@@ -36,38 +36,39 @@ def run_many(
     until: Callable[[Simulation], object] | None = None,
     record: Mapping[str, Callable[[Simulation], npt.ArrayLike]] | None = None,
 ) -> list[Record | Exception]:
-    """Run many simulations side by side, in threads, with one progress bar.
+    """Run many simulations in parallel, on threads, with one progress bar.
 
     Parameters
     ----------
     simulations : iterable of Simulation
-        All different; `Simulation.copy` makes more of one.
+        Different simulations; `Simulation.copy` makes copies.
     duration : float [s]
+        Duration of each run.
     workers : int
-        Number of threads; by default one a processor.
+        Number of threads. By default one per processor.
     client : dask.distributed.Client, optional
-        Runs them on its workers, in other processes or on other machines that have withe, in place of threads. Each
-        ends in the state that its run came to, with the same bits where processors are alike; `Simulation.record` stays
-        what it was. Functions are sent along.
+        Client whose workers run the simulations instead of threads, in other processes or on other machines that have
+        withe. Each simulation ends in the final state of its run, with the same bits on equal processors.
+        `Simulation.record` does not change. Functions are sent to the workers.
     errors : {"raise", "return"}
-        Whether the first exception ends everything, or takes the place of its record.
+        With "raise" the first exception ends all runs. With "return" an exception takes the place of its record.
     record_every, progress, before_step, until, record
-        As in `Simulation.run`.
+        Arguments of `Simulation.run`.
 
     Returns
     -------
     list of Record
-        In the order of the simulations; with errors="return", exceptions among them.
+        Records in the order of the simulations; with errors="return" also exceptions.
 
     Raises
     ------
     ValueError
-        Something that is not a simulation, or one that is there twice; workers beside a client, or not a client.
+        An object that is not a simulation, a simulation given twice, workers beside a client, or not a client.
     ImportError
         A client is given and Dask is not installed.
     ConvergenceError, KeyboardInterrupt, or what a callback raised
-        With errors="raise"; every simulation keeps what it recorded until then. On a client those that did not end
-        stay where they were.
+        Only with errors="raise". Every simulation keeps its frames until then. On a client, simulations that did not
+        end keep their initial state.
 
     Examples
     --------
@@ -139,12 +140,12 @@ def _result(future: Future[Record], errors: str) -> Record | Exception:
 
 
 def listed_simulations(simulations: Iterable[Simulation]) -> list[Simulation]:
-    """Simulations that a user gives, as a list.
+    """Return the simulations of a user as a list.
 
     Raises
     ------
     ValueError
-        No list, or something in it that is not a simulation.
+        Not a list, or an object in it that is not a simulation.
     """
     try:
         listed = list(simulations)
@@ -157,7 +158,7 @@ def listed_simulations(simulations: Iterable[Simulation]) -> list[Simulation]:
 
 
 def thread_count(workers: int | None) -> int:
-    """Threads that a user asks for; by default, as many as this process may use processors."""
+    """Return the number of threads. By default as many as the processors that this process may use."""
     if workers is not None:
         return validation.integer(workers, "workers", 1, 4096)
     affinity: Any = getattr(os, "sched_getaffinity", None)

@@ -1,4 +1,4 @@
-"""A scene while it runs, as every function that changes or reads it is given it."""
+"""A running scene, the argument of every function that changes or reads it."""
 
 from __future__ import annotations
 
@@ -23,38 +23,38 @@ FloatArray = npt.NDArray[np.float64]
 
 
 class Journal(Protocol):
-    """Who hears what is set."""
+    """Receiver of the values that are set."""
 
     def note(self, session: Session, method: str, part: Any, values: Mapping[str, Any], over: float) -> None:
-        """A call has set these, of a part or the scene, reached after so long [s]."""
+        """Note values of a call, for a part or the scene, with the duration of their ramp [s]."""
 
 
 @dataclass(eq=False)
 class Session:
-    """A scene while it runs.
+    """A running scene.
 
     Attributes
     ----------
     scene, gravity, options
-        As they were drawn and built; never changed.
+        Scene, gravity and options at the build. They never change.
     directory : Directory
-        Parts now: those of the scene, and what came while running.
+        Present parts: those of the scene, and those added since.
     settings : Settings
-        What was set while running.
+        Values set since the build.
     world : _core.World
         The engine.
     drawn_loads, custom_forces : tuple
-        Parts of the scene, in its order.
+        Loads and custom forces of the scene, in its order.
     journal : Journal or None
-        Of a differentiable run, while it goes.
+        Journal of a differentiable run, while it runs.
     contact_then : ContactDescription or None
-        Of a session that is kept as it was: its contact then.
+        Contact description of a stored session.
     left_rings : list of (str, float)
-        Rings that the engine has released since rods have left them, by name, and when [s]; not reported yet.
+        Rings that the engine has released because their rods have left them: name and time [s]; not yet reported.
     restorations : int
-        How often it went back to a snapshot or to a frame of a record.
+        Number of restorations of a snapshot or of a frame of a record.
     longest_meant : float [s]
-        Time steps up to this are as long as they are on purpose, by what was measured: no `CoarseStepWarning` of them.
+        Longest time step that is intended by measurement: up to it, no `CoarseStepWarning` is given.
     """
 
     scene: Directory
@@ -73,7 +73,7 @@ class Session:
 
     @classmethod
     def begin(cls, scene: Directory, gravity: FloatArray, options: BuildOptions) -> Session:
-        """Build a scene that nobody else changes.
+        """Build a scene that no other code changes.
 
         Raises
         ------
@@ -108,7 +108,7 @@ class Session:
         )
 
     def copy(self) -> Session:
-        """Another in the same state, which goes its own way from here."""
+        """Return an independent session in the same state."""
         return replace(
             self,
             directory=self.directory.copy(),
@@ -119,7 +119,7 @@ class Session:
         )
 
     def note(self, method: str, part: Any, values: Mapping[str, Any], over: float = 0.0) -> None:
-        """Remember what a call has set, of a part, two bodies, or nothing (the scene); tell the journal, if any."""
+        """Note the values of a call, for a part, two bodies, or None (the scene), also in the journal, if any."""
         name = getattr(part, "name", None)
         for word in ["move"] if method == "move" else values:
             self.settings.ramps.pop((word, name), None)
@@ -130,7 +130,7 @@ class Session:
 
     @property
     def contact(self) -> _core.ContactDescription:
-        """With present coefficients of friction."""
+        """Return the contact description with the present friction coefficients."""
         return self.contact_then if self.contact_then is not None else self.world.contact
 
     @property

@@ -1,4 +1,4 @@
-"""Settings that were made during a simulation."""
+"""Values that were set during a simulation."""
 
 from __future__ import annotations
 
@@ -29,20 +29,20 @@ class Settings:
         Present value of each part, by name.
     gravity : ndarray of shape (3,) [m/s^2]
     supports : dict of str to (int, SupportPart)
-        Those that hold, with their index in the engine.
+        Active supports, with their index in the engine.
     functions : dict of str to callable
-        Loads that vary, by name.
+        Functions of loads that vary, by name.
     paths : dict of (str, {"position", "rotation"}) to callable
-        Supports and obstacles that move along a path, by name, and what of them does.
+        Paths of supports and obstacles, by name and moved word.
     friction_fields : dict of int to (int, str, Coefficients)
-        Friction that varies over an obstacle: by the pair of the engine, the rod, the obstacle's name and the field.
+        Friction that varies over an obstacle: index of the pair in the engine, rod, name of the obstacle, and field.
     frictions : dict of tuple of str to Coefficients
-        Fields of friction of obstacles, by their name, and of a rod and an obstacle, by both names. The engine keeps
+        Fields of friction of obstacles, by their name, and of a rod and an obstacle, by both names. The engine stores
         all other friction.
     loads : dict of str to LoadPart
-        Those put on while running, in order.
+        Loads that were added during the simulation, in order.
     ramps : dict of (str, str or None) to float [s]
-        When what is reached after a while was last asked for: by word, or "move", and part.
+        Time of the last ramp, by word (or "move") and part.
     """
 
     rods: list[RodParameters]
@@ -59,7 +59,7 @@ class Settings:
     ramps: dict[tuple[str, str | None], float] = field(default_factory=dict)
 
     def copy(self) -> Settings:
-        """Settings that no longer change with these. What they hold is never changed in place."""
+        """Return an independent copy. Values are never changed in place."""
         return Settings(
             list(self.rods),
             dict(self.masses),

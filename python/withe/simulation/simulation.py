@@ -1,4 +1,4 @@
-"""Simulations: a scene while it runs."""
+"""Simulations: running scenes."""
 
 from __future__ import annotations
 
@@ -165,33 +165,34 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
         steps: int = 1000,
         turn: float = 0.1,
     ) -> Equilibrium | EquilibriumPath:
-        """Find the static equilibrium that the present state leads to, and go there. Time stands still.
+        """Move to the static equilibrium that the present state leads to. Time does not advance.
 
-        Targets that are still ramping (`over=`) are frozen at their current value; a warning tells of ramps that have
+        Targets that are still ramping (`over=`) are frozen at their current value. A warning reports ramps that have
         not begun.
 
         The solver follows the branch of equilibria that begins at the present state, in steps in which no edge turns
-        far. Where that branch ends (at a limit point) or is not stable any more, the scene goes on dynamically: then
-        `branch_changed` is true. Saddles are left, so that a straight column that carries too much buckles, unless
-        ``stable=False``. A scene that is solved in a plane stays in it, with an `OutOfPlaneWarning` where it would not
-        stay in space.
+        far. If that branch ends (at a limit point) or becomes unstable, the scene moves dynamically to another
+        equilibrium, and `branch_changed` is true. The solver leaves saddles, so that a straight column above its
+        critical load buckles, unless ``stable=False``. A scene that is solved in a plane stays in it. If it would leave
+        the plane in space, `OutOfPlaneWarning` is given.
 
-        All changes since the last equilibrium come in together, each in proportion to one factor from 0 to 1. The order
-        in which they were made in Python does not matter. With the factor
+        All changes since the last equilibrium act together, each in proportion to one factor from 0 to 1. Their order
+        in Python does not matter. The factor drives these changes:
 
-        - supports and grippers go from where they are to where they were moved, in straight lines and even turns;
-        - natural shapes and tensions of tendons grow from those that the state last moved with (at first from the drawn
-          shape and slack tendons);
-        - moments and follower forces grow from the share of them that the state balances;
-        - the forces that are out of balance at the present state (of changed loads, gravity, moduli and obstacles) come
-          in as dead forces.
+        - supports and grippers: from their present poses to their targets, in straight lines and uniform rotations
+        - natural shapes and tensions of tendons: from their values at the last motion (at first from the drawn shape
+          and slack tendons)
+        - moments and follower forces: from the share that the present state balances
+        - forces out of balance at the present state (of changed loads, gravity, moduli and obstacles): as dead forces
+          that vanish
 
-        Obstacles that were moved are at their new places from the start. Where the order of changes matters, call
-        `equilibrium` after each of them: ``move``, ``equilibrium``, ``set``, ``equilibrium``.
+        Obstacles are at their new positions from the start. If the order of changes matters, call `equilibrium` after
+        each change: ``move``, ``equilibrium``, ``set``, ``equilibrium``. `equilibrium` after each of them: ``move``,
+        ``equilibrium``, ``set``, ``equilibrium``.
 
-        With ``path="arc_length"`` the branch is followed through limit points, stable or not, by pseudo-arc-length
-        continuation [Riks 1979, Int. J. Solids Struct. 15; Crisfield 1981, Comput. Struct. 13], and all its points are
-        returned; the simulation ends at the last one.
+        With ``path="arc_length"`` pseudo-arc-length continuation follows the branch through limit points, stable or not
+        [Riks 1979, Int. J. Solids Struct. 15; Crisfield 1981, Comput. Struct. 13]. The result contains all points, and
+        the simulation ends at the last one.
 
         Parameters
         ----------
@@ -218,7 +219,7 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
         Returns
         -------
         Equilibrium
-            Or, along a path, `EquilibriumPath`.
+            Result, or an `EquilibriumPath` along a path.
 
         Raises
         ------
@@ -321,7 +322,7 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
         Raises
         ------
         RuntimeError
-            No run was made.
+            The simulation has not run yet.
         """
         if self._stepping.recorder is None:
             raise RuntimeError("simulation has no record: call run first")

@@ -1,4 +1,4 @@
-"""Snapshots: the whole state of a simulation at one moment, to go back to bit by bit."""
+"""Snapshots: the whole state of a simulation at one moment, which can be restored bit for bit."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ _FILE_VERSION = 8
 class Snapshot:
     """The whole state of a simulation at one moment. Made by `Simulation.snapshot`, or read with `load`.
 
-    It can be restored in any simulation of the same scene with the same options, and continues there bit
-    by bit. Functions of time (of loads and paths) are not stored in files and pickles: a simulation that
-    restores such a snapshot must have them already.
+    Any simulation of the same scene with the same options can restore it, and continues bit for bit. Files and pickles
+    do not contain functions of time (of loads and paths). A simulation that restores such a snapshot must already have
+    these functions.
     """
 
     _scene: Directory | None = None  # in which it was taken, where that is known: simulations of it can go back to it
@@ -57,7 +57,7 @@ class Snapshot:
 
     @property
     def time(self) -> float:
-        """When it was taken [s]."""
+        """Time of the snapshot [s]."""
         return self._time
 
     def __repr__(self) -> str:
@@ -142,7 +142,7 @@ class Snapshot:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Snapshot:
-        """Read a snapshot that `save` wrote. Nothing in the file is ever run.
+        """Read a snapshot that `save` wrote. The file cannot execute code.
 
         Raises
         ------
@@ -212,7 +212,7 @@ class Snapshot:
 
 
 def restore(session: Session, snapshot: Snapshot) -> None:
-    """Go back to a snapshot; see `Simulation.restore`.
+    """Restore a snapshot; see `Simulation.restore`.
 
     Raises
     ------
@@ -230,7 +230,7 @@ def matched(session: Session, snapshot: Snapshot) -> Settings:
 
 
 def check_fits(session: Session, snapshot: Snapshot) -> None:
-    """Refuse a snapshot to which the engine cannot go back; nothing is changed.
+    """Refuse a snapshot that the engine cannot restore; nothing is changed.
 
     Raises
     ------
@@ -242,7 +242,7 @@ def check_fits(session: Session, snapshot: Snapshot) -> None:
 
 
 def adopt(session: Session, settings: Settings) -> None:
-    """Take over settings of a snapshot to which the engine went back, and find what it has that goes by them."""
+    """Adopt the settings of a restored snapshot, and update the values that depend on them."""
     parts = session.directory.parts
     for name in set(parts) - set(session.scene.parts) - set(settings.supports):
         del parts[name]

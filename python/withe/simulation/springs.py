@@ -1,4 +1,4 @@
-"""Springs while a simulation runs: what is read."""
+"""Springs of a running simulation: read-outs."""
 
 from __future__ import annotations
 
@@ -10,5 +10,5 @@ __all__ = ["spring_tension"]
 
 
 def spring_tension(session: Session, part: SpringPart) -> float:
-    """The axial force [N], pulling is positive."""
+    """Return the axial force [N], positive in tension."""
     return session.world.spring_tension(number_of(session, part))
