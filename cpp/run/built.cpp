@@ -62,7 +62,7 @@ Model model_of_active(Built& built, bool running) {
   return fresh;
 }
 
-void begin_as_drawn(const Built& built, Running& running) {
+void begin_as_drawn(const Built& built, Running& running, Configuration& c) {
   const auto& [description, drawn_contact, options, model, spatial, left_by, separated, stable] = built;
   State& state = running.state;
   running.parameters = initial_parameters(model);
@@ -72,7 +72,6 @@ void begin_as_drawn(const Built& built, Running& running) {
   running.motions.assign(description.supports.size(), SupportMotion{});
   running.custom_force = MatrixX3::Zero(model.node_count, 3);
   running.custom_moments = MatrixX3::Zero(description.custom_moments ? model.node_count : 0, 3);
-  Configuration c;
   compute_configuration(model, state, state.q, c);
   for (std::size_t s = 0; s < running.motions.size(); ++s) {
     SupportMotion& motion = running.motions[s];

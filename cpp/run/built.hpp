@@ -27,7 +27,7 @@ Built built_of(SceneDescription scene, const Options& options);
 /// the scene is `running`, one that was spatial stays spatial.
 Model model_of_active(Built& built, bool running);
 
-/// The scene as it is drawn.
-void begin_as_drawn(const Built& built, Running& running);
+/// Sets the values of the scene as it is drawn. `c` becomes its configuration.
+void begin_as_drawn(const Built& built, Running& running, Configuration& c);
 
 }  // namespace withe

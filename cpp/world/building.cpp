@@ -92,7 +92,7 @@ void World::Implementation::rebuild(Rebuild why) {
   const Model old = std::exchange(model, std::move(fresh));
   systems.build(model, options);
   if (why == Rebuild::first)
-    begin_as_drawn(*this, *this);
+    begin_as_drawn(*this, *this, energy_scratch.configuration);
   else
     carry_over(old, why);
   description.uncorrected_ends = model.description.uncorrected_ends;
