@@ -187,8 +187,7 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
           that vanish
 
         Obstacles are at their new positions from the start. If the order of changes matters, call `equilibrium` after
-        each change: ``move``, ``equilibrium``, ``set``, ``equilibrium``. `equilibrium` after each of them: ``move``,
-        ``equilibrium``, ``set``, ``equilibrium``.
+        each change: ``move``, ``equilibrium``, ``set``, ``equilibrium``.
 
         With ``path="arc_length"`` pseudo-arc-length continuation follows the branch through limit points, stable or not
         [Riks 1979, Int. J. Solids Struct. 15; Crisfield 1981, Comput. Struct. 13]. The result contains all points, and
