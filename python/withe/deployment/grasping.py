@@ -54,7 +54,7 @@ class Grasp:
 
     @property
     def friction(self) -> FloatArray:
-        """Friction coefficient that lift-off needs: the tangential force of the floor over its normal force."""
+        """Friction coefficient that lift-off needs, the tangential force of the floor over its normal force."""
         return np.asarray(np.hypot(self.force[..., 0], self.force[..., 1]) / self.force[..., 2])
 
 

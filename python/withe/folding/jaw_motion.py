@@ -34,7 +34,7 @@ class Motion(Protocol):
 
     @property
     def poses(self) -> FloatArray:
-        """Shape (n, 7): x, y, z [m] and the quaternion x, y, z, w."""
+        """Return positions x, y, z [m] and quaternions x, y, z, w, shape (n, 7)."""
 
 
 class _Way:

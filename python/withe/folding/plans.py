@@ -161,7 +161,7 @@ class FoldPlan(PlanFile):
 
     @property
     def sheet(self) -> Elastica:
-        """Return the hanging sheet at each pose [Lgb], [w Lgb]: as planned, without slide, or else as predicted."""
+        """Return the hanging sheet at each pose [Lgb], [w Lgb], as planned without slide, or else as predicted."""
         return self._motion[0] if self._foreseen is None else self._foreseen
 
     @cached_property
@@ -228,7 +228,7 @@ class FoldPlan(PlanFile):
 
     @property
     def papers(self) -> list[Paper]:
-        """Return the papers within `uncertainty`: the estimate, and the bounds.
+        """Return the papers within `uncertainty`, the estimate and the bounds.
 
         There are five papers: the estimate, and a smaller and a larger Lgb, each with the least friction and with the
         friction of the paper. There are fewer papers if a share is 0.

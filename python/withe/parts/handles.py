@@ -259,7 +259,7 @@ class Rod(Handle):
 
     @property
     def stencils(self) -> int:
-        """Number of nodes at which the rod bends: the inner ones, or all of a closed rod."""
+        """Number of nodes at which the rod bends, the inner ones or all of a closed rod."""
         return self.nodes - (0 if self.closed else 2)
 
     @property

@@ -234,7 +234,7 @@ class ObstaclePart(Part):
 
     @property
     def axis(self) -> FloatArray | None:
-        """Return the axis of rotation: normal or axis; None for a sphere, which may turn about any axis."""
+        """Return the axis of rotation (normal or axis); None for a sphere, which may turn about any axis."""
         axis = self.other if self.kind == "plane" else self.other - self.point
         length = float(np.linalg.norm(axis))
         return axis / length if length > 0.0 else None

@@ -43,7 +43,7 @@ class SectionProperties:
 
     @property
     def touching(self) -> FloatArray:
-        """Radius of the round surface that touches others, by default: half the smaller side, shape (edges,) [m]."""
+        """Default radius of the round surface that touches others (half the smaller side), shape (edges,) [m]."""
         return self.radii if self.widths is None else 0.5 * self.widths.min(axis=1)
 
     @cached_property

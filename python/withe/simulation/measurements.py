@@ -350,7 +350,7 @@ class Measurements:
 
     @property
     def plan(self) -> Plan:
-        """Return the decisions of `build` for this scene: ``print(simulation.plan)``."""
+        """Return the decisions of `build` for this scene, to be printed."""
         plan, parts = self._session.world.plan, self._session.directory.all(RodPart)
         length = sum(float(part.arcs.sum()) for part in parts)
         rods = zip(parts, self._session.settings.rods, strict=True)
