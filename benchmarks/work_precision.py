@@ -140,7 +140,7 @@ def _their_motion(case: Case, point: Point, duration: float):
         return ElasticaRun(case, point.edges, duration, point.step, moved_wall=moved).record()
     fraction = point.step
     largest = largest_stable_step(case, point.edges, moved_wall=moved)
-        # A step that survives a short run may still fail in a long run.
+    # A step that survives a short run may still fail in a long run.
     for shrink in (1.0, 0.93, 0.8, 0.6):
         point.step = fraction * shrink * largest
         motion = ElasticaRun(case, point.edges, duration, point.step, moved_wall=moved).record()

@@ -143,8 +143,7 @@ def overhand_knot(
 def reef_knot(
     *, length: float = 1.0, radius: float = 2e-3, nodes: int | None = None, tails: Tails = "up"
 ) -> FloatArray:
-    """Points of a loose reef knot: two half knots of opposite handedness. The loop of the first is the middle of the
-    rod.
+    """Points of a loose reef knot: two half knots of opposite handedness, the first around the middle of the rod.
 
     Parameters
     ----------

@@ -87,8 +87,8 @@ class Feasibility:
     tail : ndarray of shape (nodes,)
         Greatest need at lift-off of all earlier places. If a bend slips inwards by c while it is laid, the cable behind
         it runs ahead by the integral of the curvature times c, because the cable does not stretch. The jaw does not
-        correct for this. A long suspended part yields. A suspended part of about 2.5 Lgb or less is stiff, and pulls the
-        cable behind the bend back along itself, straight or not.
+        correct for this. A long suspended part yields. A suspended part of about 2.5 Lgb or less is stiff, and pulls
+        the cable behind the bend back along itself, straight or not.
     overlap : ndarray of bool of shape (nodes,)
         True where the pattern approaches itself by less than the thickness of the cable. The cable pushes itself aside
         there. The push is at most four radii, from one side of the other part to its other side. The cable keeps its

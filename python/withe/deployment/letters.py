@@ -52,8 +52,7 @@ LETTERS = {
 
 
 def written(text: str, height: float) -> FloatArray:
-    """Points along a word, shape (n, 2) [m]: a cubic spline through the points of its letters. A small x is `height`
-    high.
+    """Points along a word, shape (n, 2) [m], on a cubic spline through its letters, whose small x is `height` high.
 
     Raises
     ------

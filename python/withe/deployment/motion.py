@@ -107,8 +107,7 @@ def displaced(path: Path, shift: FloatArray) -> Path:
 
 @dataclass(frozen=True)
 class Piece:
-    """Poses along a parameter that runs smoothly in time; `reach` is the length along it that counts for the speed
-    [m]."""
+    """Poses along a parameter that runs smoothly in time; `reach` is the length that counts for the speed [m]."""
 
     parameter: FloatArray
     positions: FloatArray

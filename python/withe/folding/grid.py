@@ -52,8 +52,9 @@ class Grid:
     ----------
     spacing : float [Lgb]
     lifts : int
-        How many nodes belong to the lift.
-        Number of nodes of the lift. Arrays of shape (nodes,).
+        Number of nodes of the lift.
+    pose : Elastica
+        Arrays of shape (nodes,).
     edges : ndarray of shape (edges, 2)
     lengths : ndarray of shape (edges,) [Lgb]
     """

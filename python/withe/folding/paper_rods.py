@@ -31,8 +31,7 @@ def strip_numbers(paper: Paper) -> tuple[float, float, float]:
 
 
 def jaw_stiffness(jaw: Jaw, paper: Paper) -> tuple[float, float]:
-    """Stiffness of a jaw's hold on a sheet, for displacement and rotation [N/m], [N m/rad]; plans assume a rigid
-    jaw."""
+    """Stiffness of a jaw that holds a sheet, for displacement and rotation [N/m], [N m/rad]; plans assume rigidity."""
     if jaw.stiffness is not None:
         return jaw.stiffness
     lgb = paper.gravito_bending_length

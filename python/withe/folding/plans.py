@@ -138,8 +138,7 @@ class FoldPlan(PlanFile):
         return self._moved(self.paper)
 
     def _moved(self, paper: Paper) -> tuple[Elastica, FloatArray]:
-        """Return the sheet and its slide [Lgb] for another paper, from where it first hangs freely (no force
-        before)."""
+        """Return sheet and slide [Lgb] for another paper, from the first pose on in which it hangs freely."""
         factor = paper.gravito_bending_length / self.paper.gravito_bending_length
         width, length = self._width.of_other(factor), self._length / factor
         flat = flat_forces(width)

@@ -201,8 +201,7 @@ class Episodes:
             raise ValueError(f"{self._name(method)} must be finite, got {found[~finite][0]} of robot {robot}")
 
     def checked(self, actions: npt.ArrayLike, *robots: int) -> FloatArray:
-        """Return valid actions of some robots, or of one, from -1 to 1. Rounding errors of single precision are
-        clipped.
+        """Return valid actions of some robots, or of one, from -1 to 1, after clipping errors of single precision.
 
         Raises
         ------

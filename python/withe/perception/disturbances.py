@@ -9,8 +9,7 @@ __all__ = ["add_frays", "add_occluder", "add_specks", "strip_across"]
 
 
 def add_frays(mask: NDArray[np.bool_], rng: np.random.Generator, amount: float = 1.0) -> NDArray[np.bool_]:
-    """Make the border of a mask ragged: pixels within about 1.5 px of it flip at random; `amount` scales their
-    number."""
+    """Make the border of a mask ragged: pixels within 1.5 px of it flip at random, in proportion to `amount`."""
     result = mask.copy()
     for _ in range(2):
         padded = np.pad(result, 1, mode="edge")

@@ -417,16 +417,18 @@ def render(
     ----------
     scene : SyntheticScene
     rng : numpy.random.Generator
-        For the direction of the light and the grain.
-        Random generator of the direction of the light and the grain. One a cable; by default random bright ones.
+        Random generator of the direction of the light and the grain.
+    colours : sequence of (red, green, blue) from 0 to 255, optional
         Colour of each cable; by default random bright ones.
+    background : (red, green, blue)
+        Colour of the background.
     shading : float
-        How much darker the flank turned away from the lamp is, from 0 to 1.
-        Darkening of the flank that faces away from the lamp, from 0 to 1. Standard deviation of the noise [grey
-        levels].
+        Darkening of the flank that faces away from the lamp, from 0 to 1.
+    grain : float
+        Standard deviation of the noise [grey levels].
     shadow : float
-        How much the shadow of the upper strand darkens the lower one, from 0 to 1.
         Darkening of the lower strand by the shadow of the upper one, from 0 to 1.
+
     Returns
     -------
     ndarray of uint8, shape (height, width, 3)

@@ -90,8 +90,7 @@ class Centrelines(ShortRepr, Target):
         return len(self.points)
 
     def told(self, frame: int) -> int:
-        """Number of observations in a frame. A point determines the line only across itself, an end in all
-        directions."""
+        """Number of observations in a frame: a point determines the line across itself, an end in all directions."""
         points = np.asarray(self.points[frame])
         return points.size - len(points) + (2 if self.ends and len(points) else 0)
 

@@ -78,6 +78,7 @@ def _lines(values: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Predict each value from the neighbouring frames by a line, because errors of the model drift.
 
     The line is fitted by repeated medians, which a few outliers do not move [Siegel 1982]. NaN with too few frames.
+
     Returns
     -------
     expected : ndarray of shape (frames, tags, dimension)

@@ -62,8 +62,7 @@ def order_of_setting(session: Session, unknowns: Sequence[Unknown]) -> list[int]
 
 
 def remaining(session: Session, unknowns: Sequence[Unknown]) -> list[Any]:
-    """Return unknowns for the derivatives after all are set: `Remaining` for unknowns that another partly
-    overwrites."""
+    """Return unknowns for derivatives after all are set: `Remaining` for unknowns that another partly overwrites."""
     own = [arrays_of(session, unknown) for unknown in unknowns]
     made: dict[Array, set[str]] = {}
     for place in order_of_setting(session, unknowns):
