@@ -47,17 +47,17 @@ _POSE_COLUMNS = ("t", "x", "y", "z", "qx", "qy", "qz", "qw")
 def written_beside(path: Path) -> Iterator[Path]:
     """Return a path beside a file to write to; the file is replaced only when it is complete.
 
-    Whatever ends the writing early, a full disk or Ctrl-C, leaves what was there before.
+    If writing ends early, for example by a full disk or Ctrl-C, the previous file remains.
 
     Yields
     ------
     pathlib.Path
-        In the same folder and with the same suffix, by which some writers choose a format.
+        Path in the same folder and with the same suffix, by which some writers choose a format.
 
     Raises
     ------
     OSError
-        The file cannot be written, or a device or a pipe has its name; the error names `path`, and says why.
+        The file cannot be written, or a device or a pipe has its name; the error names `path` and the reason.
     """
     if path.exists() and not path.is_file() and not path.is_dir():  # a user who may would lose /dev/full
         raise OSError(
@@ -88,20 +88,20 @@ def save_arrays(
     Parameters
     ----------
     path : path
-        Where to, ending in .npz.
+        Path of the file, ending in .npz.
     kind : str
-        What the file holds, such as "record"; `load_arrays` refuses any other kind.
+        Kind of the content, such as "record"; `load_arrays` refuses any other kind.
     version : int
         Version of the layout of this kind.
     header : mapping
-        Names and units, anything that JSON can hold.
+        Names, units and other values that JSON supports.
     arrays : mapping of str to ndarray
-        Numbers only; objects are refused, so that reading never runs code.
+        Arrays of numbers; objects are refused, so that reading never executes code.
 
     Returns
     -------
     pathlib.Path
-        The file.
+        The written file.
 
     Raises
     ------
@@ -125,20 +125,20 @@ def save_arrays(
 def load_arrays(
     path: str | os.PathLike[str], kind: str, version: int
 ) -> tuple[dict[str, Any], dict[str, npt.NDArray[Any]]]:
-    """Read what `save_arrays` wrote. Nothing in the file is ever run.
+    """Read a file that `save_arrays` wrote. The file cannot execute code.
 
     Returns
     -------
     header : dict
-        As it was saved.
+        Header as saved.
     arrays : dict of str to ndarray
         Every array of the file.
 
     Raises
     ------
     ValueError
-        A file that is damaged, not ours, of another kind or of another version; the message names
-        the file and the reason.
+        A file that is damaged, not a withe file, of another kind or of another version; the message names the file and
+        the reason.
     OSError
         The file cannot be opened.
     """
@@ -146,7 +146,7 @@ def load_arrays(
     with path.open("rb") as stream:
         # NumPy would take anything else for a pickle, and advise to load it unsafely.
         if stream.read(2) != b"PK":
-            raise ValueError(f"{path} is not a withe file, or damaged: it is no npz archive")
+            raise ValueError(f"{path} is not a withe file, or damaged: it is not an npz archive")
         stream.seek(0)
         try:
             with zipfile.ZipFile(stream) as packed:
@@ -188,7 +188,7 @@ def _checked_header(path: Path, header: Any, kind: str, version: int) -> dict[st
 
 
 def save_json(path: str | os.PathLike[str], kind: str, version: int, content: Mapping[str, Any]) -> Path:
-    """Write numbers and words as JSON, with what they are and the version of their form before them."""
+    """Write numbers and words as JSON, after their kind and the version of their format."""
     path = Path(path)
     with written_beside(path) as beside:
         text = json.dumps({"format": f"withe {kind}", "version": version, **content}, indent=1, allow_nan=False)
@@ -204,8 +204,8 @@ def load_json(
     Raises
     ------
     ValueError
-        A file that is damaged, not ours, of another kind or of another version; the message names it. Damaged is also
-        what `read` misses something in, or refuses.
+        A file that is damaged, not a withe file, of another kind or of another version; the message names the file. A
+        file in which `read` misses or refuses a value counts as damaged.
     OSError
         The file cannot be opened.
     """
@@ -214,7 +214,7 @@ def load_json(
         content = json.loads(path.read_text(encoding="utf-8"))
     except (json.JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
         other = "" if path.suffix == ".json" else "; the file to read is the .json"
-        raise ValueError(f"{path} is not a withe file, or damaged: it is no JSON ({error}){other}") from error
+        raise ValueError(f"{path} is not a withe file, or damaged: it is not JSON ({error}){other}") from error
     content = _checked_header(path, content, kind, version)
     try:
         return read(content)
@@ -247,7 +247,7 @@ class PlanFile(ABC):
 
     @property
     def path(self) -> FloatArray:
-        """Rows t, x, y, z, qw, qx, qy, qz of shape (n, 8), for hands of a simulation, which have the scalar first.
+        """Rows t, x, y, z, qw, qx, qy, qz of shape (n, 8), for hands of a simulation, whose scalar comes first.
 
         >>> import withe
         >>> plan = withe.folding.plan(withe.folding.Paper.a4())
@@ -273,7 +273,7 @@ class PlanFile(ABC):
         Raises
         ------
         ValueError
-            Another ending.
+            Another suffix.
         """
         path = Path(path)
         if path.suffix == ".csv":
@@ -293,12 +293,12 @@ class PlanFile(ABC):
         Returns
         -------
         FoldPlan or LayPlan
-            That of the class.
+            Plan of this class.
 
         Raises
         ------
         ValueError
-            A file that is damaged, of something else (a table of poses has no plan), or of another version.
+            A file that is damaged, of another kind (a table of poses is not a plan), or of another version.
         OSError
             The file cannot be opened.
 
@@ -311,7 +311,7 @@ class PlanFile(ABC):
 
 
 def increasing_times(values: Any, what: str) -> FloatArray:
-    """Return the times of a plan in a file [s], two or more that increase from 0; raises ValueError for others."""
+    """Return the times of a plan in a file [s]: two or more that increase from 0. Raise ValueError for others."""
     times = validation.number_array(values, what, ("n",))
     if len(times) < 2 or times[0] != 0.0 or (np.diff(times) <= 0.0).any():
         raise ValueError(f"{what} must be two or more values that increase from 0")
@@ -319,12 +319,12 @@ def increasing_times(values: Any, what: str) -> FloatArray:
 
 
 def listed(values: FloatArray) -> list[Any]:
-    """Return numbers as JSON holds them: a number that is not finite is None."""
+    """Return numbers for JSON: a number that is not finite becomes None."""
     return [value if np.isfinite(value) else None for value in values.tolist()]
 
 
 def with_gaps(values: Any, what: str, count: int) -> FloatArray:
-    """Return `count` numbers that `listed` made; None is NaN."""
+    """Return `count` numbers from the result of `listed`; None becomes NaN."""
     known = [0.0 if value is None else value for value in values]
     missing = [value is None for value in values]
     return np.where(missing, np.nan, validation.number_array(known, what, (count,)))
@@ -336,7 +336,7 @@ def save_poses(path: str | os.PathLike[str], times: npt.NDArray[np.float64], pos
     Parameters
     ----------
     path : path
-        Where to; columns t, x, y, z, qx, qy, qz, qw with a header of these names, in the order of the fields of
+        Path of the table. Its columns t, x, y, z, qx, qy, qz, qw have a header, and the order of the fields of
         geometry_msgs' Pose and of trajectory_msgs' MultiDOFJointTrajectory.
     times : ndarray of shape (n,) [s]
     poses : ndarray of shape (n, 7) [m], [-]
@@ -345,7 +345,7 @@ def save_poses(path: str | os.PathLike[str], times: npt.NDArray[np.float64], pos
     Returns
     -------
     pathlib.Path
-        The file.
+        The written file.
 
     Raises
     ------
@@ -360,22 +360,22 @@ def save_poses(path: str | os.PathLike[str], times: npt.NDArray[np.float64], pos
 
 
 def load_poses(path: str | os.PathLike[str]) -> npt.NDArray[np.float64]:
-    """Read a table of poses as a path for a hand or a clamp: columns are found by their names, in whatever order.
+    """Read a table of poses as a path for a hand or a clamp. Columns are found by their names, in any order.
 
     Parameters
     ----------
     path : path
-        A table with a header that has t, x, y, z, qx, qy, qz, qw [s], [m], such as `save` of a plan writes.
+        A table with a header that has t, x, y, z, qx, qy, qz, qw [s], [m], for example one that `save` of a plan wrote.
 
     Returns
     -------
     ndarray of shape (n, 8)
-        Rows t, x, y, z, qw, qx, qy, qz, as ``simulation.move(hand, path=...)`` takes them: the scalar first.
+        Rows t, x, y, z, qw, qx, qy, qz, as ``simulation.move(hand, path=...)`` expects them: the scalar first.
 
     Raises
     ------
     ValueError
-        A column is missing, or what stands there are not numbers.
+        A column is missing, or has values that are not numbers.
     OSError
         The file cannot be read.
 
@@ -402,12 +402,12 @@ def load_poses(path: str | os.PathLike[str]) -> npt.NDArray[np.float64]:
 
 
 def pose_path(times: npt.NDArray[np.float64], poses: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Rows t, x, y, z, qw, qx, qy, qz of shape (n, 8), as hands take them, from poses with the scalar last."""
+    """Convert poses with the scalar last to rows t, x, y, z, qw, qx, qy, qz for hands, of shape (n, 8)."""
     return np.column_stack([times, poses[:, :3], poses[:, 6], poses[:, 3:6]])
 
 
 def write_vtk(record: Frames, folder: str | os.PathLike[str]) -> Path:
-    """Write a record as a time series for ParaView: one .vtp file a frame, and a .pvd that lists them.
+    """Write a record as a time series for ParaView: one .vtp file per frame, and a .pvd file that lists them.
 
     Every rod is one polyline. Its points carry radius [m], tension [N] (mean of the two edges at a node), curvature
     (towards d1 and d2) [1/m], twist [rad/m], the first director and the velocity [m/s]. The ends of an open rod have
@@ -425,7 +425,7 @@ def write_vtk(record: Frames, folder: str | os.PathLike[str]) -> Path:
     Returns
     -------
     pathlib.Path
-        The .pvd file, which is what to open.
+        The .pvd file, to be opened in ParaView.
 
     Raises
     ------

@@ -152,7 +152,7 @@ def test_a_plan_is_read_back_as_it_was(options, tmp_path):
 @pytest.mark.parametrize(
     ("damage", "message"),
     [
-        (lambda text: text[:-200], "is not a withe file, or damaged: it is no JSON"),
+        (lambda text: text[:-200], "is not a withe file, or damaged: it is not JSON"),
         (lambda text: text.replace("plan of a deployment", "plan of a fold"), "expected a withe plan of a deployment"),
         (lambda text: text.replace('"laid"', '"lain"'), "is a damaged plan of a deployment: it has no 'laid'"),
         (lambda text: text.replace('"radius": 0.0016', '"radius": -1'), "damaged .*: radius must be positive"),

@@ -289,7 +289,7 @@ def test_the_command_writes_a_plan(tmp_path, capsys):
     ("arguments", "message"),
     [
         (["--out", "foo.txt"], "withe: out must end in .csv or .json, got 'foo.txt'"),
-        (["--out", "nowhere/foo.csv"], "withe: out must be in a folder that there is, got 'nowhere/foo.csv'"),
+        (["--out", "nowhere/foo.csv"], "withe: out must be in an existing folder, got 'nowhere/foo.csv'"),
         (
             ["--lgb", "48"],
             "withe: gravito_bending_length must be at most 10 lengths, got 48 m: are all sizes in metres?",

@@ -76,7 +76,7 @@ def test_a_plan_is_read_back_as_it_was(tmp_path):
 @pytest.mark.parametrize(
     ("damage", "message"),
     [
-        (lambda text: text[: len(text) // 2], "is not a withe file, or damaged: it is no JSON"),
+        (lambda text: text[: len(text) // 2], "is not a withe file, or damaged: it is not JSON"),
         (lambda text: text.replace("withe plan of a fold", "withe record"), "holds a withe record, expected"),
         (lambda text: text.replace('"version": 1', '"version": 7'), "of version 7, this withe reads version 1"),
         (lambda text: "[1, 2]", "is not a withe file"),

@@ -128,14 +128,14 @@ class Dangerous:
 @pytest.mark.parametrize("content", [{"a": 1}, torch.zeros(2), Dangerous()])
 def test_other_files_are_refused_and_run_no_code(content, tmp_path, capfd):
     torch.save(content, tmp_path / "other.pt")
-    with pytest.raises(ValueError, match=r"other.pt is no network of withe"):
+    with pytest.raises(ValueError, match=r"other.pt is not a network of withe"):
         Network.load(tmp_path / "other.pt")
     assert "this ran" not in capfd.readouterr().out
 
 
 def test_a_file_that_is_no_archive_is_refused(tmp_path):
     (tmp_path / "text.pt").write_text("hello")
-    with pytest.raises(ValueError, match=r"text.pt is no network"):
+    with pytest.raises(ValueError, match=r"text.pt is not a network"):
         Network.load(tmp_path / "text.pt")
     with pytest.raises(FileNotFoundError):
         Network.load(tmp_path / "missing.pt")

@@ -428,7 +428,7 @@ def _drawn(image: Any, scale: float | None) -> FloatArray:
     tracing = trace(image)
     curves = [line for line in tracing.centrelines if len(line) >= 3]
     if not curves:
-        raise ValueError("image must show a curve, none was found in it")
+        raise ValueError("image must show a curve, but no curve was found")
     longest = max(curves, key=lambda line: float(_lengths(line)[-1]))
     return np.asarray(size * longest * [1.0, -1.0])
 

@@ -89,4 +89,4 @@ def _require_writable(out: Path) -> None:
     if out.suffix not in (".csv", ".json"):
         raise ValueError(f"out must end in .csv or .json, got {out.name!r}")
     if not out.parent.is_dir():
-        raise ValueError(f"out must be in a folder that there is, got {str(out)!r}")
+        raise ValueError(f"out must be in an existing folder, got {str(out)!r}")

@@ -96,9 +96,9 @@ class JawMotion:
         return max(float(np.exp(-age / _FOLLOWS)) * self._way.speed(time - age - _FOLLOWS, time - age) for age in ages)
 
     def longest_step(self, time: float, longest: float) -> float:
-        """Return the longest timestep that resolves the motion of the jaw and the vibration that it excites [s].
+        """Return the longest time step that resolves the motion of the jaw and the vibration that it excites [s].
 
-        No timestep goes beyond the end of a motion.
+        No time step goes beyond the end of a motion.
         """
         left = self.end - time
         longest = left if 1e-9 < left < longest else longest

@@ -49,9 +49,9 @@ class Arm(Task):
     components : int
         Number of actuated components of curvature.
     time_step : float [s]
-        Timestep of the simulation.
+        Time step of the simulation.
     longest_meant : float [s]
-        Longest timestep without a `CoarseStepWarning`. A longer step does not resolve the vibration of the arm, which
+        Longest time step without a `CoarseStepWarning`. A longer step does not resolve the vibration of the arm, which
         is intended here: the tip stays within 1 cm RMS of a run with short steps (`benchmarks/rl_throughput.py`). In
         `Follow` the velocities of nodes are then wrong by 0.2 to 0.4 m/s RMS, because fast modes lose their phase. The
         velocities themselves are 0.5 to 0.8 m/s.

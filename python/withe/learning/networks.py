@@ -226,9 +226,9 @@ class Network:
         except OSError:
             raise
         except Exception as error:  # of many kinds, by what the bytes happen to say
-            raise ValueError(f"{path} is no network of withe: torch cannot read it") from error
+            raise ValueError(f"{path} is not a network of withe: torch cannot read it") from error
         if not isinstance(content, dict) or content.get("format") != _FORMAT:
-            raise ValueError(f"{path} is no network of withe")
+            raise ValueError(f"{path} is not a network of withe")
         if content.get("version") != _VERSION:
             raise ValueError(
                 f"{path} is a network of version {content.get('version')}, this withe reads version {_VERSION}: "

@@ -220,7 +220,7 @@ def _adapter() -> Any:
             )
 
         def env_method(self, method_name: str, *arguments: Any, indices: Any = None, **options: Any) -> list[Any]:
-            raise AttributeError("robots on one batch have no methods of their own: call those of the task")
+            raise AttributeError("robots on one batch have no methods of their own: call methods of the task")
 
         def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
             return [False] * len(list(self._get_indices(indices)))

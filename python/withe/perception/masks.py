@@ -141,7 +141,7 @@ def network_mask(model: Any, threshold: float = 0.5, size: tuple[int, int] | Non
 def _is_onnx(model: Any) -> bool:
     if isinstance(model, str | Path):
         if not Path(model).is_file():
-            raise ValueError(f"model must be a file or a torch module, got {str(model)!r}, which is no file")
+            raise ValueError(f"model must be a file or a torch module, got {str(model)!r}, which is not a file")
         return Path(model).suffix.lower() == ".onnx"
     if not callable(model):
         raise ValueError(f"model must be a file or a torch module, got {type(model).__name__}")

@@ -92,7 +92,7 @@ def read_image(path: str | os.PathLike[str], name: str = "image") -> NDArray[np.
         raise ValueError(f"{name} must be a file that can be read, got {os.fspath(path)!r}: {reason}") from None
     picture = cv2.imdecode(content, cv2.IMREAD_COLOR) if len(content) else None
     if picture is None:
-        raise ValueError(f"{name} must be a picture that can be read, got {os.fspath(path)!r}, which is none")
+        raise ValueError(f"{name} must be a picture that can be read, got {os.fspath(path)!r}, which is not a picture")
     return np.ascontiguousarray(picture[..., ::-1])
 
 

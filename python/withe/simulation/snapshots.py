@@ -282,7 +282,7 @@ def _matched(snapshot: Snapshot, mine: Settings, directory: Directory, scene: Di
         settings.supports[name] = index, replace(part, node=node)
         known = scene.parts.get(name)
         if known is not None and not isinstance(known, SupportPart):
-            raise ValueError(f"snapshot belongs to another scene: {name!r} is no support in this one")
+            raise ValueError(f"snapshot belongs to another scene: {name!r} is not a support of this scene")
     for names, friction in mine.frictions.items():
         if names in snapshot._fields:
             settings.frictions[names] = friction

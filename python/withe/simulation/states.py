@@ -100,7 +100,7 @@ def restore_frame(session: Session, record: Record, frame: int) -> None:
         or not np.array_equal(outline.rows, session.directory.layout.rows(part.index))
         for outline, part in zip(record.rods, parts, strict=True)
     ):
-        raise ValueError("record belongs to another scene: its rods are others")
+        raise ValueError("record belongs to another scene: its rods differ")
     count = len(record)
     frame = validation.integer(frame, "frame", -count, count - 1)
     states = []
