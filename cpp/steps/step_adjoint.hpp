@@ -32,7 +32,7 @@ struct CoefficientAdjoint {
   MatrixX6 hand_stiffness;                    ///< per support, see `HandDescription` [m/N], [rad/(N m)]
   VectorX hand_limit;                         ///< per support [1/N]
   std::vector<MatrixX2> natural_curvature;    ///< per rod and stencil, by the smooth curvature, through read-outs [m]
-  VectorX rest_length;  ///< per edge, through axial strain, loads along rods and read-outs [1/m]
+  VectorX rest_length;                        ///< per edge, through axial strain, loads along rods and read-outs [1/m]
   /// Derivatives by rotation vectors in the axes of the drawn scene [1/rad]. `attachment` is per half stencil, by the
   /// rotation of the part that is attached to its frame. `edge_turn` is per edge, by its frame in the drawing, without
   /// the effects through the members above.
