@@ -256,7 +256,7 @@ void Assembler::find_edge_couplings() {
     }
 }
 
-/// Rows and columns of what supports hold.
+/// Rows and columns of held unknowns.
 void Assembler::find_blocks() {
   blocks_.clear();
   const bool symmetric = symmetry_ == Symmetry::symmetric;
@@ -296,7 +296,7 @@ void Assembler::project_for_now() {
   project_matrix([&](std::size_t place) { replaced_.emplace_back(place, values[place]); });
 }
 
-/// Rows and columns of two constraints meet: what was changed last is the first to go back.
+/// Restores rows and columns where two constraints meet, in the reverse order of their changes.
 void Assembler::take_back_projection() {
   const std::span<double> values = solver_->values();
   for (std::size_t i = replaced_.size(); i-- > 0;) values[replaced_[i].first] = replaced_[i].second;
@@ -327,7 +327,7 @@ void Assembler::project_matrix(const Before& before) {
     p.topLeftCorner(n, n) = P.topLeftCorner(n, n);
     for (int i = 0; i < n; ++i)
       for (int j = 0; j < n; ++j) own(i, j) = values[static_cast<std::size_t>(block.own[i][j])];
-    // Rows of what is held get a number of the size of the others, whichever way they lie in space.
+    // The diagonal of held rows has the size of the other entries, for any orientation in space.
     const double size = own.norm() / std::sqrt(n), scale = size > 0.0 ? size : 1.0;
     own = p * own * p + scale * (Matrix3::Identity() - p);
     for (int i = 0; i < n; ++i)

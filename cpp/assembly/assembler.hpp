@@ -66,12 +66,12 @@ class ElementTable {
   std::vector<std::ptrdiff_t> starts_;
 };
 
-/// Ordinary stencils that the kernels of stencil_kernels.hpp take, and what is left for others.
+/// Ordinary stencils for the kernels of stencil_kernels.hpp, and the other stencils.
 struct RegularStencils {
   std::vector<int> stencil, first_unknown, edges;
   std::vector<double> owned;
   std::vector<std::ptrdiff_t> lines;
-  bool by_rows = false;          ///< whether lines of an unsymmetric matrix are its rows, else its columns
+  bool by_rows = false;          ///< true if lines of an unsymmetric matrix are its rows, else its columns
   std::vector<int> other_bend;   ///< stencils left over
   std::vector<int> other_edges;  ///< edges whose stretching no regular stencil owns
 };
@@ -92,28 +92,28 @@ class Assembler {
     return solver_->values()[static_cast<std::size_t>(diagonal_[static_cast<std::size_t>(dof)])];
   }
 
-  /// The entry of row i and column j in the solver's values, or nothing.
+  /// The entry of row i and column j in the solver's values, or null.
   double* entry(int row, int column, std::span<double> values) const;
   /// Three rows, from `first` on, times a matrix; and a block on the diagonal added there. Unsymmetric matrices only.
   void turn_rows(int first, const Matrix3& by, std::span<double> values) const;
   void add_block(int first, const Matrix3& block, std::span<double> values) const;
 
-  /// out = A x, A^T x with the solver's values; exact matrices only. `multiply_held`: of what supports hold alone.
+  /// out = A x or A^T x with the solver's values; exact matrices only. `multiply_held` uses held unknowns only.
   void multiply(const VectorX& x, VectorX& out) const;
   void multiply_transposed(const VectorX& x, VectorX& out) const;
   void multiply_held_transposed(const VectorX& x, VectorX& out) const;
 
   double greatest_diagonal() const;
-  /// Greatest mean of a node's diagonal entries, a frame's, or of an angle, over that of `weight`: the same however the
-  /// scene lies in space.
+  /// Greatest mean of the diagonal entries of a node or frame, or greatest entry of an angle, over that of `weight`. It
+  /// does not depend on the orientation of the scene in space.
   double greatest_stiffness(const VectorX& weight) const;
 
-  /// Takes in the unknowns of contacts, one after the other (-1: none), and finds a new order of elimination where they
-  /// couple what was not coupled yet. The solver is then another one.
+  /// Adds the unknowns of contacts, one after the other (-1: none). If they couple unknowns that were not coupled, it
+  /// finds a new order of elimination, and the solver is a new one.
   void couple(const std::vector<int>& contact_unknowns, int width);
   /// Couples the unknowns of contacts, with an order of elimination for these contacts and no others.
   void order_for(const std::vector<int>& contact_unknowns, int width);
-  /// Takes in groups of unknowns that custom forces couple, as far as they are not coupled yet.
+  /// Adds groups of unknowns that custom forces couple, if they are not coupled yet.
   void couple_groups(const std::vector<std::vector<int>>& groups);
   /// These and no others.
   void set_groups(const std::vector<std::vector<int>>& groups);
@@ -121,8 +121,8 @@ class Assembler {
   /// Another number whenever the solver is.
   int generation() const { return generation_; }
 
-  /// Takes out what supports hold: rows and columns are projected onto the free directions, and the held
-  /// ones get a positive diagonal, so that the pattern stays and held increments vanish.
+  /// Removes held unknowns: rows and columns are projected onto the free directions. Held directions get a positive
+  /// diagonal, so that the pattern stays and held increments vanish.
   void project_matrix();
   /// Project the matrix until it is restored, see above.
   void project_for_now();
@@ -130,18 +130,18 @@ class Assembler {
   void project(VectorX& vector) const;
   /// The part of a vector along held directions.
   VectorX held_part(const VectorX& vector) const;
-  /// Puts that of another in its place; `held` may be empty where nothing is held.
+  /// Replaces the held part by that of another vector; `held` may be empty if nothing is held.
   void set_held_part(const VectorX& held, VectorX& vector) const;
   /// to += factor x the part of `from` along held directions.
   void add_held_part(const VectorX& from, double factor, VectorX& to) const;
   /// out += factor x the part of `to` - `from` along held directions.
   void add_held_change(const VectorX& from, const VectorX& to, double factor, VectorX& out) const;
-  /// Length of the longest of those parts, each that of one constraint.
+  /// Length of the longest of those parts, one per constraint.
   double greatest_held_change(const VectorX& from, const VectorX& to) const;
 
   ElementTable stretch, bend, half, contact;
   RegularStencils regular;
-  /// Per edge and direction, where its nodes' own entries stand, and the one or (unsymmetric) two between them, or -1.
+  /// Places of a node's own entries per edge and direction, and of the one or (unsymmetric) two entries between them.
   std::vector<std::ptrdiff_t> edge_couplings;
 
  private:
@@ -169,11 +169,11 @@ class Assembler {
   bool exact_;
   int generation_ = 0;
   std::vector<std::vector<int>> cliques_;  ///< without contact and custom forces
-  std::vector<std::vector<int>> groups_;   ///< of custom forces
+  std::vector<std::vector<int>> groups_;   ///< groups of custom forces
   SparsityPattern pattern_;
   std::unique_ptr<LinearSolver> solver_;
   std::vector<std::ptrdiff_t> diagonal_;
-  std::vector<std::ptrdiff_t> entries_;  ///< of the pattern, one after the other; exact matrices only
+  std::vector<std::ptrdiff_t> entries_;  ///< entries of the pattern, one after the other; exact matrices only
   std::vector<Block> blocks_;
   std::vector<std::pair<std::size_t, double>> replaced_;  ///< entries that a projection has changed
 };

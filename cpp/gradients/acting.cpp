@@ -30,7 +30,7 @@ void ActingNumbers::record(std::size_t step, const Parameters& parameters) {
 void ActingNumbers::cut(std::size_t step) {
   while (stretches_.size() > 1 && stretches_.back().first >= step) {
     stretches_.pop_back();
-    divided_ = true;  // what is noted again belongs to no stretch before
+    divided_ = true;  // a repeated note belongs to no earlier stretch
   }
 }
 

@@ -21,7 +21,7 @@ void StepGradient::add_held(const StepAdjoint& adjoint, const VectorX& end_veloc
     const double h = equations_.problem().interval;
     by -= adjoint.acceleration / (h * h);
   }
-  const double share = 1.0 / end_rate();  // of z = share q1 + (1 - share) q0
+  const double share = 1.0 / end_rate();  // share in z = share q1 + (1 - share) q0
   for (std::size_t i = 0; i < model.constraints.size(); ++i) {
     const Constraint& c = model.constraints[i];
     const Vector3 part = c.held(by);
@@ -91,8 +91,8 @@ Vector3 arm_of(const Model& model, const VectorX& q, const Support& support) {
   return node_vector(model, q, support.other_node) - node_vector(model, q, support.node);
 }
 
-/// Derivatives by the pose of a rigid hand. An edge beside another hand has a node of that: its director is what this
-/// hand says, carried from the tangent t that it has there to that which it has.
+/// Derivatives by the pose of a rigid hand. An edge beside another hand shares a node with that hand. This hand then
+/// determines its director, transported from the tangent at the grasp to the present tangent t.
 void add_hand(const Model& model, const VectorX& q, VectorX& held, const Support& hand, const HandsHeld& hands,
               std::size_t support, Vector3& rotation) {
   for (std::size_t i = 0; i < hand.touched.size() && !model.planar(); ++i) {

@@ -1,4 +1,4 @@
-// Reactions are rows of the residual of what supports hold, as `World::reaction` makes forces and moments of them.
+// Reactions are rows of the residual of held unknowns, from which `World::reaction` computes forces and moments.
 
 #include <Eigen/Geometry>
 
@@ -37,8 +37,8 @@ void StepGradient::add_reactions(const ReactionAdjoint& reactions, StepAdjoint& 
     for (int edge : support.edges) add_held_inertia(model.edge_dof[at(edge)], adjoint.coefficients);
   }
   if (moves()) return;
-  // An equilibrium's rows are those of reference directors that turn along with their edges: without what those which
-  // stay behind leave nodes of torques, -torque spin, with d spin = -t x de / (2 l^2).
+  // The rows of an equilibrium refer to reference directors that turn with their edges. Fixed reference directors would
+  // add -torque spin to nodes, with d spin = -t x de / (2 l^2).
   for (int e = 0; e < model.edge_count; ++e) {
     const EdgeFrame<double>& f = data_.configuration.edge[at(e)];
     const double torque = data_.full_residual[model.edge_dof[at(e)]];
@@ -119,8 +119,8 @@ void StepGradient::add_frame_reaction(int dof, CoefficientAdjoint& coefficients)
         (u - J * u).cwiseProduct(equations_.problem().held_acceleration.segment<3>(dof));
 }
 
-/// Reactions take the inertia of what is held as M (v1 - v0) / dt, for that of finite turns in the rows of the midpoint
-/// rules. Either is prescribed, but for the mass.
+/// Reactions use M (v1 - v0) / dt as inertia of held parts, in place of the inertia of finite rotations in the rows of
+/// the midpoint rules. Both are prescribed, except for the mass.
 void StepGradient::add_held_inertia(int angle, CoefficientAdjoint& coefficients) const {
   const double inertia = equations_.mass().rows[angle];
   if (!equations_.problem().in_middle() || inertia == 0.0) return;

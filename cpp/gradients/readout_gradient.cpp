@@ -105,8 +105,8 @@ class Readouts {
     add_halves(rod, stencil, place.half, by_curvature, by_twist);
   }
 
-  /// Curvature of a frame: the mean over both halves, by their lengths V, of k0 (1 - V / C) + S / C, and the sum of
-  /// twists tau over both lengths. What a half carries is a fixed part of its edge.
+  /// Curvature of a frame: the mean over both halves, weighted by their lengths V, of k0 (1 - V / C) + S / C. The twist
+  /// is the sum of tau over both lengths. The carried length C of a half is a fixed part of its edge.
   void add_halves(int rod, int stencil, const int (&halves)[2], const Vector2& by_curvature, double by_twist) {
     const Vector2 natural = p_.natural_curvature[at(rod)].row(stencil);
     StrainGradients strains;
@@ -148,8 +148,8 @@ class Readouts {
     return {strains.strain[0], strains.strain[1]};
   }
 
-  /// Read-outs of a stencil depend on rest lengths too: the curvature k0 (1 - V / C) + S / C, with C what the
-  /// stencil carries and S its turn, and the twist tau / V.
+  /// Read-outs of a stencil depend on rest lengths too: the curvature k0 (1 - V / C) + S / C, with C the carried length
+  /// of the stencil and S its rotation, and the twist tau / V.
   void add_lengths(int rod, int stencil, int bend, double carried, const StrainGradients& strains,
                    const Vector2& by_curvature, double by_twist) {
     const double voronoi = model_.bend_voronoi(bend);
@@ -164,7 +164,7 @@ class Readouts {
     }
   }
 
-  /// By discrete curvatures; see `World::curvatures`. In a plane by both components of the one.
+  /// Derivatives by discrete curvatures; see `World::curvatures`. In a plane, by both components of the one curvature.
   Vector2 by_strains(int rod, int stencil, const StrainGradients& strains, double voronoi, double carried,
                      const Vector2& by) {
     const double beyond = voronoi / carried;

@@ -55,7 +55,7 @@ void displace_state(const Model& model, const VectorX& by, State& state) {
   require(by.allFinite(), "a displacement of the state must be finite");
   State out = state;
   Configuration configuration;
-  if (!model.planar()) {  // from where all are measured from where they are
+  if (!model.planar()) {  // frames count from their present orientation
     compute_configuration(model, out, out.q, configuration);
     accept_configuration(model, VectorX(out.q), configuration, out);
   }

@@ -12,8 +12,8 @@
 namespace withe {
 namespace {
 
-/// Stiffness by which neutral modes are held, and that below which rounding alone resists, over the greatest; what a
-/// solve may leave of its right-hand side.
+/// Relative stiffness added to neutral modes, relative stiffness below which a resistance is rounding, and largest
+/// relative residual of a solve.
 constexpr double kNeutral = 1e-12, kFree = 1e-14, kSolved = 1e-6;
 constexpr const char* kSingular =
     "the state is not determined by the parameters, because the matrix is "
@@ -99,8 +99,8 @@ void StepGradient::set_end(const StateAdjoint& state) {
     by_end_.segment<3>(dof) = cayley_spin(step_->end.segment<3>(dof)).transpose() * state.q.segment<3>(dof);
 }
 
-/// rows = -(R_z^T)^-1 (zbar + R_z^T w) + w, the former on what is free and w the derivatives by rows of supports, and
-/// what it makes of the columns of R_z: -zbar on what is free.
+/// Computes rows = r + w with R_z^T r = -(zbar + R_z^T w) on the free unknowns, where w are the derivatives by rows of
+/// supports. Also computes columns = R_z^T rows, which is -zbar on the free unknowns.
 void StepGradient::solve() {
   const Assembler& assembler = equations_.assembler();
   const bool reacts = by_rows_.size() != 0;
@@ -137,7 +137,7 @@ void StepGradient::pull_back(StateAdjoint& state, CoefficientAdjoint& by, HeldAd
   StepAdjoint adjoint(model, rows, state.approach, state.hands, by);
   set_end(state);
   if (yielding) yielding->add_slip_adjoint(equations_.problem(), step_->end, adjoint, by_end_);
-  // v1 = rate (q1 - q0) - (end_rate - 1) v0, but that angles' rates may be those of finite rotations.
+  // v1 = rate (q1 - q0) - (end_rate - 1) v0, except that rates of angles may be those of finite rotations.
   VectorX start = VectorX::Zero(model.dof_count), velocity = start;
   if (moves()) {
     VectorX free = state.v;
@@ -230,13 +230,12 @@ void StepGradient::add_transport(const StateAdjoint& state, const StepAdjoint& a
     const EdgeFrame<double>& last = end_->edge[at(e)];
     const Vec3d e0 = edge_vector(model, step_->start.q, e);
     const double inverse0 = 1.0 / std::sqrt(dot(e0, e0));
-    // If all of an edge's angles, of the start too, grow alike and its reference director turns back, nothing
-    // changes.
+    // If all angles of an edge, also at the start, grow equally and its reference director turns back, nothing changes.
     const double turns = columns_[angle] + adjoint.start[angle],
                  at_z = turns + adjoint.middle_turn[e] - adjoint.end_turn[e] - adjoint.start_turn[e];
     Vec3d by = (at_z * inverse0 / f.inverse_length) * f.spin +
                ((adjoint.end_turn[e] + state.q[angle]) * inverse0 / last.inverse_length) * last.spin;
-    // Friction says itself how its torques depend on the start.
+    // Friction has its own derivatives of torques by the start.
     const double friction = data_.contact_gradient.size() != 0 ? data_.contact_gradient[angle] : 0.0,
                  torque = data_.full_residual[angle] - data_.inertia[angle] - friction;
     const Vec3d u = torque * edge_vector(model, rows_, e);

@@ -25,7 +25,7 @@ struct StateAdjoint {
   VectorX v;  ///< [s/m], [s/rad]
   ApproachAdjoint approach = {};
   HandAdjoint hands = {};   ///< empty: nothing
-  MatrixX3 obstacles = {};  ///< by their places, per obstacle, in the axes of the unknowns [1/m]; empty: nothing
+  MatrixX3 obstacles = {};  ///< by positions of obstacles, in the axes of the unknowns [1/m]; empty: zero
 };
 
 /// Step that is differentiated, from `start` to q1.
@@ -35,8 +35,8 @@ struct StepTaken {
   StepRule rule;
   double duration;  ///< [s]; statics: 0
   const VectorX& end;
-  const VectorX* held_velocity = nullptr;  ///< of supports at the end, meaningful where held; nothing: they rest
-  /// Per constraint, how much of the gain on the mean velocity before goes into that at the end; nothing: none.
+  const VectorX* held_velocity = nullptr;  ///< of held unknowns at the end, elsewhere undefined; null: at rest
+  /// Per constraint, the share of the change of the mean velocity that is added to the velocity at the end; null: zero.
   const VectorX* held_gain = nullptr;
   /// Poses of hands and places of obstacles at the end; must outlive the step.
   const Prescribed& prescribed = Prescribed::nothing();
@@ -44,28 +44,28 @@ struct StepTaken {
 
 /// Derivatives of a scalar by the reactions of supports in a step, as `World::reaction` has them; or empty.
 struct SupportAdjoint {
-  MatrixX3 forces, moments;  ///< per support [1/N], [1/(N m)]; zero for those after the last row
+  MatrixX3 forces, moments;  ///< per support [1/N], [1/(N m)]; zero for supports after the last row
 };
 
-/// Those that are read out after a time step, of which a step may be a part, and where hands are then, about which
-/// their moments are.
+/// Derivatives by reactions that are read out after a time step, which may have several inner steps, and the positions
+/// of hands at that time, about which moments are taken.
 struct ReactionAdjoint {
   const SupportAdjoint& by;
   std::vector<SupportPose> about;  ///< per support; none: there is no hand
-  double share = 1;                ///< of the time step, over whose parts reactions are means
+  double share = 1;                ///< share of the inner step in the time step, over which reactions are means
 };
 
-/// Derivatives of a scalar by what supports prescribe, meaningful where held.
+/// Derivatives of a scalar by prescribed motion; undefined for free unknowns.
 struct HeldAdjoint {
-  VectorX pose;        ///< by where they hold at the end of a step, in coordinates of the state
-  VectorX mean;        ///< by the mean velocity of the step that is to be gone back through next [s/m], [s/rad]
-  HandAdjoint hands;   ///< by where hands are at the end of a step, beyond what follows from what they hold
-  MatrixX3 obstacles;  ///< by places of obstacles then, as in `StateAdjoint`
+  VectorX pose;        ///< by held unknowns at the end of a step, in coordinates of the state
+  VectorX mean;        ///< by the mean velocity of the previous step, which is visited next [s/m], [s/rad]
+  HandAdjoint hands;   ///< by poses of hands at the end of a step, besides the effect of held unknowns
+  MatrixX3 obstacles;  ///< by positions of obstacles at the end of a step, as in `StateAdjoint`
 
   explicit HeldAdjoint(const Model& model) : pose(VectorX::Zero(model.dof_count)), mean(pose), hands(model) {}
 };
 
-/// Adds derivatives by axial forces in a configuration: to those by its unknowns, and by coefficients.
+/// Maps derivatives by axial forces in a configuration to derivatives by its unknowns and by coefficients.
 void add_axial_forces(const Model& model, const Parameters& parameters, const Configuration& configuration,
                       const VectorX& by, VectorX& unknowns, CoefficientAdjoint& coefficients);
 
@@ -75,21 +75,21 @@ class StepGradient {
 
   Equations& equations() { return equations_; }
 
-  /// Prepares for a step; what it refers to must outlive `pull_back`. Throws std::invalid_argument where no state
-  /// follows from what acts.
+  /// Prepares a step; its references must outlive `pull_back`. Throws std::invalid_argument if the parameters do not
+  /// determine the state.
   void begin(const StepTaken& step);
   /// Imbalance of the last evaluation: greatest residual force, beyond rounding, over the greatest force [-].
   double imbalance() const;
-  /// Makes of the adjoint of the state at the end that of the state at the start, and adds what coefficients and held
-  /// unknowns (at the end, in coordinates of the state) contribute. `reactions`, and `tensions` in the middle, per edge
-  /// [1/N]: of this step, by which the scalar goes besides. Throws std::invalid_argument where no gradient is known.
+  /// Maps the adjoint of the state at the end to that of the state at the start, and adds derivatives by coefficients
+  /// and held unknowns (at the end, in coordinates of the state). `reactions`, and `tensions` in the middle, per edge
+  /// [1/N], are further read-outs of this step. Throws std::invalid_argument if no gradient is available.
   void pull_back(StateAdjoint& state, CoefficientAdjoint& by, HeldAdjoint& held,
                  const ReactionAdjoint* reactions = nullptr, const VectorX* tensions = nullptr);
   /// Residual of the last evaluation [N], [N m].
   const VectorX& residual() const { return data_.residual; }
-  /// Change of the unknowns of an equilibrium, forward mode, R_z dz = -dR, if the residual, at fixed unknowns,
-  /// changes by `residual`, and what supports hold by `held` (zero elsewhere). Throws std::invalid_argument where no
-  /// state follows from what acts.
+  /// Change of the unknowns of an equilibrium in forward mode, R_z dz = -dR. The residual at fixed unknowns changes by
+  /// `residual`, and held unknowns by `held` (zero elsewhere). Throws std::invalid_argument if the parameters do not
+  /// determine the state.
   VectorX respond(const VectorX& residual, const VectorX& held);
   /// Adds the derivatives of the work of an equilibrium's residual over a motion.
   void add_work_along(const VectorX& motion, CoefficientAdjoint& by, HeldAdjoint& held);
@@ -119,9 +119,9 @@ class StepGradient {
   StepData data_;
   Configuration own_end_;
   const Configuration* end_ = nullptr;  ///< at q1, in space
-  VectorX rates_;                       ///< of velocities at the end by q1 [1/s]
+  VectorX rates_;                       ///< derivatives of velocities at the end by q1 [1/s]
   VectorX held_acceleration_, z_, by_end_, by_z_, rows_, columns_;
-  VectorX by_rows_;       ///< of the residual, by which reactions go directly; empty: none
+  VectorX by_rows_;       ///< by rows of the residual, on which reactions depend directly; empty: none
   bool shifted_ = false;  ///< the factorised matrix, against neutral modes
 };
 

@@ -14,9 +14,9 @@
 namespace withe {
 namespace {
 
-/// States are kept this many steps apart; those between are played again.
+/// Distance of stored states in steps; the states in between are replayed.
 constexpr std::size_t kStretch = 100;
-constexpr double kRounding = 1e-12;  // by which supports that rest move, of the scene's length; and angles
+constexpr double kRounding = 1e-12;  // motion of resting supports, over the scene's length; and of angles
 
 MatrixX3 at_nodes(const Model& model, const VectorX& by) {
   MatrixX3 out(model.node_count, 3);
@@ -85,7 +85,7 @@ class Tape::Player {
     return step.hands.empty() ? poses_of(start) : step.hands;
   }
 
-  /// Per unknown, meaningful where held; nothing where supports rest.
+  /// Per unknown, undefined for free ones; null if supports rest.
   const VectorX* held_velocity(const Step& step) {
     if (step.held.size() == 0) return nullptr;
     held_.setZero(model_.dof_count);
@@ -220,7 +220,7 @@ void Tape::check_known() const {
 }
 
 void Tape::walk_back(Player& player, const std::function<void(const Passage&)>& visit) const {
-  std::vector<State> states(std::min(kStretch, steps_.size()));  // written anew, without allocation
+  std::vector<State> states(std::min(kStretch, steps_.size()));  // overwritten without allocation
   ActingNumbers::Player acting;
   std::size_t stretch = acting_.count() - 1;
   for (std::size_t k = steps_.size(); k-- > 0;) {
@@ -265,7 +265,7 @@ class Tape::Moments {
     }
   }
 
-  /// Adds those after so many steps; `state()` is the one then.
+  /// Adds the derivatives of moments after this number of steps; `state()` is the state then.
   void add(std::size_t steps, const Assembler& assembler, const Parameters& parameters,
            const std::function<State()>& state, StateAdjoint& adjoint) {
     for (; left_ > 0 && moments_[left_ - 1].steps == static_cast<long>(steps); --left_) {
@@ -288,7 +288,7 @@ class Tape::Moments {
     }
   }
 
-  /// By the axial forces in the middle of a step; or nothing. To be asked from the last step on.
+  /// Derivatives by the axial forces in the middle of a step, or null. Call from the last step backwards.
   std::optional<VectorX> tensions(std::size_t step) {
     if (tensions_.empty() || tensions_.back().first != step) return std::nullopt;
     std::optional<VectorX> found = std::move(tensions_.back().second);
@@ -296,7 +296,7 @@ class Tape::Moments {
     return found;
   }
 
-  /// By the reactions of a step; or nothing. To be asked from the last step on.
+  /// Derivatives by the reactions of a step, or null. Call from the last step backwards.
   std::optional<ReactionAdjoint> reactions(std::size_t step) {
     if (reactions_.empty() || reactions_.back().first != step) return std::nullopt;
     std::optional<ReactionAdjoint> found = std::move(reactions_.back().second);
@@ -305,7 +305,7 @@ class Tape::Moments {
   }
 
  private:
-  /// True if axial forces after so many steps are read out in the middle of the last one.
+  /// True if axial forces after this number of steps are read out in the middle of the last step.
   bool tensions_in_middle(long steps) const {
     return steps > 0 && tape_.steps_[static_cast<std::size_t>(steps - 1)].tensions_in_middle;
   }
@@ -347,7 +347,7 @@ class Tape::Moments {
             "a subdivided time step: use a smaller time_step, or adaptive=False");
   }
 
-  /// With the natural shape that was there after so many steps.
+  /// Uses the natural shape after this number of steps.
   const Parameters& shown_parameters(long steps, const Parameters* acted) {
     const auto found = tape_.natural_.find(steps);
     if (found == tape_.natural_.end()) return *acted;

@@ -77,11 +77,11 @@ class Tape {
   void note_moment(const Parameters& now);
   /// Begins a new stretch of parameters.
   void divide() { acting_.divide(); }
-  /// Forgets all but so many.
+  /// Removes all steps after the first `count`.
   void cut(long count, const State& after, std::vector<SupportPose> hands);
-  /// Says why no gradient goes through this run; the first reason stays.
+  /// Notes the reason why this run has no gradient; the first reason stays.
   void refuse(const std::string& why);
-  /// True if that is what the last step led to.
+  /// True if the last step led to this state.
   bool continues(const State& state) const;
   /// True if these are as many loads as at the start.
   bool has_loads(const Parameters& parameters) const { return parameters.loads.rows() == acting_.load_rows(); }
@@ -95,7 +95,7 @@ class Tape {
   /// `visit_poses` may be empty.
   InitialGradient gradient(const std::vector<MomentAdjoint>& moments, const ParameterVisitor& visit,
                            const PoseVisitor& visit_poses) const;
-  /// Jacobian of a run in which nothing was set; costs a solve of each step for every row.
+  /// Jacobian of a run without changes of parameters; it costs a solve of each step for every row.
   RunJacobian jacobian() const;
 
  private:
@@ -103,17 +103,17 @@ class Tape {
     StepRule rule;
     double duration, time;  ///< and that at its end [s]
     VectorX end;
-    VectorX held;  ///< velocities at its end of what supports hold, one after the other; none: they rest, as before it
-    VectorX gain;  ///< see `StepTaken::held_gain`; none: nothing
+    VectorX held;  ///< velocities of held unknowns at its end, in order; empty: they rest, as before it
+    VectorX gain;  ///< see `StepTaken::held_gain`; empty: null
     Reached reached;
-    std::vector<SupportPose> hands;        ///< at its end; none: where they were before it
-    std::vector<ObstaclePlace> obstacles;  ///< at its end; none: where they were before it
+    std::vector<SupportPose> hands;        ///< at its end; empty: as before it
+    std::vector<ObstaclePlace> obstacles;  ///< at its end; empty: as before it
     std::vector<ContactRecord> contacts;   ///< at its end
     bool begins;
-    const char* unknown;  ///< why no gradient goes through it, if so
+    const char* unknown;  ///< reason why no gradient exists, or null
     bool tensions_in_middle;
   };
-  /// As it is read out, where it is another than the one that acted last.
+  /// Natural shape for read-outs, if it differs from the one of the last step.
   struct NaturalShape {
     std::vector<MatrixX2> curvature;
     std::vector<VectorX> twist;
@@ -148,8 +148,8 @@ class Tape {
   ActingNumbers acting_;
   std::vector<Step> steps_;
   std::map<long, NaturalShape> natural_;  ///< by the number of steps
-  std::vector<State> starts_;             ///< of every stretch of steps that are played again together
-  VectorX last_, last_velocity_;          ///< what the last step led to
+  std::vector<State> starts_;             ///< initial state of every stretch of steps that is replayed together
+  VectorX last_, last_velocity_;          ///< result of the last step
   std::vector<SupportPose> last_hands_;   ///< poses of hands after the last step
   std::vector<ObstaclePlace> last_obstacles_;
   std::string refused_;

@@ -16,7 +16,7 @@ struct Actuation {
   VectorX tension;                  ///< per tendon [N]
 };
 Actuation actuation_of(const Parameters& parameters);
-/// Strains (kappa1, kappa2, tau) of the stencils of a rod as it is drawn, by its edges' tangents and first directors.
+/// Strains (kappa1, kappa2, tau) of the stencils of a drawn rod, from its edges' tangents and first directors.
 MatrixX3 drawn_strains(const MatrixX3& tangents, const MatrixX3& directors, bool closed);
 /// Actuation under which a configuration is free of stress, as far as joints let it be found; tendons are slack.
 Actuation relaxed_actuation(const Model& model, const Parameters& parameters, const Configuration& configuration);

@@ -26,13 +26,13 @@ struct Cluster {
   JointForm form = JointForm::frame;
   int frame = -1;
   int hinge = -1;
-  int merged_into = -1;  ///< of a plane that lets them turn by nothing: the one that has its passes now
+  int merged_into = -1;  ///< of a planar hinge that cannot turn: the cluster that has its rods now
 };
 
 /// Place of a revolute link, before frames have unknowns.
 struct LinkPlace {
-  int parent, child;  ///< clusters, the latter of which turns; in space about the hinge
-  double sign;        ///< of its unknown
+  int parent, child;  ///< clusters; the child turns, in space about the hinge
+  double sign;        ///< sign of its unknown
   int hinge = -1;
   bool turns = true;
 };
@@ -150,8 +150,8 @@ class Builder {
     }
   }
 
-  /// In a plane a hinge lies between two frames, or, about an axis in the plane, lets nothing turn: those clusters
-  /// become one first.
+  /// In a plane, a hinge lies between two frames. A hinge about an axis in the plane cannot turn, so its clusters are
+  /// merged first.
   void add_planar_links(const JointDescription& joint, int base) {
     const auto along = [&](const RevoluteLink& link) { return link.axis.normalized().dot(model_.plane->normal); };
     const auto now = [&](int cluster) {
@@ -510,7 +510,7 @@ class Builder {
         model_.bend_offset.row(b) << strain.kappa1, strain.kappa2, strain.tau;
       }
     }
-    // Natural strains of the rods come on top, so those of the drawing are taken off here.
+    // Natural strains of the rods are added later, so those of the drawing are subtracted here.
     const MatrixX3 drawn = model_.bend_offset;
     model_.bend_offset.setZero();
     const Parameters natural = initial_parameters(model_);

@@ -20,7 +20,7 @@ struct RodDescription {
   bool closed = false;
   MatrixX3 directors;          ///< first director of each edge, unit length, normal to the edge
   VectorX rest_lengths;        ///< [m]
-  VectorX arc_lengths;         ///< of the curve that the edges are chords of [m]; empty: the edges are the rod
+  VectorX arc_lengths;         ///< arcs of the curve whose chords the edges are [m]; empty: the edges are the rod
   VectorX stretch_stiffness;   ///< EA [N]
   MatrixX2 bend_stiffness;     ///< EI1, EI2 [N m^2]: resisting curvature towards d1 and d2
   VectorX twist_stiffness;     ///< GJ [N m^2]
@@ -30,8 +30,8 @@ struct RodDescription {
   VectorX drag;                ///< force per length and velocity [Pa s]
   MatrixX2 natural_curvature;  ///< per stencil, of the smooth rod, towards d1 and d2 [1/m]
   VectorX natural_twist;       ///< per stencil [rad/m]
-  VectorX contact_radius;      ///< of the round surface that touches others [m]; empty: it touches nothing
-  VectorX fluid_radius;        ///< of what a fluid flows around [m]
+  VectorX contact_radius;      ///< radius of the round contact surface [m]; empty: no contact
+  VectorX fluid_radius;        ///< radius in the fluid [m]
 };
 
 /// One rod passing through, starting or ending at a shared node: rod index and node index within the rod.
@@ -49,7 +49,7 @@ struct RevoluteLink {
   double stiffness = 0;   ///< k [N m/rad]
   double rest_angle = 0;  ///< [rad]
   double damping = 0;     ///< c [N m s/rad]
-  double moment = 0;      ///< of a motor, on the child [N m]
+  double moment = 0;      ///< moment of a motor on the child [N m]
 };
 
 enum class JointForm {
@@ -95,12 +95,12 @@ struct HandDescription {
   bool yields = false;
   /// Stiffness of a hand that yields: along d1, d2, t of the held rod [N/m], and about them [N m/rad].
   std::array<double, 6> stiffness{};
-  double force_limit = std::numeric_limits<double>::infinity();  ///< beyond which it slips [N]
+  double force_limit = std::numeric_limits<double>::infinity();  ///< above it the hand slips [N]
   /// A ring, see forces/ring.hpp: it yields, with stiffness[0] across the rod and along it.
   bool slides = false;
-  double friction = 0;   ///< of a ring that lets the rod slide [-]
-  bool feeds = false;    ///< whether a drive holds the rod along itself
-  double feed_rate = 0;  ///< of the drive at first: length at rest towards the end of the rod [m/s]
+  double friction = 0;   ///< coefficient of a ring that lets the rod slide [-]
+  bool feeds = false;    ///< true if a drive holds the rod along itself
+  double feed_rate = 0;  ///< initial rate of the drive: rest length towards the end of the rod [m/s]
 };
 
 /// Something that holds a node of a rod.
@@ -108,7 +108,7 @@ struct SupportDescription {
   SupportKind kind = SupportKind::pin;
   RodPass pass;
   Matrix3 free = Matrix3::Zero();  ///< projector onto the directions along which the node may slide
-  bool gripped = false;            ///< put on while the scene runs, so that it must not change what is stored
+  bool gripped = false;            ///< true if added during a run, so that it must not change the stored energy
   Vector3 axis =
       Vector3::Zero();  ///< about which a spinning clamp turns that was put on then; else that of the drawing
   HandDescription hand;
@@ -132,7 +132,7 @@ struct LoadDescription {
   MatrixX3 values = MatrixX3::Zero(1, 3);
   bool follower = false;
   bool varies = false;  ///< set by a callback while running, so `values` are only its first ones
-  bool added = false;   ///< put on while the scene runs: it has no say in which plane the drawing lies in
+  bool added = false;   ///< true if added during a run: it has no influence on the plane of the drawing
 };
 
 /// A spring with a damper beside it (Kelvin and Voigt) between two nodes; see forces/spring.hpp.
@@ -190,9 +190,9 @@ enum class ObstacleKind {
 /// Something solid, where it is drawn.
 struct ObstacleDescription {
   ObstacleKind kind = ObstacleKind::plane;
-  Vector3 point = Vector3::Zero();   ///< on the plane; start of the segment [m]
+  Vector3 point = Vector3::Zero();   ///< point of the plane; start of the segment [m]
   Vector3 other = Vector3::UnitZ();  ///< unit normal of the plane, away from the solid; end of the segment [m]
-  double radius = 0;                 ///< of a capsule [m]
+  double radius = 0;                 ///< radius of a capsule [m]
   std::string name;
 };
 
@@ -203,15 +203,15 @@ struct ContactPairDescription {
   Vector3 friction = -Vector3::Ones();  ///< as in `ContactDescription::obstacle_friction`; negative: that of the scene
   double stiffness = 0;                 ///< [N/m]; 0: that of the scene
   double restitution = -1;              ///< coefficient [-]; negative: that of the scene
-  VectorX shares;  ///< of a rod and an obstacle: what its nodes, then its edges, rub with, over these coefficients [-];
+  VectorX shares;  ///< for a rod and an obstacle: factors of these coefficients at nodes, then at edges [-];
                    ///< empty: 1
 
   bool is_of(int a, int b) const { return (first == a && second == b) || (first == b && second == a); }
 };
 
 struct ContactDescription {
-  bool rods = false;  ///< whether rods touch each other and themselves
-  /// True if the scene does not say whether rods touch: a warning then names rods that pass through each other.
+  bool rods = false;  ///< true if rods touch each other and themselves
+  /// True if the scene does not define contact between rods: a warning then names rods that pass through each other.
   bool warns_of_crossings = false;
   double friction = 0;           ///< coefficient between rods [-]
   MatrixX3 obstacle_friction;    ///< per obstacle, of rods that slide towards their end, their start, across [-]
@@ -251,19 +251,19 @@ enum class FluidModel {
 struct FluidDescription {
   FluidModel model = FluidModel::none;
   double viscosity = 0;       ///< [Pa s]
-  double regularization = 0;  ///< of Stokeslets [m]
-  double wavelength = 0;      ///< of waves along rods, for resistive-force theory [m]; 0: rods are straight
+  double regularization = 0;  ///< regularization of Stokeslets [m]
+  double wavelength = 0;      ///< wavelength along rods, for resistive-force theory [m]; 0: rods are straight
 };
 
 /// Measure of bending strain: the angle between two edges (nearly; see geometry/bend_measure.hpp), or 2 tan of its
 /// half.
 enum class Bending { angle, tangent };
 
-/// An end of a rod at a joint or a clamp whose end correction of bending (`Builder::share_bending`) was given up, as a
-/// support held its edge. What the correction amounted to then stays as rest strain, so that nothing jumps.
+/// End of a rod at a joint or a clamp without end correction of bending (`Builder::share_bending`), because a support
+/// held its edge. The previous amount of the correction stays as rest strain, so that nothing jumps.
 struct UncorrectedEnd {
   int edge = 0;
-  bool frame_first = false;  ///< whether the joint or the clamp is at the edge's tail
+  bool frame_first = false;  ///< true if the joint or the clamp is at the edge's tail
   /// Added to natural strains f (kappa1, kappa2, tau), also in a plane: of the stencil at the frame, and of that at the
   /// edge's other node.
   Vector3 at_frame = Vector3::Zero(), at_next = Vector3::Zero();
@@ -284,7 +284,7 @@ struct SceneDescription {
   std::vector<SpringDescription> springs;
   std::vector<TendonDescription> tendons;
   bool has_custom_force = false;  ///< nodal forces come from a callback
-  bool custom_implicit = false;   ///< it knows their derivatives, so they are solved for
+  bool custom_implicit = false;   ///< true if custom forces have derivatives, and are part of the residual
   bool custom_moments = false;    ///< and moments on nodes
   ContactDescription contact;
   FluidDescription fluid;

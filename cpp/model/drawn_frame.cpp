@@ -14,7 +14,7 @@ DrawnFrameSlopes drawn_frame_slopes(const FrameEdges& at, const Matrix3& before,
                 by_turn = share * rotation_spin(share * turn) * rotation_spin(turn).inverse();
   DrawnFrameSlopes out{-by_turn * rotation, by_turn, Vector3::Zero(), Vector3::Zero()};
   (at.place == end ? out.after : out.before) += part;
-  const double sign = at.place == between ? 1.0 : -1.0;  // of how the share grows with l0
+  const double sign = at.place == between ? 1.0 : -1.0;  // sign of the derivative of the share by l0
   out.length0 = (sign * l1 / square) * turn;
   out.length1 = (-sign * l0 / square) * turn;
   return out;

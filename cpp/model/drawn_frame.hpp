@@ -1,5 +1,5 @@
 #pragma once
-/// The frame of a rod at a node, as it was drawn: what a clamp holds there, and what a joint attaches.
+/// The drawn frame of a rod at a node, which a clamp holds, or to which a joint is attached.
 ///
 /// It lies between the frames F0, F1 of two edges of lengths l0, l1, or half an edge beyond them at a rod's end:
 ///   F = exp(s v) F0,    v = log(F1 F0^T),    s = l0 / (l0 + l1) between them, s = -l0 / (l0 + l1) at the start,
@@ -10,7 +10,7 @@
 
 namespace withe {
 
-/// Edges that arrive at and leave a node of a rod; -1 where there is none.
+/// Edges that arrive at and leave a node of a rod; -1 if there is none.
 struct EdgesAtNode {
   int in, out;
 };

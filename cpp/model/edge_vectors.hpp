@@ -20,7 +20,7 @@ inline Vector3 node_position(const Model& model, const VectorX& q, int node) {
   return model.planar() ? Vector3(model.plane->origin + place) : place;
 }
 
-/// Adds to the rows of a node what is given in the axes of space.
+/// Adds a vector in the axes of space to the rows of a node.
 inline void add_to_node(const Model& model, int node, const Vector3& by, VectorX& rows) {
   const int dof = model.node_dof[at(node)];
   if (model.planar())
@@ -29,14 +29,14 @@ inline void add_to_node(const Model& model, int node, const Vector3& by, VectorX
     rows.segment<3>(dof) += by;
 }
 
-/// From the tail of an edge to its head, in a plane in the plane's axes as tangents are; of a configuration, of
-/// velocities, or of what multiplies rows.
+/// Vector from the tail of an edge to its head; in a plane in the axes of the plane, as tangents are. The argument is a
+/// configuration, velocities, or a multiplier of rows.
 inline Vec3d edge_vector(const Model& model, const VectorX& q, int edge) {
   const double *tail = &q[model.tail_dof[at(edge)]], *head = &q[model.head_dof[at(edge)]];
   return {head[0] - tail[0], head[1] - tail[1], model.planar() ? 0.0 : head[2] - tail[2]};
 }
 
-/// Adds to the rows of an edge's head, and takes from those of its tail; in a plane in the plane's axes.
+/// Adds a vector to the rows of an edge's head, and subtracts it from those of its tail; in a plane in its axes.
 inline void add_to_edge(const Model& model, int edge, const Vec3d& force, VectorX& rows) {
   double *tail = &rows[model.tail_dof[at(edge)]], *head = &rows[model.head_dof[at(edge)]];
   const double component[3] = {force.x, force.y, force.z};

@@ -8,7 +8,7 @@
 namespace withe {
 namespace {
 
-constexpr double kTouched = 1e-9;  // of an edge's length: less than that is rounding
+constexpr double kTouched = 1e-9;  // smallest touched length, over that of the edge; below it is rounding
 
 RodCurve curve_of(const Model& model, int rod) {
   const RodDescription& description = model.description.rods[at(rod)];

@@ -5,8 +5,8 @@
 
 namespace withe {
 
-/// Finds what a hand touches, whose support is otherwise resolved. Throws std::invalid_argument where that is off the
-/// rod.
+/// Finds the edges that a hand touches, for an otherwise resolved support. Throws std::invalid_argument if the hand is
+/// not on the rod.
 void find_touched(const Model& model, Support& hand);
 
 }  // namespace withe

@@ -40,7 +40,7 @@ void lay_out_unknowns(Model& model) {
         if (hinge.frame == f) hinge.dof = next++;
     }
   };
-  // A frame at the far end of a rod stands outside the stencil of the node before, so that the band stays as narrow.
+  // A frame at the far end of a rod is outside of the stencil of the node before, so that the band stays narrow.
   const auto place_node = [&](int node, bool far_end) {
     if (model.node_dof[at(node)] >= 0) return;
     if (!far_end) place_frames(node);
@@ -57,7 +57,7 @@ void lay_out_unknowns(Model& model) {
     }
   };
   std::vector<bool> placed(rods.size(), false);
-  // A chain starts at a rod whose first node no other rod ends at, where there is one.
+  // A chain starts at a rod whose first node is not the end of another rod, if there is one.
   std::vector<bool> is_end(at(model.node_count), false);
   for (const RodDescription& rod : rods)
     if (!rod.closed) is_end[at(rod.nodes.back())] = true;
@@ -81,7 +81,7 @@ void lay_out_unknowns(Model& model) {
 
 namespace {
 
-/// Who holds what, while constraints are gathered.
+/// Owners of held unknowns, while constraints are gathered.
 class Holder {
  public:
   explicit Holder(Model& model)
@@ -99,7 +99,7 @@ class Holder {
     if (!support.active || support.yields()) return;
     if (support.is_hand()) {
       for (int node : support.span) {
-        if (is(node_, node) && is(by_edge_, node)) continue;  // between two edges that are held: by whom came first
+        if (is(node_, node) && is(by_edge_, node)) continue;  // between two held edges, the first support holds it
         hold_node(support, node);
       }
       for (const TouchedEdge& touched : support.touched) hold_edge(support, touched.edge, false);

@@ -1,5 +1,5 @@
 #pragma once
-/// Order of the unknowns, and what supports take away from them.
+/// Order of the unknowns, and the unknowns that supports hold.
 
 #include "model/model.hpp"
 

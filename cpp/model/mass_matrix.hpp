@@ -36,8 +36,8 @@ struct MassMatrix {
 };
 
 void set_mass(const Model& model, const Parameters& parameters, MassMatrix& mass);
-/// Drag by the same interpolation of velocities, in N s/m: so that it damps every mode of an even rod alike, by drag
-/// over mass, whatever its wave length.
+/// Drag with the same interpolation of velocities, in N s/m. It therefore damps every mode of a uniform rod at the same
+/// rate, drag over mass, for any wavelength.
 void set_drag(const Model& model, const Parameters& parameters, MassMatrix& drag);
 /// out = M x.
 void multiply(const Model& model, const MassMatrix& mass, const VectorX& x, VectorX& out);

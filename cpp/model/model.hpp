@@ -1,6 +1,6 @@
 #pragma once
-/// The scene as flat arrays: everything that is decided once, in `build`, and the parameters that may be
-/// changed while it runs. Built by `build_model`; immutable but for `Parameters`.
+/// The scene as flat arrays: everything that `build` decides once, and the parameters that may change during a run.
+/// `build_model` makes it; it is immutable except for `Parameters`.
 
 #include <functional>
 #include <optional>
@@ -37,7 +37,7 @@ struct BendStencil {
 struct FrameStencil {
   int frame;
   int edge;
-  int hinge;           ///< -1, or the hinge between the frame and what this edge is attached to
+  int hinge;           ///< -1, or the hinge between the frame and this edge
   bool frame_first;    ///< the edge leaves the node (the rod goes from the frame to the edge)
   Matrix3 attachment;  ///< columns d1, d2, t of the attached end, in the axes of the drawn scene
 };
@@ -48,9 +48,10 @@ struct Hinge {
   int dof;
 };
 
-/// The angle of a revolute joint by the unknowns, 0 as it is drawn: sign (q[turning] - q[against]). In space a hinge
-/// has an unknown of its own, and there is nothing to turn against; in a plane it lies between two frames. A plane lets
-/// nothing turn about an axis that lies in it.
+/// The angle of a revolute joint by the unknowns, 0 as drawn: sign (q[turning] - q[against]). In space a hinge has its
+/// own unknown, and `against` is unused. In a plane the hinge lies between two frames. In a plane nothing turns about
+/// an
+/// axis that lies in it.
 struct JointAngle {
   int turning = -1, against = -1;
   double sign = 1;
@@ -92,26 +93,26 @@ struct Constraint {
 /// An edge that a hand touches.
 struct TouchedEdge {
   int edge = 0;
-  double place = 0;  ///< middle of what is touched, from 0 at the edge's tail to 1
-  double share = 0;  ///< of the hand's length that lies on it
+  double place = 0;  ///< middle of the touched part, from 0 at the edge's tail to 1
+  double share = 0;  ///< share of the hand's length on the edge
 };
 
-/// One support, resolved: what it holds.
+/// Resolved support, with its held unknowns.
 struct Support {
   bool active = false;
   SupportDescription description;
   int node = -1;                       ///< global node
-  int frame = -1;                      ///< of a clamp
+  int frame = -1;                      ///< frame of a clamp
   int other_node = -1;                 ///< hold_edge
   int edge = -1;                       ///< hold_edge
-  Vector3 tangent = Vector3::UnitX();  ///< drawn, of what is held: the rod at a frame, or an edge
+  Vector3 tangent = Vector3::UnitX();  ///< drawn tangent of the held rod at a frame, or of a held edge
   std::vector<int> nodes, edges;       ///< nodes whose places and edges whose angles it holds
   // Data of a hand:
   std::vector<TouchedEdge> touched;  ///< in the order of the rod
   std::vector<int> span;             ///< nodes of these edges, in that order
-  int at_edge = -1;                  ///< which of these edges has the point that it is at
-  double at_place = 0;               ///< where on it
-  RodCurve curve;                    ///< of a ring: its rod
+  int at_edge = -1;                  ///< index in `touched` of the edge with the held point
+  double at_place = 0;               ///< place of this point on the edge
+  RodCurve curve;                    ///< curve of a ring's rod
 
   bool is_hand() const { return description.kind == SupportKind::hand; }
   bool yields() const { return is_hand() && description.hand.yields; }
@@ -136,18 +137,19 @@ struct SurfaceParameters {
   bool operator==(const SurfaceParameters& other) const;
 };
 
-/// Numbers that may change while running; one entry per edge, stencil or node. What users set of them has names in
-/// parameter_index.hpp.
+/// Parameters that may change during a run, with one entry per edge, stencil or node. The parameters that users set
+/// have
+/// names in parameter_index.hpp.
 struct Parameters {
   VectorX edge_stretch;  ///< EA [N]
   MatrixX2 edge_bend;    ///< EI1, EI2 [N m^2]
   VectorX edge_twist;    ///< GJ [N m^2]
   VectorX edge_density, edge_rotary, edge_viscous_time, edge_drag;
-  VectorX edge_natural_stretch;  ///< length free of stress over that of the drawing [-]
+  VectorX edge_natural_stretch;  ///< natural length over drawn length [-]
   VectorX added_mass;
   Vector3 gravity;
   double fluid_viscosity = 0;               ///< [Pa s]
-  double fluid_regularization = 0;          ///< of Stokeslets [m]
+  double fluid_regularization = 0;          ///< regularization of Stokeslets [m]
   std::vector<MatrixX2> natural_curvature;  ///< per rod and stencil, smooth [1/m]
   std::vector<VectorX> natural_twist;       ///< per rod and stencil [rad/m]
   SurfaceParameters surfaces;
@@ -155,14 +157,14 @@ struct Parameters {
   /// Per revolute joint [N m/rad], [rad], [N m s/rad], [N m].
   VectorX joint_stiffness, joint_rest_angle, joint_damping, joint_moment;
   VectorX tendon_tension;  ///< per tendon [N]
-  MatrixX3 loads;          ///< rows of each load after those of the one before; see `LoadDescription::values`
+  MatrixX3 loads;          ///< rows of all loads, load by load; see `LoadDescription::values`
   BendMeasure measure;
-  bool lumped = false;       ///< whether masses sit at nodes alone; see mass_matrix.hpp
-  bool held_lumped = false;  ///< whether those of edges at held nodes do
+  bool lumped = false;       ///< true if all masses are at nodes; see mass_matrix.hpp
+  bool held_lumped = false;  ///< true if masses of edges at held nodes are at nodes
 
   // Derived from the above by `update_derived`.
-  VectorX node_mass, node_drag;                  ///< of the half edges around a node, and added ones [kg], [N s/m]
-  VectorX edge_inertia;                          ///< of theta [kg m^2]
+  VectorX node_mass, node_drag;                  ///< half edges around a node, plus added ones [kg], [N s/m]
+  VectorX edge_inertia;                          ///< inertia of theta [kg m^2]
   VectorX frame_inertia, hinge_inertia;          ///< [kg m^2]
   MatrixX3 bend_stiffness, half_stiffness;       ///< per stencil: EI1 / V, EI2 / V, GJ / V [N m]
   MatrixX3 bend_natural, half_natural;           ///< per stencil: f (kappa1, kappa2, tau)
@@ -186,10 +188,10 @@ struct Model {
   std::vector<int> edge_rod;
   std::vector<int> edge_tail, edge_head;
   VectorX edge_length;            ///< at rest [m]
-  VectorX edge_arc;               ///< of the rod that an edge is the chord of [m]
-  std::vector<bool> rod_curved;   ///< whether its edges are chords of arcs of more than a radian in all
-  std::vector<bool> edge_lumped;  ///< whether its mass is at its nodes; see mass_matrix.hpp
-  std::vector<bool> edge_held;    ///< whether a support holds one of its nodes
+  VectorX edge_arc;               ///< length of the arc whose chord the edge is [m]
+  std::vector<bool> rod_curved;   ///< true if its edges are chords of arcs of more than a radian in all
+  std::vector<bool> edge_lumped;  ///< true if its mass is at its nodes; see mass_matrix.hpp
+  std::vector<bool> edge_held;    ///< true if a support holds one of its nodes
   std::vector<BendStencil> bend;
   std::vector<int> reversed_bend;  ///< stencils with an edge against its rod
   std::vector<FrameStencil> half;
@@ -216,7 +218,7 @@ struct Model {
   std::vector<int> frame_node;
   std::vector<int> node_dof, edge_dof, frame_dof;  ///< first unknown of each; edge_dof is empty in a plane
   std::vector<int> tail_dof, head_dof;             ///< per edge: first unknown of its nodes
-  int component_count = 0;                         ///< connected components: what joints and springs hold together
+  int component_count = 0;                         ///< connected components, by joints and springs
   std::vector<int> dof_component;                  ///< per unknown
   std::vector<Constraint> constraints;
   std::vector<Support> supports;
@@ -250,12 +252,13 @@ void set_rod(const Model& model, int rod, const RodDescription& description, Par
 void set_spring(int spring, const SpringDescription& description, Parameters& parameters);
 /// Masses, stencil stiffnesses and discrete natural strains from the rest.
 void update_derived(const Model& model, Parameters& parameters);
-/// Only the discrete natural strains; those of one rod.
+/// Updates the discrete natural strains of one rod.
 void update_natural(const Model& model, Parameters& parameters);
 void update_natural(const Model& model, Parameters& parameters, int rod);
 
-/// The plane that holds the whole scene, or nothing (with the reason). A straight scene has one only when `asked`: that
-/// of its first director.
+/// The plane that contains the whole scene, or none (with the reason). A straight scene has a plane only if `asked`:
+/// the
+/// plane of its first director.
 std::optional<Plane> find_plane(const SceneDescription& description, std::optional<bool> asked, std::string& reason);
 
 /// Square of the angle by which an arc of `arc` over a chord of `chord` turns [rad^2], to its fourth power.
@@ -265,9 +268,9 @@ inline double square_of_turn(double chord, double arc) { return 24.0 * (arc / ch
 struct ArcOfStencil {
   bool turns = false;
   double square_of_turn = 0;        ///< [rad^2]
-  Vector2 share = Vector2::Zero();  ///< of the curvature's square towards either director
+  Vector2 share = Vector2::Zero();  ///< share of the squared curvature towards either director
 };
-/// EI1, EI2 of an edge; in a plane the one bending stiffness stands in the first place [N m^2].
+/// EI1, EI2 of an edge; in a plane the only bending stiffness is the first [N m^2].
 Vector2 bend_of(const Model& model, const Parameters& parameters, int edge);
 ArcOfStencil arc_of_bend(const Model& model, Eigen::Index stencil);
 ArcOfStencil arc_of_half(const Model& model, Eigen::Index stencil);
@@ -278,8 +281,8 @@ Vector2 discrete_curvature(const Vector2& smooth, double voronoi);
 Vector2 smooth_curvature(const Vector2& discrete, double voronoi);
 /// Curvatures of the smooth rod from discrete ones, one stencil a row [1/m].
 MatrixX2 smooth_curvatures(const MatrixX2& discrete, const VectorX& voronoi);
-/// Refuses smooth curvatures, a row a stencil or one for all, that turn a rod by pi or more at a node;
-/// std::invalid_argument says where, and of what: `owner`.
+/// Refuses smooth curvatures, one row per stencil or one for all, that turn a rod by pi or more at a node. Throws
+/// std::invalid_argument that names the node and the `owner`.
 void check_turns(const Eigen::Map<const MatrixX>& smooth, const VectorX& voronoi,
                  const std::function<std::string()>& owner);
 

@@ -58,7 +58,7 @@ bool fits(const ObstacleDescription& o, const Vector3& corner, const Vector3& no
   return axis.cross(normal).norm() <= size && start * end < 0.0;
 }
 
-/// Across a line, where revolute joints turn what lies along it.
+/// Plane across a line, for a straight scene whose revolute joints turn about an axis across it.
 std::optional<Vector3> turning_across(const SceneDescription& scene, const Vector3& line) {
   for (const JointDescription& joint : scene.joints)
     for (const RevoluteLink& link : joint.links)
@@ -66,7 +66,7 @@ std::optional<Vector3> turning_across(const SceneDescription& scene, const Vecto
   return std::nullopt;
 }
 
-/// The normal of the plane that directions span; nothing, with the reason, where they span none.
+/// The normal of the plane that directions span; none, with the reason, if they span no plane.
 std::optional<Vector3> normal_of(const SceneDescription& scene, bool asked, std::vector<Vector3>& directions,
                                  std::string& reason) {
   Matrix3 spread = Matrix3::Zero();
@@ -74,7 +74,7 @@ std::optional<Vector3> normal_of(const SceneDescription& scene, bool asked, std:
   spread /= static_cast<double>(std::max<std::size_t>(directions.size(), 1));
   Eigen::JacobiSVD<Matrix3> svd(spread, Eigen::ComputeFullU);
   if (svd.singularValues()(1) < 1e-20 && asked) {
-    // A straight scene lies in many planes: the one asked for is what its joints turn in, or holds the first director.
+    // A straight scene lies in many planes: the plane of its joints' rotation is chosen, or that of the first director.
     directions.push_back(turning_across(scene, directions.front()).value_or(scene.rods.front().directors.row(0)));
     spread += directions.back() * directions.back().transpose();
     svd.compute(spread, Eigen::ComputeFullU);
@@ -133,8 +133,7 @@ std::string why_off_plane(const SceneDescription& scene, const RodDescription& r
   return "";
 }
 
-/// True if a direction is the plane's normal or lies in the plane, so that the mirror image of what belongs to it is
-/// itself.
+/// True if a direction is the plane's normal or lies in the plane, so that mirroring at the plane does not change it.
 bool is_mirrored(const Vector3& direction, const Vector3& normal) {
   constexpr double kAngle = 1e-9;
   return std::abs(direction.dot(normal)) <= kAngle * direction.norm() ||
@@ -152,7 +151,7 @@ Matrix3 hand_axes(const SceneDescription& scene, const SupportDescription& suppo
   return first_frame(scene, scene.rods[static_cast<std::size_t>(support.pass.rod)]);
 }
 
-/// True if the springs of a hand push out of the plane what moves in it: not where the normal is an axis of both.
+/// True if the springs of a hand push planar motion out of the plane: unless the normal is an axis of both stiffnesses.
 bool leans(const SceneDescription& scene, const SupportDescription& support, const Vector3& normal) {
   const HandDescription& hand = support.hand;
   if (support.kind != SupportKind::hand || !hand.yields || hand.slides) return false;
@@ -167,7 +166,7 @@ bool leans(const SceneDescription& scene, const SupportDescription& support, con
   return false;
 }
 
-/// Why anything in the scene leaves the plane; empty: nothing does.
+/// Reason why a part of the scene leaves the plane; empty if none does.
 std::string why_off_plane(const SceneDescription& scene, const Vector3& normal) {
   const auto across = [&](const Vector3& v) { return v.cross(normal).norm() > kTolerance * 100 * v.norm(); };
   for (const JointDescription& joint : scene.joints)
@@ -196,7 +195,7 @@ std::string why_off_plane(const SceneDescription& scene, const Vector3& normal) 
 }  // namespace
 
 std::optional<Plane> find_plane(const SceneDescription& scene, std::optional<bool> asked, std::string& reason) {
-  // Who asks for a plane sees to it that such forces stay in it.
+  // A user who requests a plane must keep such forces in it.
   const bool sure = asked.value_or(false);
   if (scene.has_custom_force && !sure) {
     reason = "a custom force may point anywhere";

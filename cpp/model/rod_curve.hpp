@@ -11,13 +11,13 @@ namespace withe {
 
 struct RodCurve {
   std::vector<int> nodes;      ///< in the order of the rod
-  std::vector<double> arc;     ///< of each [m]
-  std::vector<double> length;  ///< of the edge after each; none after the last of an open rod [m]
+  std::vector<double> arc;     ///< arc length of each node [m]
+  std::vector<double> length;  ///< length of the edge after each node; the last node of an open rod has none [m]
   bool closed = false;
   double whole = 0;  ///< [m]
 
   int pieces() const { return static_cast<int>(nodes.size()); }
-  /// Pieces of a closed rod go on for ever.
+  /// Pieces of a closed rod continue periodically.
   SplinePiece piece(int i) const;
   /// Place of an arc length [m].
   SplinePlace place(double at) const;
@@ -26,7 +26,7 @@ struct RodCurve {
   double arc_between(const SplinePlace& from, const SplinePlace& to) const;
 };
 
-/// Nodes of a piece from a point in space; nothing beyond the ends of the rod. `position`: of a node.
+/// Nodes of a piece from a point in space, none beyond the ends of the rod. `position` returns that of a node.
 template <class Positions>
 void place_nodes(const SplinePiece& piece, const Positions& position, const Vector3& from, Vec3<double> (&x)[3]) {
   for (int i = 0; i < 3; ++i) {

@@ -69,7 +69,7 @@ EdgeBatch spatial_batch(const Model& model, const State& state, const VectorX& q
   return edges;
 }
 
-/// Joints' frames and what is attached to them, in space.
+/// Frames of joints and their attached parts, in space.
 void attach(const Model& model, const State& state, const VectorX& q, Configuration& out) {
   for (int f = 0; f < model.frame_count; ++f) {
     const auto i = static_cast<std::size_t>(f);

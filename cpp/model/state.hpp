@@ -25,22 +25,22 @@ struct ContactRecord {
   double age = 0;        ///< time since then [s]
   Vec3d stick{};         ///< elastic slip of an anchored contact, of a's surface over b's [m]
   Vec3d roll{};          ///< elastic slip of anchored rolling friction, by a's turning alone [m]
-  Vec3d friction{};      ///< on a [N]
+  Vec3d friction{};      ///< friction force on body a [N]
   bool sticking = false;
 };
 
 /// Place of an obstacle, in the axes of the unknowns (in a plane: its two, and zero).
 struct ObstaclePlace {
-  Vec3d point{}, other{};  ///< of a plane: a point, and its normal; of a capsule: its ends [m]
+  Vec3d point{}, other{};  ///< plane: a point, and the normal; capsule: both ends [m]
   Vec3d turn{};            ///< about its own axis, since it was drawn; full turns count [rad]
-  Vec3d velocity{};        ///< with which it came there in the last step [m/s]
+  Vec3d velocity{};        ///< velocity in the last step [m/s]
 };
 
-/// Finds items by their keys in a sorted sequence. Those that are asked for mostly come in its order, so that the one
-/// behind the last is looked at first.
+/// Finds items by their keys in a sorted sequence. Searches mostly come in this order, so that the item after the last
+/// one is checked first.
 class OrderedLookup {
  public:
-  /// Nothing where there is none. `key_of(item)`.
+  /// Returns null if there is none. `key_of(item)` is the key.
   template <class Items, class KeyOf>
   auto find(Items& items, const ContactKey& key, const KeyOf& key_of) -> decltype(items.data()) {
     if (next_ >= items.size() || !(key_of(items[next_]) == key)) {
@@ -56,7 +56,7 @@ class OrderedLookup {
   std::size_t next_ = 0;
 };
 
-/// The record of a contact among sorted ones, or nothing.
+/// The record of a contact among sorted ones, or null.
 template <class Records>
 auto find_record(Records& records, const ContactKey& key, OrderedLookup& lookup) -> decltype(records.data()) {
   return lookup.find(records, key, [](const ContactRecord& r) -> const ContactKey& { return r.key; });
@@ -72,7 +72,7 @@ struct RingState {
   SplinePlace place;         ///< where
   double origin = 0;         ///< s0, arc length there at first [m]
   double fed = 0, slip = 0;  ///< [m]
-  bool left = false;         ///< whether the rod has: an end has passed
+  bool left = false;         ///< true if the rod has left the ring: an end has passed
 };
 
 /// Pose of a hand, and the held rod in the axes of the hand.
@@ -83,9 +83,9 @@ struct HandState {
   std::vector<Vector3> points;
   std::vector<Matrix3> edges;  ///< columns d1, d2, t of the edges that it touches
   // Yielding hands only, per edge:
-  std::vector<Vector3> slip;  ///< along d1, d2, t of what was grasped [m]
-  VectorX twist;              ///< of the edge against that, which fixes the branch of the angle [rad]
-  RingState ring;             ///< where it slides
+  std::vector<Vector3> slip;  ///< along d1, d2, t of the grasped frame [m]
+  VectorX twist;              ///< twist of the edge against that frame, which fixes the branch of the angle [rad]
+  RingState ring;             ///< place of the ring on the rod
 };
 
 /// Configuration, velocities and the frames they are measured from. The frames advance by time-parallel
@@ -94,7 +94,7 @@ struct HandState {
 /// ones and the velocities of supports are predicted.
 struct Motion {
   int known = 0;
-  VectorX velocity[2];  ///< [m/s]; empty where nothing asks for them
+  VectorX velocity[2];  ///< [m/s]; empty if unused
   double time[2] = {};  ///< middles of these steps [s]
 };
 
@@ -111,7 +111,7 @@ struct State {
   VectorX bend_tau, half_tau;           ///< twist of each stencil, which fixes the branch of the angle [rad]
   std::vector<ContactRecord> contacts;  ///< sorted by key
   std::vector<ObstaclePlace> obstacles;
-  std::vector<HandState> hands;  ///< per support; empty but for hands
+  std::vector<HandState> hands;  ///< per support; empty for supports that are no hands
   VectorX contact_stiffness;     ///< per rod, of contacts that begin [N/m]; where a scene has contact
   Motion motion;
 };

@@ -1,6 +1,5 @@
 #pragma once
-/// Coefficients of a stencil from those of its edges, on any scalar: doubles, or dual numbers for
-/// derivatives.
+/// Coefficients of a stencil from those of its edges, for any scalar: doubles, or dual numbers for derivatives.
 
 #include <cmath>
 #include <numbers>
@@ -12,7 +11,7 @@
 
 namespace withe {
 
-/// V / K of a part of an edge of length V; infinite where nothing resists.
+/// V / K of a part of an edge of length V; infinite without stiffness.
 template <class Scalar>
 Scalar flexibility(double length, const Scalar& stiffness) {
   return value_of(stiffness) == 0.0 ? Scalar(INFINITY) : length / stiffness;
