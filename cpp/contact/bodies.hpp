@@ -13,10 +13,10 @@ namespace withe {
 
 /// Closest points of two surfaces.
 struct Proximity {
-  ClosestPoints points;         ///< of a curve: its s alone
-  CurveDistance<double> curve;  ///< of a curve
+  ClosestPoints points;         ///< for a curve only its s
+  CurveDistance<double> curve;  ///< for a curve
   Vec3d normal{};               ///< from b to a
-  double distance = 0;          ///< of the centrelines, or of a centreline and the obstacle [m]
+  double distance = 0;          ///< distance of the centrelines, or of a centreline and the obstacle [m]
 };
 
 struct Bodies {
@@ -28,11 +28,11 @@ struct Bodies {
   }
   /// True if a pair is one with a plane, which has no other side.
   bool flat(const ContactPair& pair) const { return pair.key.b < 0 && obstacle(pair).kind == ObstacleKind::plane; }
-  /// Puts obstacles where they are now; how far the farthest of them came [m].
+  /// Sets the present positions of obstacles; returns the greatest displacement [m].
   double place(std::span<const ObstaclePlace> places);
-  /// Ends of edges, or of an obstacle; of a piece of a curve its nodes, and nothing.
+  /// Ends of edges, or of an obstacle. For a piece of a curve, its nodes and no others.
   void end_points(const ContactPair& pair, const VectorX& q, Vec3d (&x)[4]) const;
-  /// Unknowns of a pair at q (obstacles' points where there are none).
+  /// Unknowns of a pair at q (points of an obstacle have none).
   void values(const ContactPair& pair, const VectorX& q, double (&x)[kContactUnknowns]) const;
   /// Distance of a piece of a curve from its obstacle, or from the obstacle's place before its `drift`.
   CurveDistance<double> piece_distance(const ContactPair& pair, const VectorX& q, const Vec3d& drift = {}) const;

@@ -1,5 +1,5 @@
 #pragma once
-/// Which boxes overlap, in a time that grows with their number and that of the pairs found.
+/// Overlapping boxes, in a time proportional to the number of boxes and of overlapping pairs.
 
 #include <vector>
 

@@ -23,7 +23,8 @@ double way_between(const std::vector<Obstacle>& from, const std::vector<Obstacle
   return std::sqrt(square);
 }
 
-/// Least distance of centrelines: a share of their distance at the start of a motion, or this, whichever is less.
+/// Least allowed distance of centrelines: `share` times their distance at the start of a motion, or `nearest`,
+/// whichever is less.
 struct Limit {
   double share, nearest;  ///< [-], [m]
 };
@@ -67,8 +68,8 @@ double allowed_of_piece(const Bodies& bodies, const ContactPair& pair, const Vec
   });
 }
 
-/// The same of straight lines, whose distance falls no faster than the ends move against each other. `change`: of q;
-/// nothing: rods stay. `shift`: of the obstacle.
+/// Allowed share for straight lines, whose distance falls no faster than their ends approach each other. `change` is
+/// the change of q; null: rods stay. `shift` is that of the obstacle.
 double allowed_of(const Bodies& bodies, const ContactPair& pair, const VectorX& q, const VectorX* change,
                   const Vec3d& shift, const Limit& limit) {
   if (pair.curve()) return allowed_of_piece(bodies, pair, q, change, shift, limit);
@@ -121,7 +122,7 @@ double Candidates::way_from_last(const VectorX& q, const Bodies& bodies) const {
   return farthest(model_, q - last_) + 2.0 * way_between(last_obstacles_, bodies.obstacles);
 }
 
-/// Has candidates for q, and what is known of how near they come there.
+/// Updates the candidates for q, and the bounds of their distances there.
 void Candidates::reach(const VectorX& q, const Bodies& bodies) {
   moved_ += way_from_last(q, bodies);
   if (outgrown(q, nullptr)) find_pairs(q, q);
@@ -138,12 +139,12 @@ void Candidates::reach(const VectorX& q, const Bodies& bodies) {
 void Candidates::set_bounds(double distance, std::size_t p) {
   const ContactPair& pair = pairs_[p];
   const auto above = [&](double least) { return moved_ + kRoundedDown * 0.5 * (distance - least); };
-  // The weights of closest_points make it greater than that of the points themselves.
+  // The weights of closest_points make this distance greater than that of the points themselves.
   const double weights = 0.25 * (pair.weight_a + pair.weight_b);
   bounds_[p] = {above(pair.reach()), above(std::sqrt(pair.nearest() * pair.nearest() + weights))};
 }
 
-/// True if some node has left, or would leave, what the candidates were found for.
+/// True if a node has left, or would leave, the margin of the candidates.
 bool Candidates::outgrown(const VectorX& q, const VectorX* change) const {
   if (surfaces_.edges().empty()) return false;
   if (reference_.size() != q.size()) return true;
@@ -201,7 +202,7 @@ void Candidates::find_pairs(const VectorX& from, const VectorX& to) {
   bounds_.assign(pairs_.size(), {});
 }
 
-/// Pairs with obstacles, and those of edges whose boxes overlap, sorted by key.
+/// Pairs with obstacles, and pairs of edges with overlapping boxes, sorted by key.
 void Candidates::add_near(const std::vector<BroadPhase::Pair>& found, std::vector<ContactPair>& pairs) const {
   const std::vector<ContactPair>& fixed = surfaces_.obstacle_pairs();
   pairs.assign(fixed.begin(), fixed.end());

@@ -16,7 +16,7 @@ namespace withe {
 struct CandidateSearch {
   BroadPhase broad_phase;
   std::vector<Box> boxes;
-  std::vector<ContactPair> pairs;  ///< obstacles' first, then those found, sorted by key
+  std::vector<ContactPair> pairs;  ///< pairs with obstacles first, then others, sorted by key
 };
 
 class Candidates {
@@ -54,19 +54,19 @@ class Candidates {
   /// True if surfaces that are apart at q, and were before it, have gone through each other in between, on a way that
   /// the candidates are known for. `shift`: of obstacles since then; empty: they rest.
   bool missed(const VectorX& before, const VectorX& q, const Bodies& bodies, const std::vector<Vec3d>& shift);
-  /// Pairs within reach and half of their radii at q, sorted by key, whatever the candidates are; and all obstacles'
-  /// pairs. Empty q: these alone.
+  /// Pairs within reach and half of their radii at q, sorted by key, independent of the candidates; and all pairs with
+  /// obstacles. With an empty q only the latter.
   std::vector<ContactKey> near(const VectorX& q, const Bodies& bodies) const;
   /// Coefficients of friction of the surfaces have changed.
   void renew_parameters() {
     for (ContactPair& pair : pairs_) surfaces_.set_parameters(pair);
   }
-  /// Without what was found before.
+  /// Discards the results of earlier searches.
   void forget();
 
  private:
   struct Bounds {
-    double clear = -1.0;  ///< it touches nothing while `moved_` stays below [m]
+    double clear = -1.0;  ///< the pair does not touch while `moved_` stays below this distance [m]
     double open = -1.0;   ///< nor do its centrelines come nearer than an iteration may bring them
   };
   void reach(const VectorX& q, const Bodies& bodies);
@@ -82,9 +82,9 @@ class Candidates {
   const Surfaces& surfaces_;
   BroadPhase broad_phase_;
   std::vector<Box> boxes_;
-  std::vector<ContactPair> pairs_;  ///< obstacles' first, then those of the broad phase, sorted by key
+  std::vector<ContactPair> pairs_;  ///< pairs with obstacles first, then those of the broad phase, sorted by key
   VectorX end_, back_;              ///< scratch: where a way leads, and the way to where one began
-  VectorX reference_;               ///< where the candidates belong
+  VectorX reference_;               ///< q for which the candidates were found
   VectorX low_, high_;              ///< bounds of the way there
   double margin_ = 0;
   std::vector<Bounds> bounds_;  ///< per pair

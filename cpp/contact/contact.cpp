@@ -12,7 +12,7 @@
 namespace withe {
 namespace {
 
-/// Puts a problem to the start of a step, with nothing known of what touches there.
+/// Sets a problem to the start of a step, before its touching pairs are known.
 void set_start(const State& state, double duration, ContactProblem& problem) {
   problem.start = &state;
   problem.duration = duration;
@@ -31,7 +31,7 @@ void set_start(const State& state, double duration, ContactProblem& problem) {
 /// Distance of a straight edge from an obstacle [m].
 double edge_distance(const Obstacle& o, const Vec3d& tail, const Vec3d& head) {
   if (o.kind == ObstacleKind::plane) return std::min(height_above(o, tail), height_above(o, head));
-  constexpr double kStrictlyConvex = 1e-12;  // of the edge's length squared: closest points of what is parallel
+  constexpr double kStrictlyConvex = 1e-12;  // share of the squared edge length: closest points of parallel edges
   const Vec3d way = head - tail;
   const double weight = kStrictlyConvex * dot(way, way);
   const Vec3d between = closest_points(tail, head, o.point, o.other, weight, weight).between;
@@ -63,7 +63,7 @@ ContactReport report_of(const ContactProblem& problem, const Touching& t) {
   }
   r.point = on_a - (pair.radius_a + 0.5 * r.gap) * r.normal;
   if (pair.curve()) {
-    // Total force on the nodes: beside what is round, the normals of the three distances part.
+    // Total force on the nodes: beside a round obstacle, the normals of the three distances diverge.
     const CurveSlopes slopes = curve_slopes(pair.piece, t.proximity.curve);
     Vec3d sum{};
     for (int i = 0; i < pair.piece.weights->nodes; ++i)
@@ -117,7 +117,7 @@ void Contact::take_given_stiffness(State& state, const Parameters& parameters) c
     if (!(given > 0.0)) continue;
     if (anchored()) record.friction = (given / record.stiffness) * record.friction;
     record.stiffness = given;
-    record.yielded = record.force = 0.0;  // what it presses with now no step has seen
+    record.yielded = record.force = 0.0;  // no step has computed its present force
   }
 }
 

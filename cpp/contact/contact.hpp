@@ -27,21 +27,21 @@ struct ContactReport {
   ContactKey key;
   double distance = 0;      ///< of the centrelines, or of a centreline and the obstacle [m]
   double gap = 0;           ///< of the surfaces [m]
-  double edge_gap = 0;      ///< of the surfaces, by the straight edge where a curve touches in its place [m]
+  double edge_gap = 0;      ///< of the surfaces, with the straight edge in place of the curve [m]
   double s = 0, t = 0;      ///< along the edges
   Vec3d point{}, normal{};  ///< between the surfaces; from b to a
   double force = 0;         ///< normal force [N]
-  Vec3d friction{};         ///< on a [N]
+  Vec3d friction{};         ///< friction force on body a [N]
   bool sticking = false;
 
-  /// Overlap of surfaces as they are drawn [m]. The curve of a rod swings out beside a corner of its edges, by up to an
-  /// eighth of the second difference of the nodes, and begins at rest there.
+  /// Drawn overlap of surfaces [m]. Beside a corner of the edges, the curve of a rod deviates from the edges by up to
+  /// an eighth of the second difference of the nodes, and begins at rest there.
   double drawn_depth() const { return -std::max(gap, edge_gap); }
 };
 
-/// Contact of a state that stays as it is, obstacles too: scratch of read-outs.
+/// Contact of a fixed state with fixed obstacles: scratch of read-outs.
 struct ContactAtRest {
-  ContactParameters own;  ///< where they are not those of the steps
+  ContactParameters own;  ///< parameters, if they differ from those of the steps
   ContactProblem problem;
   ContactSet set;
   CandidateSearch search;
@@ -70,27 +70,27 @@ class Contact {
 
   /// Takes over how surfaces press and rub, for read-outs before the next step.
   void set_parameters(const Parameters& parameters);
-  /// Gives contacts of a state, and those that begin, the stiffness that is given, where one is; and where none is any
-  /// more, those that begin the least one.
+  /// Sets the given stiffness of contacts of a state, and of new contacts. If no stiffness is given any more, new
+  /// contacts get the least one.
   void take_given_stiffness(State& state, const Parameters& parameters) const;
   /// A step begins at `state`, which must outlive it. `duration`: the time in which slip happens [s]. `target`:
   /// obstacles at the end of the step, which must outlive it; empty: they rest.
   void begin(const State& state, const Parameters& parameters, double duration, Pressing pressing,
              std::span<const ObstaclePlace> target = {});
-  /// Finds what touches at q1.
+  /// Finds the contacts at q1.
   void update(const VectorX& q1);
   const ContactProblem& problem() const { return problem_; }
   const ContactSet& contacts() const { return set_; }
   int count() const { return set_.count(); }
   const ContactKey& key(int i) const { return set_[i].pair.key; }
-  /// Unknowns of contact i, -1 where there is none.
+  /// Unknowns of contact i, -1 for missing ones.
   void unknowns(int i, int (&dofs)[kContactUnknowns]) const { surfaces_.unknowns(set_[i].pair, dofs); }
-  /// Minus its forces, and their derivative when asked for.
+  /// Minus the forces of a contact, and optionally their derivative.
   void local(int i, bool with_hessian, ContactLocal& out, const ContactLinearisation& linearisation = {}) const;
   /// The same of a piece beside a plane, by its nodes' coordinates alone; false where contact i is none.
   bool plane_local(int i, bool with_hessian, PlaneLocal& out, const ContactLinearisation& linearisation) const;
   void plane_unknowns(int i, int (&dofs)[kPlaneUnknowns]) const { surfaces_.plane_unknowns(set_[i].pair, dofs); }
-  /// rows^T times its derivatives by what the step is given; see contact_adjoint.hpp.
+  /// rows^T times the derivatives by the inputs of a step; see contact_adjoint.hpp.
   ContactAdjoint adjoint(int i, const double (&rows)[kContactUnknowns], double by_approach) const {
     return contact_adjoint(problem_, set_[i], rows, by_approach);
   }
@@ -104,12 +104,12 @@ class Contact {
   double mean_friction_loss(const VectorX& change, const VectorX& start, const VectorX& end) const;
   void friction_force(VectorX& out) const;
   double obstacle_work() const;
-  /// True if what touches has kept, in an accepted state, the stiffness that it was given; not, where none was.
+  /// True if all contacts of an accepted state kept their given stiffness; false if none was given.
   bool has_given_stiffness(const State& state) const;
   /// True if surfaces are deeper in each other than a step may end with.
   bool too_deep() const { return set_.depth() > deepest_; }
   void allow_depth(double deepest) { deepest_ = deepest; }
-  /// True if a step of dt would be too long for what an impact loses by its restitution.
+  /// True if a step of dt is too long for the loss of an impact by restitution.
   bool unresolved(double dt) const;
   /// True if the step from q0, now at its end, is too long to see that surfaces met.
   bool missed(const VectorX& q0) { return candidates_.missed(q0, set_.q(), problem_.bodies, problem_.shift); }
@@ -125,22 +125,22 @@ class Contact {
   /// Which connected components touch anything, and how fast obstacles go that they touch.
   struct TouchingComponents {
     std::vector<bool> which;
-    std::vector<Vec3d> obstacles;  ///< velocities in the step of those that are touched, which all differ [m/s]
+    std::vector<Vec3d> obstacles;  ///< different velocities of touched obstacles in the step [m/s]
   };
   TouchingComponents touching_components() const;
-  /// Takes from a predicted change of q what would move surfaces that stick: friction is steep there, and from outside
-  /// Newton's method would fall past it.
+  /// Removes the part of a predicted change of q that would move sticking surfaces: friction is steep there, and from
+  /// outside Newton's method would step past it.
   void hold_sticking(const State& state, VectorX& change) const;
 
-  /// Keeps in `state`, still where the step began, what contacts at q1 must remember: see `ContactStiffness::accept`.
+  /// Stores the records of contacts at q1 in `state`, which is still that of the start: see `ContactStiffness::accept`.
   double accept(State& state, double spare);
   /// The same in an equilibrium, or on the way to one.
   void accept_at_rest(State& state, bool arrived, double deepest = kMaxDepth);
-  /// The greatest of the stiffnesses that forces want of contacts, over what they have; no less than 1.
+  /// Greatest ratio of required to present stiffness of any contact; at least 1.
   double wanted_ratio() const { return ContactStiffness(problem_).wanted_ratio(set_); }
-  /// True if what was accepted last there presses as it did, but for rounding.
+  /// True if the contacts that were accepted last press as before, up to rounding.
   bool presses_alike() const { return scratch_.change <= 1e-9 * scratch_.pressing; }
-  /// The same for a step so short that stiffness stays as it is.
+  /// Stores records for a step so short that the stiffness does not change.
   void remember(State& state);
   /// Makes contacts of bodies that are too deep in each other stiffer; returns the energy put in [J].
   double stiffen(State& state, bool at_rest);
@@ -149,7 +149,7 @@ class Contact {
   /// Contacts of a state at rest, for read-outs; and their energy.
   std::vector<ContactReport> report(const State& state, const Parameters& parameters) const;
   double energy_of(const State& state, const Parameters& parameters, ContactAtRest& rest) const;
-  /// The next step finds everything anew.
+  /// Makes the next step search all contacts again.
   void forget();
 
  private:
@@ -167,9 +167,9 @@ class Contact {
   ContactParameters parameters_;
   ContactProblem problem_;
   Candidates candidates_;
-  ContactSet set_, deep_;  ///< what touches; what did when it was found to be too deep
+  ContactSet set_, deep_;  ///< present contacts; contacts when the overlap was found too deep
   StiffnessScratch scratch_;
-  bool current_ = false;  ///< set_ is what touches in this step
+  bool current_ = false;  ///< true if set_ has the contacts of this step
   std::span<const ObstaclePlace> target_;
   bool blocked_ = false;
   double deepest_ = kMaxDepth;

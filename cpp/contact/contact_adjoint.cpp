@@ -129,7 +129,7 @@ void add_lagged_friction(const ContactProblem& problem, const Touching& t, const
   const SlipStart<ByStart> start = start_of(f);
   SlippingSurfaces<ByStart> c;
   Vec3<ByStart> x[4];
-  // The obstacle stands at its end: rods are from there what they were from where it was.
+  // The obstacle has its position at the end: rods have the same relative position as before its motion.
   const Vec3<ByStart> shift = lifted(problem.shift_of(t.pair));
   for (int i = 0; i < 4; ++i) x[i] = t.pair.curve() || i < 2 ? start.point(i) + shift : start.point(i);
   for (int b = 0; b < 2; ++b) c.sides[b].edge = x[tail_of(t.pair, b) + 1] - x[tail_of(t.pair, b)];
@@ -217,7 +217,7 @@ double times_forces(const ContactProblem& problem, const Touching& t, const Rows
   return sum;
 }
 
-/// By what decides how much of an impact is elastic: pressing and friction are proportional to the force.
+/// Derivatives by the inputs of the elastic share of an impact: pressing and friction are proportional to the force.
 void add_impact(const ContactProblem& problem, const Touching& t, const Rows& rows, double by_approach,
                 ContactAdjoint& out) {
   if (!(t.approach > 0.0)) return;

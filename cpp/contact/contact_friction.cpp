@@ -42,7 +42,7 @@ double slip_rate(const ContactProblem& problem, double regularisation) {
   return 7.5 / (regularisation * problem.parameters->slip_tolerance * problem.duration);
 }
 
-/// Lagged friction is that of contacts of the start, and holds no rolling rod.
+/// Lagged friction acts on contacts of the start, and does not resist rolling.
 bool has_friction(const ContactProblem& problem, const Touching& t, FrictionKind kind) {
   if (kind == FrictionKind::rolling && problem.lags()) return false;
   return coefficient(t.pair, kind) > 0.0 && (t.lagged >= 0) == problem.lags();
@@ -168,7 +168,7 @@ double kept_anchor_energy(const ContactProblem& problem, const Touching& t) {
   return rolled + 0.5 * dot(c.friction.force, t.stick);
 }
 
-/// Friction's forces on the obstacle, the opposite of those on a, times the ways of the surface.
+/// Work of friction on the obstacle: the opposite of the force on a, times the displacement of the surface.
 double turning_work(const ContactProblem& problem, const Touching& t) {
   const Vec3d turn = problem.turn_of(t.pair);
   if (!t.pair.rubs() || dot(turn, turn) == 0.0) return 0.0;

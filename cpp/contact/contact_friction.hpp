@@ -9,23 +9,23 @@ namespace withe {
 
 /// True if friction grows with slip, so that its slip tolerance can be made greater for a while.
 bool regularises_friction(const Model& model);
-/// K / (2 dt), over what makes the slip tolerance greater [1/m].
+/// K / (2 dt), over the factor of the slip tolerance [1/m].
 double slip_rate(const ContactProblem& problem, double regularisation);
 /// True if there is friction on a contact in a step, of a kind or at all.
 bool has_friction(const ContactProblem& problem, const Touching& t, FrictionKind kind);
 bool rubs(const ContactProblem& problem, const Touching& t);
 /// Stiffness of an anchor, for a contact of that stiffness [N/m].
 double anchor_stiffness(const ContactPair& pair, FrictionKind kind, double stiffness);
-/// Friction setting of a contact that presses, or of a lagged one as it was at the start. `regularisation`,
-/// `predicted`: see `ContactLinearisation`; what it refers to must outlive it.
+/// Friction setting of a pressing contact, or of a lagged one in its state at the start. `regularisation`, `predicted`:
+/// see `ContactLinearisation`; their references must outlive the setting.
 FrictionSetting friction_setting(const ContactProblem& problem, const Touching& t, FrictionKind kind,
                                  double regularisation, const Vec3d* predicted);
 /// Friction by the slip, at most [N/m].
 double friction_slope(const ContactProblem& problem, const Touching& t, const ContactLinearisation& linearisation);
-/// Adds minus the friction on a contact, and its derivative when asked for. False where there is none.
+/// Adds minus the friction on a contact, and optionally its derivative. Returns false without friction.
 bool add_friction(const ContactProblem& problem, const Touching& t, const ContactLinearisation& linearisation,
                   bool with_hessian, ContactLocal& out);
-/// Work of anchors' forces over the change of their elastic slip; `mean`: of the mean of those at both ends [J].
+/// Work of anchors over the change of their elastic slip; with `mean`, of the mean force of both ends [J].
 double anchor_work(const ContactProblem& problem, const Touching& t, bool mean);
 /// Energy of an anchor at the end of a step, zero if the contact opens [J].
 double anchor_energy(const ContactProblem& problem, const Touching& t);
@@ -39,7 +39,7 @@ void record_friction(const ContactProblem& problem, const Touching& t, ContactRe
 /// The same of a lagged one.
 void record_lagged_friction(const ContactProblem& problem, const Touching& t, ContactRecord& record);
 
-/// A contact's slip, what a change of the unknowns adds to it, and the friction on it.
+/// A contact's slip, its change by a change of the unknowns, and the friction on it.
 struct Slipping {
   Vec3d slip{}, change{};
   ForceLaw law;
@@ -47,10 +47,10 @@ struct Slipping {
 };
 Slipping slipping(const ContactProblem& problem, const Touching& t, FrictionKind kind,
                   const ContactLinearisation& linearisation, const VectorX& change);
-/// True if all surfaces slip so little by `change` that a tangent says enough.
+/// True if `change` makes all surfaces slip so little that the tangent is accurate.
 bool slips_shortly(const ContactProblem& problem, const ContactLinearisation& linearisation, const VectorX& change);
 
-/// Friction with J of the start, where frames have not turned yet, of what touches there.
+/// Friction with J of the start, where frames have not turned yet, for contacts at the start.
 LaggedFriction lag_friction(const ContactProblem& problem, const Touching& t);
 
 }  // namespace withe

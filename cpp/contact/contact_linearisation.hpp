@@ -1,6 +1,6 @@
 #pragma once
-/// Linearisation of contact for Newton's method: a continuation in the slip tolerance, what its derivatives leave out,
-/// and the friction that its last step has predicted.
+/// Linearisation of contact for Newton's method: a continuation in the slip tolerance, omitted derivatives, and the
+/// friction that the last step predicted.
 
 #include <algorithm>
 #include <utility>
@@ -15,7 +15,7 @@ namespace withe {
 /// linearisation, see `ForceLaw`.
 class FrictionPrediction {
  public:
-  /// Nothing where there has been no step; what touches since then has none.
+  /// Null if there was no step; contacts that began since then have none.
   const Vec3d* of(const ContactKey& key, OrderedLookup& lookup) const {
     static constexpr Vec3d kNone{};
     if (!known_) return nullptr;
@@ -27,7 +27,7 @@ class FrictionPrediction {
     return of(key, lookup);
   }
   void clear() { known_ = false; }
-  /// Takes what make(add) gives by calls of add(key, share); until it is done the last prediction can be asked for.
+  /// Stores the results of make(add), which calls add(key, share). The previous prediction is available until then.
   template <class Make>
   void renew(const Make& make) {
     next_.clear();
@@ -48,10 +48,10 @@ enum class FrictionKind { slipping, rolling };
 inline constexpr FrictionKind kFrictionKinds[] = {FrictionKind::slipping, FrictionKind::rolling};
 
 struct ContactLinearisation {
-  double regularisation = 1;  ///< by which the slip tolerance is greater
+  double regularisation = 1;  ///< factor of the slip tolerance
   bool geometric = true;      ///< derivatives have how pressing turns, the part by which it has negative stiffness
-  FrictionPrediction friction{}, rolling{};  ///< where known, derivatives are what Newton's steps need, not those of
-                                             ///< the forces
+  FrictionPrediction friction{}, rolling{};  ///< if known, derivatives are those of Newton's steps, not those of the
+                                             ///< forces
 
   const FrictionPrediction& predicted(FrictionKind kind) const {
     return kind == FrictionKind::rolling ? rolling : friction;

@@ -6,7 +6,7 @@
 namespace withe {
 namespace {
 
-// The force with which a rod resists what bends it, EI / L^2, where its length L is so many radii.
+// Bending force of a rod, EI / L^2, for a length L of this number of radii.
 constexpr double kSlender = 100.0;
 
 bool by_bodies(const BodyOffset& a, const BodyOffset& b) { return a.rod != b.rod ? a.rod < b.rod : a.other < b.other; }

@@ -9,9 +9,9 @@
 
 namespace withe {
 
-/// Law of the pressing force in a step (see pressing_law.hpp). `still`: for statics and explicit steps, which know
-/// nothing of impacts. `end`: the force at the end of the step. `mean`: the force of the whole step, for surfaces that
-/// have just met. `mean_direction`: as `mean`, and along the mean direction too, so that sliding gains no energy.
+/// Law of the pressing force in a step (see pressing_law.hpp). `still`: for statics and explicit steps, without
+/// impacts. `end`: the force at the end of the step. `mean`: the force of the whole step, for surfaces that have just
+/// met. `mean_direction`: as `mean`, and along the mean direction too, so that sliding gains no energy.
 enum class Pressing { still, end, mean, mean_direction };
 
 /// Gradient and Hessian of one contact in its own unknowns.
@@ -35,7 +35,7 @@ struct Touching {
   double stiffness = 0, yielded = 0;
   double approach = 0, age = 0;  ///< see ContactRecord
   double before = 0;             ///< distance at the start of the step, where `law` needs it [m]
-  double turn = 0;  ///< of an impact that begins: between directions to each other at both ends of the step [rad]
+  double turn = 0;               ///< for a new impact: angle between its directions at both ends of the step [rad]
   PressingLaw law;
   PressingForce pressing;
   Vec3d stick{}, roll{};  ///< elastic slips, see ContactRecord
@@ -56,8 +56,8 @@ struct LaggedFriction {
   double slip[3][kContactUnknowns];
   double pressing = 0;  ///< times how far from sticking the contact starts, if semi-explicit [N]
   Vec3d direction{};
-  Vec3d drift{};   ///< what an obstacle moves along the surface [m]
-  Vec3d turned{};  ///< of that, what it does by turning [m]
+  Vec3d drift{};   ///< motion of an obstacle along the surface [m]
+  Vec3d turned{};  ///< part of it by rotation [m]
 
   Vec3d column(int i) const { return {slip[0][i], slip[1][i], slip[2][i]}; }
 };
@@ -78,7 +78,7 @@ struct ContactParameters {
   double gravity = 0;         ///< [m/s^2]
   double slip_tolerance = 0;  ///< nu [m/s]
   VectorX edge_mass;          ///< [kg]
-  VectorX least_stiffness;    ///< per rod, that of no contact of which is less [N/m]
+  VectorX least_stiffness;    ///< lower bound of the stiffness of contacts, per rod [N/m]
   VectorX firm_stiffness;     ///< per rod, from which on the distance tolerance is whole [N/m]
 };
 
@@ -88,19 +88,19 @@ struct ContactProblem {
   const State* start = nullptr;
   Pressing pressing = Pressing::still;
   double duration = 0;                 ///< the time in which slip happens [s]
-  Bodies bodies;                       ///< with obstacles where they are at the end
-  std::vector<Vec3d> shift;            ///< of each obstacle in the step [m]; empty: none moves
-  std::vector<Vec3d> turn;             ///< of each obstacle in the step [rad]; empty: none turns
-  std::vector<Vec3d> velocity;         ///< of each obstacle, as its points move in the step [m/s]; empty: none moves
-  bool starting = false;               ///< what touches as the step begins is about to be found
+  Bodies bodies;                       ///< with obstacles in their positions at the end
+  std::vector<Vec3d> shift;            ///< displacement of each obstacle in the step [m]; empty: none moves
+  std::vector<Vec3d> turn;             ///< rotation of each obstacle in the step [rad]; empty: none turns
+  std::vector<Vec3d> velocity;         ///< velocity of each obstacle's points in the step [m/s]; empty: none moves
+  bool starting = false;               ///< true while the contacts at the start of the step are searched
   std::vector<BodyOffset> offsets;     ///< of bodies that have any
-  std::vector<ContactRecord> renewed;  ///< of contacts that begin with the scene, or whose surfaces near each other
-                                       ///< anew in the step; sorted
-  std::vector<ContactKey> unrecorded;  ///< what touches at the start and has no record
-  std::vector<Touching> leaving;       ///< what gives back in the step what it took, wherever it ends
+  std::vector<ContactRecord> renewed;  ///< records of contacts that begin with the scene, or whose surfaces approach
+                                       ///< again in the step; sorted
+  std::vector<ContactKey> unrecorded;  ///< contacts at the start without a record
+  std::vector<Touching> leaving;       ///< contacts that return their energy in the step, for any end of it
   std::vector<Touching> lagged;        ///< contacts of the start, for their friction alone
   std::vector<LaggedFriction> lagged_friction;
-  double start_energy = 0, start_pressing = 0;  ///< of contact and anchors, and of pressing alone [J]
+  double start_energy = 0, start_pressing = 0;  ///< energy of contact and anchors, and of pressing alone [J]
 
   const Model& model() const { return *bodies.model; }
   const ContactDescription& description() const { return model().description.contact; }
@@ -121,7 +121,7 @@ struct ContactProblem {
   Vec3d turn_of(const ContactPair& pair) const { return of_obstacle(pair, turn); }
   /// Known before anything is found, unlike the way.
   Vec3d velocity_of(const ContactPair& pair) const { return of_obstacle(pair, velocity); }
-  /// Record of a contact as the step begins, or nothing.
+  /// Record of a contact as the step begins, or null.
   const ContactRecord* record_of(const ContactKey& key, OrderedLookup& lookup) const {
     const ContactRecord* found = renewed.empty() ? nullptr : find_record(renewed, key);
     return found ? found : find_record(start->contacts, key, lookup);
@@ -130,11 +130,11 @@ struct ContactProblem {
     OrderedLookup lookup;
     return record_of(key, lookup);
   }
-  /// Depth in which a contact begins to press: that of its bodies, the mean by force, so that what takes over from what
-  /// rests is neither lower nor higher [m].
+  /// Initial yielded depth of a new contact: the mean depth of its bodies' contacts, weighted by force. A contact that
+  /// takes over from a resting one is then neither lower nor higher [m].
   double offset(const ContactPair& pair) const;
   void find_offsets();
-  /// True if surfaces at that distance, of which so much presses no more, are near enough to press.
+  /// True if surfaces at that distance, with this yielded depth, are near enough to press.
   bool touch(const ContactPair& pair, double distance, double yielded) const {
     return distance + (offsets.empty() ? 0.0 : std::min(yielded, offset(pair))) < pair.reach();
   }
@@ -147,11 +147,10 @@ struct ContactProblem {
     const VectorX& of_rod = parameters->firm_stiffness;
     return pair.rod_b < 0 ? of_rod(pair.rod_a) : std::max(of_rod(pair.rod_a), of_rod(pair.rod_b));
   }
-  /// Stiffness of a whole node by which surfaces bear a force, or store an energy, in the depth that goes with it
-  /// [N/m].
+  /// Stiffness of a whole node at which surfaces carry a force, or store an energy, at the corresponding depth [N/m].
   double stiffness_to_bear(const ContactPair& pair, double force) const;
   double stiffness_to_store(const ContactPair& pair, double energy) const;
-  /// Stiffness that bears so many times the force that another one bears, of a pair or rod with that firm stiffness.
+  /// Stiffness that carries a multiple of the force of another stiffness, for a pair or rod with that firm stiffness.
   double stiffness_to_bear_more(double firm, double stiffness, double times) const;
   /// The distance tolerance of a contact so stiff, of a whole node [m].
   double tolerance(const ContactPair& pair, double stiffness) const;
@@ -170,7 +169,7 @@ struct ContactProblem {
   CurveDistance<double> curve_at_start(const ContactPair& pair) const {
     return bodies.piece_distance(pair, start->q, shift_of(pair));
   }
-  /// The closest points as the step begins, and end points then, those of an obstacle where they were.
+  /// The closest points as the step begins, and the end points then, with the initial position of an obstacle.
   ClosestPoints closest_at_start(const ContactPair& pair, Vec3d (&x)[4]) const;
 
  private:

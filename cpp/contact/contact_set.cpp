@@ -12,7 +12,7 @@
 namespace withe {
 namespace {
 
-/// Sets what is remembered of a contact, its energy and how it presses.
+/// Sets the stored data of a contact, its energy and its pressing law.
 void set_from(const ContactProblem& problem, const ContactRecord* record, Touching& t) {
   t.stiffness = t.pair.share * (record ? record->stiffness : first_stiffness(problem, t.pair));
   t.yielded = record ? record->yielded : problem.offset(t.pair);
@@ -45,8 +45,8 @@ void ContactSet::renew(const ContactProblem& problem, int i, const ContactRecord
   set_from(problem, &record, touching_[static_cast<std::size_t>(i)]);
 }
 
-/// Adds what touches at the start of the step only, and gives back there what it took; `first`: behind what is there
-/// for friction alone.
+/// Adds contacts that touch at the start of the step only, and return their energy there. `first` is the index after
+/// the contacts that exist for friction alone.
 void ContactSet::add_leaving(const ContactProblem& problem, std::size_t first) {
   const std::size_t count = touching_.size();
   OrderedLookup records;

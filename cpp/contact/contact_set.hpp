@@ -9,8 +9,8 @@ namespace withe {
 
 class ContactSet {
  public:
-  /// Finds what touches at q: what has lagged friction first, then what presses, in the order of candidates, then what
-  /// only gives back what it took. `within_reach(add)` calls add(pair, proximity) for all that is near, in that order.
+  /// Finds the contacts at q: first those with lagged friction, then those that press, in the order of candidates, then
+  /// those that only return their energy. `within_reach(add)` calls add(pair, proximity) for all near pairs, in order.
   template <class WithinReach>
   void find(const ContactProblem& problem, const VectorX& q, const WithinReach& within_reach) {
     q_ = q;
@@ -32,12 +32,12 @@ class ContactSet {
   const Touching& operator[](int i) const { return touching_[static_cast<std::size_t>(i)]; }
   std::vector<Touching>::const_iterator begin() const { return touching_.begin(); }
   std::vector<Touching>::const_iterator end() const { return touching_.end(); }
-  /// That of a pair that presses, or nothing.
+  /// The contact of a pressing pair, or null.
   const Touching* pressing(const ContactKey& key) const;
-  /// Gives a contact what a record that has changed says.
+  /// Updates a contact from its changed record.
   void renew(const ContactProblem& problem, int i, const ContactRecord& record);
 
-  /// Energy of pressing, and with that of anchors, at the end of a step and at the start of the next [J].
+  /// Energy of pressing, and with that of anchors, at the end of a step and at the start of the next one [J].
   double pressing_energy() const;
   double energy(const ContactProblem& problem) const;
   double kept_energy(const ContactProblem& problem) const;
@@ -53,7 +53,7 @@ class ContactSet {
   std::vector<Touching> touching_;
 };
 
-/// Minus the forces of a contact, and their derivative when asked for.
+/// Minus the forces of a contact, and optionally their derivative.
 void contact_local(const ContactProblem& problem, const Touching& t, const ContactLinearisation& linearisation,
                    bool with_hessian, ContactLocal& out);
 

@@ -14,17 +14,17 @@ namespace {
 
 bool by_key(const ContactRecord& a, const ContactRecord& b) { return a.key < b.key; }
 
-// Stiffness over the one that a force requires, which a contact gets when the force outgrows it: the next increases of
-// up to a quarter change nothing.
+// Ratio of the new stiffness of a contact to the required one, when the force outgrows the stiffness. Later increases
+// of the force by up to a quarter then change nothing.
 constexpr double kStiffnessMargin = 1.25;
-// Force that a stiffness bears, over the present one, from which on the stiffness decreases.
+// Ratio of the force that a stiffness can carry to the present force, above which the stiffness decreases.
 constexpr double kMaxForceMargin = 32.0;
 // Share of the yielded depth beyond kDepth that presses again after a step, where surfaces rest.
 constexpr double kFadingPerStep = 0.1;
 // Speed of resting surfaces that part, over `rest_speed`.
 constexpr double kMaxFadingSpeed = 0.1;
-// Force of surfaces that a scene draws near each other, beside what their edges weigh, over the force that their
-// contact is stiff for.
+// Force of surfaces that a scene draws near each other, besides the weight of their edges, over the force for which the
+// contact is stiff.
 constexpr double kMaxDrawnForce = 1e-6;
 
 /// A new contact starts with the stiffness that the greatest force of its rods has needed. When one contact takes over
@@ -48,8 +48,9 @@ double worn(const ContactProblem& problem, const Touching& t) {
   return std::clamp(t.pair.reach() - t.proximity.distance, least, t.yielded);
 }
 
-/// And fades where it is deep and surfaces rest, which takes work: until they part, and so that they press about half
-/// as hard again after a step at most. Otherwise what friction takes would throw them off.
+/// The yielded depth also decays while surfaces rest, which takes work from other dissipation. It decays until surfaces
+/// part, and slowly: they press at most about half as hard again after a step. Otherwise dissipated friction energy
+/// would throw them off.
 double faded(const ContactProblem& problem, const Touching& t) {
   const double beyond = t.yielded - kDepth * t.pair.small_radius(), left = worn(problem, t);
   if (!(beyond > 0.0 && t.energy.second > 0.0)) return left;
@@ -88,19 +89,19 @@ class SharedWeight {
   std::ptrdiff_t contacts_ = 0;
 };
 
-/// Stiffness of a whole node that a contact's force asks for [N/m].
+/// Stiffness of a whole node that a contact's force requires [N/m].
 double wanted_stiffness(const ContactProblem& problem, const Touching& t) {
   return problem.stiffness_to_bear(t.pair, -t.energy.first / t.pair.share);
 }
 
-/// Law of a contact that is so many times as stiff, and has yielded by so much.
+/// Law of a contact with a multiplied stiffness and a yielded depth.
 PressingLaw law_at(const ContactProblem& problem, const Touching& t, double ratio, double yielded) {
   const double stiffness = ratio * t.stiffness;
   return {t.law.law, t.pair.radii(), problem.tolerance(t.pair, stiffness / t.pair.share), stiffness, yielded};
 }
 
-/// Distance of centrelines, with what has yielded, at which the force, or energy, of a contact that is so many times
-/// as stiff is what is `wanted` for unit stiffness, or less by rounding.
+/// Distance of centrelines, with the yielded depth, at which the force, or energy, of a contact with a multiplied
+/// stiffness equals `wanted` for unit stiffness, or is less by rounding.
 double distance_at(const ContactProblem& problem, const Touching& t, double ratio, bool force, double wanted) {
   const PressingLaw law = law_at(problem, t, ratio, 0.0);
   double low = t.proximity.distance + t.yielded, high = t.pair.reach();
@@ -112,7 +113,7 @@ double distance_at(const ContactProblem& problem, const Touching& t, double rati
   return high;
 }
 
-/// With which a contact presses where it stands, so many times as stiff, with a depth that presses no more [N].
+/// Force of a contact at its present distance, with a multiplied stiffness and a yielded depth [N].
 double force_at(const ContactProblem& problem, const Touching& t, double ratio, double yielded) {
   return -ratio * t.stiffness * law_at(problem, t, ratio, yielded).energy(t.proximity.distance).first;
 }
@@ -170,8 +171,8 @@ double first_stiffness(const ContactProblem& problem, const ContactPair& pair) {
   return std::max(start, impact_stiffness(problem, pair));
 }
 
-/// The depth that must press no more for a contact that becomes stiffer to store no more than before, and, but for in
-/// an impact, to press no harder.
+/// Yielded depth for which a stiffened contact stores no more energy than before and, except in an impact, presses no
+/// harder.
 double ContactStiffness::yielded_at(const Touching& t, double ratio) const {
   const double stiffness = t.stiffness * ratio;
   double distance = distance_at(problem_, t, ratio, false, t.energy.value / stiffness);
@@ -201,8 +202,8 @@ double ContactStiffness::wanted_ratio(const Touching& t, const ContactRecord& re
   if (problem_.fixed(t.pair)) return 1.0;
   const double wanted = wanted_stiffness(problem_, t);
   if (wanted > record.stiffness) return kStiffnessMargin * wanted / record.stiffness;
-  if (record.approach > 0.0) return 1.0;  // as stiff as the impact that has only begun will want it
-  // A contact that is about to open wants next to nothing, and more when it presses again.
+  if (record.approach > 0.0) return 1.0;  // a new impact has its required stiffness
+  // A contact that is about to open needs almost no stiffness, and more when it presses again.
   const double common = std::max(wanted, start_stiffness(problem_, t.pair, problem_.start->contact_stiffness));
   const auto bears = [&](double times) {
     return problem_.stiffness_to_bear_more(problem_.firm_stiffness(t.pair), common, times);
@@ -210,8 +211,8 @@ double ContactStiffness::wanted_ratio(const Touching& t, const ContactRecord& re
   return bears(kMaxForceMargin) < record.stiffness ? bears(2.0) / record.stiffness : 1.0;
 }
 
-/// The greatest force that contact has to hold at a node, times 1e5 / m [Choi, dissertation, (5.16), (5.17)]: what all
-/// other forces there add up to, inertia among them, is what contact and friction are. 0 under another rule.
+/// The greatest force that contact must carry at a node, times 1e5 / m [Choi, dissertation, (5.16), (5.17)]. Contact
+/// and friction balance the sum of all other forces there, inertia included. 0 under another rule.
 double ContactStiffness::source_stiffness(const ContactSet& set, VectorX& force) const {
   constexpr double kSource = 1e5;  // [1/m]
   if (problem_.description().stiffness_rule != StiffnessRule::source) return 0.0;
@@ -241,7 +242,7 @@ bool ContactStiffness::presses(const Touching& t) const {
   return t.lagged < 0 && problem_.touch(t.pair, t.proximity.distance, t.yielded);
 }
 
-/// Sorts records, and adds what lagged friction did.
+/// Sorts records, and adds the results of lagged friction.
 void ContactStiffness::finish(const ContactSet& set, std::vector<ContactRecord>& records) const {
   std::sort(records.begin(), records.end(), by_key);
   for (const Touching& t : set) {
@@ -414,8 +415,8 @@ void ContactStiffness::renew(ContactSet& start, std::vector<ContactRecord>& reco
   std::sort(records.begin(), records.end(), by_key);
 }
 
-/// Nothing presses surfaces that a scene begins with onto each other but what holds them up, whatever their contact is
-/// stiff for: what is beyond that presses no more. Where the stiffness is given, its law holds as it stands.
+/// At the start, drawn surfaces press on each other with their weight only, for any stiffness of their contact: the
+/// depth beyond has yielded. A given stiffness keeps its law.
 bool ContactStiffness::begins_at_rest(const Touching& t, ContactRecord& record) const {
   if (problem_.fixed(t.pair)) return false;
   const double most = record.force + kMaxDrawnForce * 2.0 * kDepth * t.pair.small_radius() * t.stiffness;

@@ -15,11 +15,11 @@ double friction_loss(const ContactProblem& problem, const ContactSet& set, const
 /// `friction_force` there.
 double mean_friction_loss(const ContactProblem& problem, const ContactSet& set, const VectorX& change,
                           const VectorX& start, const VectorX& end);
-/// Minus the generalised forces of friction; empty where nothing has any.
+/// Minus the generalised forces of friction; empty without friction.
 void friction_force(const ContactProblem& problem, const ContactSet& set, VectorX& out);
-/// Minus those of all contact.
+/// Minus the generalised forces of all contact.
 void contact_force(const ContactProblem& problem, const ContactSet& set, VectorX& out);
-/// Work of moving obstacles on rods and on what contact stores [J].
+/// Work of moving obstacles on rods and on the stored contact energy [J].
 double obstacle_work(const ContactProblem& problem, const ContactSet& set);
 
 }  // namespace withe

@@ -31,7 +31,7 @@ namespace withe {
 struct CurveWeights {
   int nodes, edges;
   double middle[3], slope[3], bend[3];
-  double share[2], share_slope[2];  ///< of each edge's rotation in that at s
+  double share[2], share_slope[2];  ///< shares of each edge's rotation at s
   double low;
   double value_by[3], slope_by[3];  ///< g0 and g1 of the three distances; g2 is 4 (1, -2, 1) of them
 
@@ -94,9 +94,9 @@ inline constexpr CurveWeights kCurveLast{.nodes = 2,
                                          .value_by = {0.0, 1.0, 0.0},
                                          .slope_by = {}};
 
-/// One piece; its second node and edge are those that follow along the rod.
+/// One piece; its second node and edge are the next ones along the rod.
 struct CurvePiece {
-  const CurveWeights* weights = nullptr;  ///< nothing: a straight edge in place of a curve
+  const CurveWeights* weights = nullptr;  ///< null: a straight edge in place of a curve
   int node[3] = {-1, -1, -1}, edge[2] = {-1, -1};
   double least_bend = 0;  ///< a
 };
@@ -146,8 +146,8 @@ void set_distance(const CurvePiece& piece, const Scalar& value, CurveDistance<Sc
   d.distance = value + d.s * (d.slope + 0.5 * d.stiff * d.s);
 }
 
-/// Distance of a piece from a plane above which its nodes are by `height`, nothing if there is none: distances are
-/// linear in these.
+/// Distance of a piece from a plane; `height` has the heights of its nodes above the plane, or is null. Distances are
+/// linear in the heights.
 template <class Scalar>
 CurveDistance<Scalar> plane_distance(const CurvePiece& piece, const Obstacle& o, const Scalar (&height)[3]) {
   const CurveWeights& w = *piece.weights;

@@ -42,23 +42,23 @@ struct FrictionSetting {
   const ContactPair* pair = nullptr;
   const Obstacle* obstacle = nullptr;
   double friction = 0;                           ///< the greatest coefficient [-]
-  bool rolling = false;                          ///< whether it is rolling friction
+  bool rolling = false;                          ///< true for rolling friction
   ClosestPoints points;                          ///< whose class is kept
-  const CurveDistance<double>* curve = nullptr;  ///< at the unknowns themselves, not at others
+  const CurveDistance<double>* curve = nullptr;  ///< valid at the present unknowns only
   double start[kContactUnknowns] = {};           ///< unknowns at the start of the step
   Vec3d source[2];                               ///< tangents that the frames of a and b are transported from
   PressingLaw pressing;
   double before = 0;          ///< distance at the start [m]
-  bool middle = false;        ///< edges turn, on their arms, as they stand in the middle of the step
+  bool middle = false;        ///< true if edges turn, on their arms, in their mid-step positions
   bool finite_turns = false;  ///< edges spin as in energy-momentum steps
   FrictionLaw law = FrictionLaw::implicit;
-  double tangential_stiffness = 0;  ///< of an anchor [N/m]
+  double tangential_stiffness = 0;  ///< stiffness of an anchor [N/m]
   double rate = 0;                  ///< K / (2 dt) [1/m]
   Vec3d drift{};                    ///< way of an obstacle in the step [m]
-  Vec3d turn{};                     ///< by which it turns then about its own axis [rad]
-  Vec3d stick{};                    ///< at the start of the step [m]
+  Vec3d turn{};                     ///< rotation about its own axis [rad]
+  Vec3d stick{};                    ///< elastic slip at the start of the step [m]
   bool spatial = true, centreline = false;
-  bool isotropic = true;             ///< whether friction is the same in all directions of the rod
+  bool isotropic = true;             ///< true if friction is the same in all directions of the rod
   const Vec3d* predicted = nullptr;  ///< friction over its limit, as a step of Newton's method predicts it
 };
 
@@ -78,14 +78,14 @@ struct SlipStart {
 
 template <class Scalar>
 struct FrictionForce {
-  Vec3<Scalar> force;    ///< of b on a, and back, turned round [N]
-  Vec3<Scalar> stick{};  ///< at the end of the step [m]
+  Vec3<Scalar> force;    ///< force of b on a; a applies the opposite force to b [N]
+  Vec3<Scalar> stick{};  ///< elastic slip at the end of the step [m]
   bool sticking = false;
 };
 
-/// Length of the arm from the centreline of a (side 0) or of b to where they touch, over the normal on an obstacle [m],
-/// over the way between both centrelines otherwise [-]. Two rods share that point, so that friction turns them by
-/// nothing, however deep they are in each other: it divides the way between their centrelines as radii do.
+/// Length of the arm from the centreline of a (side 0) or of b to the point of contact. On an obstacle it is along the
+/// normal [m], otherwise relative to the vector between both centrelines [-]. Two rods share that point, so friction
+/// has no net moment on them, however deep they overlap. The point divides the vector as the radii do.
 inline double arm_length(const ContactPair& pair, int side) {
   if (pair.rod_b < 0) return pair.radius_a;
   return (side == 0 ? pair.radius_a : pair.radius_b) / pair.radii();
@@ -125,9 +125,9 @@ Scalar slip_factor(const Scalar& square, double c) {
   return chain(square, c * t / x, 0.5 * c * c * c * ((1.0 - t * t) - t / x) / x2);
 }
 
-/// True if an elastic stick of a length, squared, holds, if it bears at most another. What slipped at the end of a step
-/// is at its limit to rounding: it is taken to slip on. As a stick it would hold its neighbours too, and Newton's
-/// method would free one contact an iteration.
+/// True if an elastic slip with one squared length holds, when at most another is allowed. A contact that slipped at
+/// the end of a step is at its limit up to rounding, and counts as slipping. As sticking it would hold its neighbours
+/// too, and Newton's method would release one contact per iteration.
 inline bool holds(double square, double most) { return square <= (1.0 - 1e-12) * most * most; }
 
 /// The force F for a slip S and a normal force N.
@@ -176,7 +176,7 @@ struct ForceLaw {
   }
 };
 
-/// That of implicit and lagged friction at a normal force N, with K / (2 dt).
+/// Law of implicit and lagged friction at a normal force N, with K / (2 dt).
 inline ForceLaw tanh_law(double mu, double pressing, double square, double rate) {
   const Dual<1> factor = slip_factor(Dual<1>::unknown(square, 0), rate);
   const double limit = mu * pressing;
@@ -194,27 +194,27 @@ inline ForceLaw force_law(const FrictionSetting& f, double pressing, double squa
 /// One of the edges whose turning makes surfaces slip.
 template <class Scalar>
 struct SlippingEdge {
-  int tail = 0;               ///< its node among those of the contact; its head is the next
+  int tail = 0;               ///< index of its tail among the nodes of the contact; its head is the next node
   Vec3<Scalar> edge, change;  ///< now, and since the start of the step [m]
-  Vec3<Scalar> tangent, arm;  ///< where the edge turns
+  Vec3<Scalar> tangent, arm;  ///< tangent and arm about which the edge turns
   Vec3<Scalar> turn;          ///< phi
-  Vec3<Scalar> spin{};        ///< of the frame, by the edge [1/m]
-  Scalar angle{};             ///< by which it has turned about itself [rad]
-  Scalar inverse;             ///< of the length there [1/m]
+  Vec3<Scalar> spin{};        ///< derivative of the frame's spin by the edge [1/m]
+  Scalar angle{};             ///< rotation about itself [rad]
+  Scalar inverse;             ///< inverse of its length there [1/m]
 };
 
 /// Two surfaces that press against each other, at given unknowns.
 template <class Scalar>
 struct SlippingSurfaces {
   SlippingEdge<Scalar> sides[2];
-  Vec3<Scalar> node[3];            ///< of a curve
-  int bodies = 0;                  ///< with an arm
-  Scalar s, t, distance;           ///< a curve's t is nothing
-  Vec3<Scalar> normal, between{};  ///< of the centrelines; nothing beside a plane
+  Vec3<Scalar> node[3];            ///< nodes of a curve
+  int bodies = 0;                  ///< number of bodies with an arm
+  Scalar s, t, distance;           ///< a curve has no t
+  Vec3<Scalar> normal, between{};  ///< normal and vector between the centrelines; zero beside a plane
   Vec3<Scalar> lever;              ///< between them where edges turn; the normal of an obstacle
-  Scalar inverse = 0.0;            ///< of the length of `between` [1/m]; 0: nothing
+  Scalar inverse = 0.0;            ///< inverse of the length of `between` [1/m]; 0: no such vector
   Scalar pressing;                 ///< N
-  PressingForce law;               ///< of minus N
+  PressingForce law;               ///< law of -N
   double before = 0;               ///< distance at the start of the step [m]
   Scalar w[4];
   Vec3<Scalar> way;      ///< slip, with its part along the normal [m]
@@ -293,7 +293,7 @@ Vec3<Scalar> rod_direction(const FrictionSetting& f, const SlippingSurfaces<Scal
   return w != nullptr && w->edges > 1 ? curve_direction(*w, c.node, c.s) : c.sides[0].edge;
 }
 
-/// Friction of the greatest coefficient, as it is along and across the rod.
+/// Converts friction of the greatest coefficient to friction along and across the rod.
 template <class Scalar>
 void direct_friction(const FrictionSetting& f, SlippingSurfaces<Scalar>& c) {
   using std::sqrt;
@@ -307,7 +307,7 @@ void direct_friction(const FrictionSetting& f, SlippingSurfaces<Scalar>& c) {
   c.friction.force = Scalar(pair.across) * c.plain + (Scalar(more) * share) * c.along;
 }
 
-/// Component of an edge's direction in the middle of the step along the mean of those at its ends.
+/// Component of an edge's direction in the middle of the step along the mean of its directions at both ends.
 template <class Scalar>
 Scalar mean_along_middle(const SlippingEdge<Scalar>& side) {
   using std::sqrt;
@@ -317,8 +317,8 @@ Scalar mean_along_middle(const SlippingEdge<Scalar>& side) {
   return dot(mean, middle) / sqrt(dot(middle, middle));
 }
 
-/// The angle by which the spin of an edge does work in an energy-momentum step, whose rates are those of its finite
-/// rotation (inertia.cpp): on another, what rolls would gain energy.
+/// The angle over which the spin of an edge does work in an energy-momentum step, whose rates are those of its finite
+/// rotation (inertia.cpp). With another angle, rolling would gain energy.
 template <class Scalar>
 Scalar working_turn(const SlippingEdge<Scalar>& side) {
   return finite_turn(side.angle) / mean_along_middle(side);
@@ -419,7 +419,7 @@ Vec3<Scalar> whole_way(const FrictionSetting& f, const SlippingSurfaces<Scalar>&
   return c.way + Vec3<Scalar>{Scalar(f.stick.x), Scalar(f.stick.y), Scalar(f.stick.z)};
 }
 
-/// The same with F and S as they are at `unknown`; returns F.
+/// Evaluates with F and S at `unknown`; returns F.
 template <class Scalar>
 FrictionForce<Scalar> friction_gradient(const FrictionSetting& f, const Scalar (&unknown)[kContactUnknowns],
                                         Scalar (&gradient)[kContactUnknowns]) {

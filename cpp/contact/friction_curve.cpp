@@ -21,9 +21,9 @@ struct Curve {
   const CurveWeights& w;
   double s, weight[3], weight_slope[3];  ///< w_i, w_i'
   double lever[2] = {};                  ///< r m_b
-  int ways[kWays], count = 0;            ///< those that are there: in a plane two a node
+  int ways[kWays], count = 0;            ///< indices of existing unknowns: in a plane two per node
 
-  /// Calls see(j) for each of them, those of nodes alone without `angles`.
+  /// Calls see(j) for each unknown, without `angles` for those of nodes only.
   template <class See>
   void each_way(bool angles, const See& see) const {
     for (int i = 0; i < count; ++i)
@@ -116,7 +116,7 @@ void add_force_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& 
   });
 }
 
-/// From the force of the greatest coefficient to that of `direct_friction`.
+/// Converts the force of the greatest coefficient to that of `direct_friction`.
 void direct_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, const Curve& curve, const Vec3d (&x)[3],
                    Slopes& d) {
   const double share = dot(c.along, c.plain), across = f.pair->across, more = f.pair->along(share) - across;

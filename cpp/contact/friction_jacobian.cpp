@@ -43,10 +43,10 @@ void add_contact_slopes(const FrictionSetting& f, const SlippingSurfaces<double>
   }
 }
 
-/// Derivatives of a turning edge, by those of its end.
+/// Derivatives of a turning edge by its vector at the end.
 double edge_share(const FrictionSetting& f) { return f.middle ? 0.5 : 1.0; }
 
-/// By how much edges turn and spin, and on what lever.
+/// Rotations and spins of edges, and their levers.
 void add_turn_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, Slopes& d) {
   for (int j = 0; j < kWays; ++j) {
     const Vec3d& moved = d.between[j];
@@ -85,7 +85,7 @@ Vec3d obstacle_arm_slope(const FrictionSetting& f, const SlippingSurfaces<double
   return d.t[j] * c.sides[1].edge + f.pair->radius_b * d.lever[j];
 }
 
-/// From the force of the greatest coefficient to that of `direct_friction`; the normal of an obstacle turns by `lever`.
+/// Converts the force of the greatest coefficient to that of `direct_friction`; an obstacle's normal turns by `lever`.
 void direct_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, Slopes& d) {
   const double share = dot(c.along, c.plain), across = f.pair->across, more = f.pair->along(share) - across;
   const Vec3d &e = c.sides[0].edge, &n = c.normal;

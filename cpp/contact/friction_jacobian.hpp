@@ -33,7 +33,7 @@
 
 namespace withe {
 
-/// Adds the derivative of `add_friction_gradient` by the unknowns; those of an obstacle are left out.
+/// Adds the derivative of `add_friction_gradient` by the unknowns, except those of an obstacle.
 void add_friction_jacobian(const FrictionSetting& f, const SlippingSurfaces<double>& c,
                            double (&jacobian)[kContactUnknowns][kContactUnknowns]);
 

@@ -14,9 +14,8 @@ constexpr double kImpactSwings = 12.0, kImpactSteps = 4.0;
 // Slower surfaces have a four-hundredth, kPartingShare^2, of the energy that is to be left. The final parting speed
 // counts as at least kMinPartingSpeed of the speed of approach.
 constexpr double kPartingShare = 0.05, kMinPartingSpeed = 0.3;
-// The same as kImpactSwings, for restitution. Surfaces that give nothing back leave at kPartingShare kMinPartingSpeed
-// of the speed of approach: within some 90 swings of a contact at its stiffest. The energy stored until then is lost
-// too.
+// kImpactSwings for restitution. Surfaces without restitution separate at kPartingShare kMinPartingSpeed of the
+// approach speed, within some 90 oscillations of a contact at its stiffest. The energy stored until then is lost too.
 constexpr double kRestitutionSwings = 128.0;
 // Speed of approach of surfaces at rest, if they do not fall on, over `rest_speed`: above 0, which means no impact.
 constexpr double kMinApproach = 1e-9;
@@ -78,8 +77,8 @@ bool touches_already(const ContactProblem& problem, const ContactPair& pair) {
   });
 }
 
-/// The rate, as the step begins, of what depends on the place of a piece of a curve against its obstacle, by what it
-/// changes with the nodes.
+/// Rate, as the step begins, of a function of the place of a curve's piece against its obstacle, from its derivatives
+/// by the nodes.
 double curve_rate(const ContactProblem& problem, const ContactPair& pair, const double (&slope)[9]) {
   Vec3d v[4];
   problem.bodies.end_points(pair, problem.start->v, v);
@@ -89,8 +88,8 @@ double curve_rate(const ContactProblem& problem, const ContactPair& pair, const 
   return rate;
 }
 
-/// True if a rod rolls on or off a piece of its curve, which then tilts against the obstacle, and has not touched it
-/// for longer than that takes. What such a piece takes the next one gives back: they do not come to rest.
+/// True if a rod rolls on or off a piece of its curve. The piece then tilts against the obstacle, and has touched it
+/// for no longer than rolling takes. The next piece returns the energy of such a piece: the pieces do not come to rest.
 bool rolls(const ContactProblem& problem, const Touching& t) {
   const ContactPair& pair = t.pair;
   if (!(t.approach > 0.0) || !pair.curve() || pair.piece.weights->edges < 2) return false;
@@ -101,7 +100,7 @@ bool rolls(const ContactProblem& problem, const Touching& t) {
          std::abs(rate) * t.age < kRolledOffSlope * start.stiff;
 }
 
-/// Share that presses elastically in a step: 1 for surfaces that have just met, and where a rod rolls; 0 for those that
+/// Elastic share of pressing in a step: 1 for surfaces that have just met, and for a rolling rod; 0 for surfaces that
 /// rest on each other.
 double elastic_share(const ContactProblem& problem, const Touching& t) {
   const double share = share_within(problem, t, speed_of_impact(problem, t), kImpactSwings);
@@ -254,7 +253,7 @@ void set_pressing(const ContactProblem& problem, Touching& t) {
                                                    share_within(problem, t, t.approach, kRestitutionSwings)
                                              : 0.0;
   if (share == 0.0 && lost == 0.0) return;
-  // Friction that goes with the force k E'(D0) asks for the same force at the end of the step before.
+  // Friction that is proportional to k E'(D0) requires the same force at the end of the previous step.
   const bool lags = problem.lags() && pair.friction > 0.0;
   if (problem.pressing >= Pressing::mean && !lags) {
     t.law.elastic = share;

@@ -1,5 +1,5 @@
 #pragma once
-/// Impacts: at which speed surfaces meet, how long they count as having just met, and what of them presses elastically.
+/// Impacts: approach speed of surfaces, time during which they count as having just met, and the elastic share.
 
 #include <algorithm>
 
@@ -24,27 +24,27 @@ inline double approach_speed(const ContactProblem& problem, const ContactPair& p
 bool comes_near(const ContactProblem& problem, const Touching& t);
 /// True if surfaces meet in this step.
 bool meets(const ContactProblem& problem, const ContactPair& pair);
-/// That of an impact which the step begins; 0: none.
+/// Approach speed of an impact that the step begins; 0: none.
 double first_approach(const ContactProblem& problem, const ContactPair& pair);
 /// Half a period of an edge on its contact: as long as an impact lasts at least [s].
 double swing_time(const ContactProblem& problem, const Touching& t);
-/// True if surfaces still behave otherwise for having met: in restitution for longer than in what presses elastically.
+/// True if an impact still affects surfaces: in restitution for longer than in the elastic share.
 bool impact_lasts(const ContactProblem& problem, const Touching& t);
 /// Derivatives of how much presses elastically in a step, `PressingLaw::elastic`.
 struct ElasticShareSlopes {
-  double approach = 0;        ///< by the speed of approach as the step begins [s/m]
-  double way = 0;             ///< by how much nearer surfaces come in the step [1/m]
+  double approach = 0;        ///< by the approach speed as the step begins [s/m]
+  double way = 0;             ///< by the decrease of the distance in the step [1/m]
   double slip_tolerance = 0;  ///< [s/m]
-  double gravity = 0;         ///< by its size [s^2/m]
-  double mass = 0;            ///< by what the contact holds up [1/kg]
+  double gravity = 0;         ///< by the magnitude of gravity [s^2/m]
+  double mass = 0;            ///< by the mass at the contact [1/kg]
 };
 ElasticShareSlopes elastic_share_slopes(const ContactProblem& problem, const Touching& t);
 /// Adds `by` times the derivatives of the speed of approach that a contact has from the start of the step, by its
 /// unknowns there and by their rates.
 void add_approach_slopes(const ContactProblem& problem, const Touching& touching, double by,
                          double (&start)[kContactUnknowns], double (&velocity)[kContactUnknowns]);
-/// True if a step of dt would be too long for where surfaces that meet push each other, or for what an impact loses by
-/// its restitution.
+/// True if a step of dt would be too long to resolve where meeting surfaces push each other, or the loss of an impact
+/// by its restitution.
 bool unresolved(const ContactProblem& problem, const Touching& t, double dt);
 /// Sets the law by which surfaces press in a step, and the force at its end, of a contact with its stiffness and speed
 /// of approach.

@@ -6,8 +6,8 @@
 namespace withe {
 
 struct LaggedForce {
-  Vec3d force{};       ///< on the slip, against it: minus friction on a [N]
-  double slope[3][3];  ///< by the slip [N/m]
+  Vec3d force{};       ///< force against the slip: minus friction on a [N]
+  double slope[3][3];  ///< derivative by the slip [N/m]
   bool sticking = false;
 };
 /// `rate`: K / (2 dt) [1/m].

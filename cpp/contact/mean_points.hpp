@@ -53,8 +53,8 @@ MeanPoints<Scalar> mean_points(const ContactPair& pair, const ClosestPoints& fir
   const Scalar along_a = end.s - start.s, along_b = end.t - start.t;
   const Vec3<Scalar> turned0 = along_a * start.u - along_b * start.v, turned1 = along_a * end.u - along_b * end.v;
   const Vec3<Scalar> back = end.moved(-along_a, -along_b), on = start.between + turned0;
-  // h(b) = c0 + c1 b + c2 b^2, from more than 0 to less. Where nothing slides any share will do, and a half is taken:
-  // there both ends are rounding, to which so little is added that it is more.
+  // h(b) = c0 + c1 b + c2 b^2 falls from above 0 to below 0. Without sliding any share is a solution, and the half is
+  // used: h is rounding at both ends, and a small term is added that exceeds it.
   constexpr double kMinRoot = 1e-10;  // of D^2, far above its rounding error of 1e-15
   const Scalar little = kMinRoot * (start.square + end.square);
   const Scalar c0 = dot(back, back) + start.spread - end.square + little,

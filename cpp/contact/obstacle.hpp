@@ -15,7 +15,7 @@ inline constexpr Vec3d kUnitVectors[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
 /// An obstacle in the axes of the unknowns (in a plane: its two, and zero).
 struct Obstacle {
   ObstacleKind kind = ObstacleKind::plane;
-  Vec3d point{}, other{};  ///< of a plane: its normal
+  Vec3d point{}, other{};  ///< `other` of a plane is its normal
   double radius = 0;
 };
 
@@ -34,7 +34,7 @@ Scalar height_above(const Obstacle& plane, const Vec3<Scalar>& x, const Vec3d& d
   return n.x * (x.x - Scalar(from.x)) + n.y * (x.y - Scalar(from.y)) + n.z * (x.z - Scalar(from.z));
 }
 
-/// `drift`: the obstacle is taken back by so much.
+/// `drift` is subtracted from the position of the obstacle.
 template <class Scalar>
 PointDistance<Scalar> distance_to(const Obstacle& o, const Vec3<Scalar>& x, const Vec3d& drift = {}) {
   using std::sqrt;

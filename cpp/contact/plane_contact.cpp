@@ -95,7 +95,7 @@ void set_plane_pressing(const ContactProblem& problem, const Touching& t, const 
 /// An edge of a piece, and how it turns.
 struct PlaneEdge {
   Point now, start;    ///< [m]
-  double inverse;      ///< of its length, squared [1/m^2]
+  double inverse;      ///< inverse of its squared length
   double turn;         ///< phi
   double lever;        ///< r m_b [m]
   double lever_slope;  ///< its derivative by s [m]

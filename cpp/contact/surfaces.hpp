@@ -52,7 +52,7 @@ struct ContactPair {
   double small_radius() const { return rod_b < 0 || radius_a < radius_b ? radius_a : radius_b; }
   bool curve() const { return piece.weights != nullptr; }
   bool isotropic() const { return forward == across && backward == across; }
-  /// That along a rod that slides by so much towards its end, over `friction`.
+  /// Friction coefficient along a rod, relative to `friction`, for a slip that is positive towards the end of the rod.
   double along(double slip) const { return slip >= 0.0 ? forward : backward; }
   bool rubs() const { return friction > 0.0 || rolling > 0.0; }
   /// Coefficients as in `SurfaceParameters::obstacle_friction`.

@@ -132,13 +132,13 @@ PlanarHalfForces planar_attached_forces(const TurnCoefficients& elastic, const D
   return f;
 }
 
-/// Moments between an edge and what is attached to it, once the rows of the edge are put.
+/// Moments between an edge and the frame that is attached to it. The rows of the edge have been written.
 struct AttachedMoments {
   MovingEdge<double> edge;
   Vec3d spin;
-  double sign;                  ///< of the moment on the edge
-  DiscreteMoment<double> m;     ///< of the first on the second, and its derivatives
-  EdgeColumns<double> by_edge;  ///< where asked for
+  double sign;                  ///< sign of the moment on the edge
+  DiscreteMoment<double> m;     ///< moment of the first on the second, and its derivatives
+  EdgeColumns<double> by_edge;  ///< filled if the matrix is requested
 };
 
 AttachedMoments put_attached_edge(const TurnCoefficients& elastic, const DiscreteStep& step, int index,

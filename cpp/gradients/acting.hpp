@@ -1,5 +1,5 @@
 #pragma once
-/// The numbers that acted in the steps of a run, where they changed while it ran.
+/// Parameters that acted in the steps of a run, where they changed during the run.
 
 #include <memory>
 #include <vector>
@@ -9,8 +9,7 @@
 namespace withe {
 
 /// Stretches of steps with equal parameters. Natural shapes and loads may change every step, and each stretch stores
-/// its
-/// own; the stretches share all other parameters.
+/// its own; the stretches share all other parameters.
 class ActingNumbers {
  public:
   explicit ActingNumbers(const Parameters& first);

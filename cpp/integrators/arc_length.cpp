@@ -64,7 +64,7 @@ class ArcLength {
       }
       longest = taken <= kMaxEasyIterations ? 2.0 * arc : arc;
       const bool ends = (start_.factor - arc_.end) * (factor_ - arc_.end) <= 0.0 && start_.factor != arc_.end;
-      // Just behind a limit point the rate is that of rounding: the next one is as far as an arc away.
+      // Just behind a limit point the rate is a rounding error: the next increment is as far as an arc away.
       const bool turns = start_.rate * rate_ < 0.0 && !(point_.limit);
       if (turns && !narrow(arc, [this] { return rate_; })) return result_;
       if (ends && !turns) {
@@ -89,7 +89,7 @@ class ArcLength {
 
   double product(const VectorX& a, const VectorX& b) const { return (a.array() * weight_.array() * b.array()).sum(); }
 
-  /// Unit tangent of the path at the present point, in the sense of the one before.
+  /// Unit tangent of the path at the present point, with the orientation of the previous tangent.
   void find_direction(const VectorX* before, bool rising, double rate_before = 0.0) {
     path_.go_to(factor_);
     path_.find_tangent(here_);
@@ -144,7 +144,7 @@ class ArcLength {
       solve(step_);
       solve(pull_);
       pull_ += held_;
-      // The held part of z is that of the factor, so that what is left of the plane's equation is linear.
+      // The held part of z follows from the factor, so the rest of the plane's equation is linear.
       const double left = arc - product(start_.tangent, z - state_.q) - factor_weight_ * start_.rate * (factor - start);
       const double change =
           (left - product(start_.tangent, step_)) / (product(start_.tangent, pull_) + factor_weight_ * start_.rate);

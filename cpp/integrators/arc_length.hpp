@@ -11,22 +11,22 @@ namespace withe {
 
 struct ArcOptions {
   double start = 0, end = 1;  ///< factors at which the path begins and ends
-  int most_points = 1000;     ///< it also ends after so many
+  int most_points = 1000;     ///< greatest number of points
   double turn = 0.1;          ///< greatest turn of an edge between two points, by the tangent [rad]
 };
 
 struct ArcPoint {
   double factor = 0;
-  bool stable = false;  ///< at this factor: no direction of negative stiffness
-  bool limit = false;   ///< the factor has an extremum here
+  bool stable = false;  ///< true if no direction has negative stiffness at this factor
+  bool limit = false;   ///< true if the factor has an extremum here
 };
 
-/// Asked at each point, with `state` there.
+/// Function that is called at each point, with `state` at that point; see below for its result.
 using ArcVisitor = std::function<void(const ArcPoint& point)>;
 
 struct ArcResult {
-  bool finished = false;  ///< came to the end, or to as many points as were wanted
-  double factor = 0;      ///< at the last point
+  bool finished = false;  ///< true if the path reached its end, or the requested number of points
+  double factor = 0;      ///< factor of the last point
   NewtonResult newton;
 };
 

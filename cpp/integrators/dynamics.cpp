@@ -27,7 +27,7 @@ double moved_by(VectorX& force, Equations& equations, const Newton& newton, doub
   // A matrix that was made for an iteration that was not needed has not been factorised.
   const bool usable = matrix.belongs_to(equations, h) && (matrix.factorized || factorize(equations, work.newton));
   if (!usable) {
-    // Nothing moved, and no matrix was made.
+    // Nothing moved, and no matrix was computed.
     force = (h * h) * force.cwiseProduct(equations.mass().inverse);
     return newton.norms().displacement(force);
   }
@@ -68,7 +68,7 @@ double estimated_error(Equations& equations, const Newton& newton, const Options
     constant = kFourthOrderError;
     whole = &work.whole_acceleration;
   }
-  constexpr double kSafetyFactor = 2.0;  // of the shift in phase of fast modes
+  constexpr double kSafetyFactor = 2.0;  // factor of the phase shift of fast modes
   const double cut =
       std::pow(kSafetyFactor * 2.0 * dt / (constant * options.duration.value_or(1.0)), 1.0 / (order + 1));
   predictor.differentiate(order - 1, -std::expm1(-cut), dt, *whole, work.difference);
@@ -78,9 +78,9 @@ double estimated_error(Equations& equations, const Newton& newton, const Options
   return moved_by(error, equations, newton, h, work);
 }
 
-/// Velocity at the end of a step of what supports hold. They have no dynamics of their own, and midpoint's 2 v - v0
-/// would ring for ever: their mean velocities of this step and the last are carried on, to second order, but where they
-/// jump.
+/// Velocity of held unknowns at the end of a step. They have no dynamics of their own, and the midpoint formula 2 v -
+/// v0 would oscillate for ever. Their mean velocities of this step and the last are extrapolated to second order,
+/// unless they jump.
 void find_held_velocity(const Model& model, const HeldTarget& held, const StepPlan& plan, const State& state,
                         StepWorkspace& work) {
   VectorX& v = work.held_velocity;
@@ -93,17 +93,17 @@ void find_held_velocity(const Model& model, const HeldTarget& held, const StepPl
   }
 }
 
-/// Time between the velocities of supports before and after a step: those of backward Euler are means over its steps,
-/// and lie in their middles, which counts where the last one was much longer.
+/// Time between the velocities of supports before and after a step. Velocities of backward Euler are means over its
+/// steps, in their middles, which matters if the last step was much longer.
 double held_time(const StepPlan& plan, const State& state) {
   if (plan.rule != StepRule::backward_euler || state.motion.known == 0) return plan.dt;
   const double between = state.time + 0.5 * plan.dt - state.motion.time[0];
   return between > kMaxUsualTime * plan.dt ? between : plan.dt;
 }
 
-/// Finds the fluid's force for a step of dt: that on velocities as they are taken to be within the step, to the order
-/// of the scheme, at the positions that go with them. Under the midpoint rules those of the last two steps are carried
-/// on: velocities at their ends would ring on stiff modes, and the guess with them.
+/// Finds the fluid's force for a step of dt, from the velocities within the step to the order of the scheme, at the
+/// corresponding positions. The midpoint rules extrapolate the velocities of the last two steps: velocities at the ends
+/// of steps would oscillate on stiff modes, and so would the initial guess.
 bool begin_flow(Equations& equations, double dt, bool euler, const State& state, StepWorkspace& work) {
   if (!equations.flows()) return true;
   VectorX &v = work.mean, &q = work.z;
@@ -153,7 +153,7 @@ void add_work(const Equations& equations, const Parameters& parameters, const Ve
 void add_support_work(const Equations& equations, const VectorX& v0, const VectorX& v1, double dt, double held_time,
                       StepWorkspace& work, StepResult& result) {
   VectorX& full_residual = work.newton.data.full_residual;
-  VectorX& momentum = work.difference;  // by how much it grows
+  VectorX& momentum = work.difference;  // growth of momentum
   VectorX& rate = work.mean;
   work.z = v1 - v0;
   multiply(equations.model(), equations.mass(), work.z, momentum);
@@ -179,7 +179,7 @@ bool solve_flow(Equations& equations, const VectorX& q, const VectorX& v, Counte
 
 namespace {
 
-/// True if the step to q1 is acceptable: no edge turns by much, and contact detection missed nothing.
+/// True if the step to q1 is acceptable: no edge turns far, and contact detection missed no contact.
 bool acceptable(Equations& equations, const StepPlan& plan, const State& state, const VectorX& q1, StepWorkspace& work,
                 StepResult& result) {
   result.largest_turn = largest_turn(equations.model(), state.q, q1);
@@ -189,7 +189,7 @@ bool acceptable(Equations& equations, const StepPlan& plan, const State& state, 
     return false;
   Contact* contact = equations.contact();
   if (!contact) return true;
-  // Iterates pass through nothing, but they may find a way around what a rod would have met.
+  // Iterates pass through no surface, but they may find a way around an obstacle that the rod would have met.
   work.change = work.z - state.q;
   if (equations.allowed(state.q, work.change) < 1.0) return false;
   contact->update(q1);
@@ -211,8 +211,8 @@ void find_end_velocity(const Equations& equations, const StepPlan& plan, const S
   equations.assembler().set_held_part(work.held_velocity, v1);
 }
 
-/// Account of the forces and of the dissipated energy; full residuals become minus the reactions. Returns what friction
-/// and restitution took [J].
+/// Accounts for the forces and the dissipated energy; full residuals become minus the reactions. Returns the energy
+/// removed by friction and restitution [J].
 double account(Equations& equations, const Parameters& parameters, const StepPlan& plan, const State& state,
                const VectorX& q1, StepWorkspace& work, StepResult& result) {
   const bool conserves = plan.rule == StepRule::energy_momentum;

@@ -9,7 +9,7 @@
 
 namespace withe {
 
-/// One implicit step: its rule and its length; `slot` tells the parts of a composition apart.
+/// One implicit step: its rule and its length; `slot` is the index of a part of a composition.
 struct StepPlan {
   StepRule rule = StepRule::midpoint;
   double dt = 0;  ///< [s]
@@ -19,12 +19,12 @@ struct StepPlan {
 struct StepResult {
   bool accepted = false;
   bool too_deep = false;  ///< surfaces are too deep in each other: contact must be stiffer
-  Squeezed squeezed;      ///< what is pressed by what does not yield
+  Squeezed squeezed;      ///< contact between parts that cannot yield
   NewtonResult newton;
-  double largest_turn = 0;   ///< of an edge [rad]
+  double largest_turn = 0;   ///< largest rotation of an edge [rad]
   double error = 0;          ///< estimated local error [m]
-  double load_work = 0;      ///< of loads and custom forces [J]
-  double dissipated = 0;     ///< by drag, viscosity and contact [J]
+  double load_work = 0;      ///< work of loads and custom forces [J]
+  double dissipated = 0;     ///< energy removed by drag, viscosity and contact [J]
   double support_work = 0;   ///< [J]
   double pressing_gain = 0;  ///< put in by surfaces that press, `Contact::pressing_gain` [J]
 };
@@ -34,7 +34,7 @@ struct StepWorkspace {
   NewtonWorkspace newton;
   VectorX z, move, change, working, mean, velocity, held_velocity, held_acceleration, assumed, difference,
       whole_acceleration;
-  PressureGains pressure;  ///< of a backward Euler step under `adaptive`
+  PressureGains pressure;  ///< energy gains of a backward Euler step under `adaptive`
   Configuration after;
   State from, next;  ///< explicit steps
 };

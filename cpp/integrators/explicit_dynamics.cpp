@@ -8,10 +8,10 @@
 namespace withe {
 namespace {
 
-/// Forces of the last evaluation over mass, where nothing holds.
+/// Forces of the last evaluation over mass, for free unknowns.
 void set_acceleration(const Equations& equations, const StepWorkspace& work, VectorX& acceleration) {
   acceleration = -work.newton.data.full_residual.cwiseProduct(equations.mass().inverse);
-  equations.assembler().project(acceleration);  // what a support holds has one mass
+  equations.assembler().project(acceleration);  // a held node has one mass in all directions
 }
 
 /// Forces over mass at q, with velocity v in drag, viscosity, friction and the spin couple. Anchors have followed the
@@ -38,7 +38,7 @@ void explicit_acceleration(Equations& equations, const Parameters& parameters, c
 double free_acceleration(Equations& equations, const Parameters& parameters, const Prescribed& prescribed,
                          const State& state, StepWorkspace& work) {
   State& next = work.next;
-  if (next.q.size() != state.q.size()) next = state;  // once: what an explicit step leaves as it is, and room
+  if (next.q.size() != state.q.size()) next = state;  // once: members that an explicit step keeps, and memory
   const double turn = advance(equations.model(), state, work.z, work.newton.data.configuration, next);
   equations.begin(next, parameters, StepRule::verlet, 0.0, prescribed);
   equations.evaluate_forces(work.velocity, work.newton.data);
@@ -165,7 +165,7 @@ double stable_step(Equations& equations, const Parameters& parameters, const Pre
   // The eigenvalue falls while a step grows, at most as one over it: each round halves the logarithm of the error.
   for (int k = 0; k < 20 && std::isfinite(dt); ++k) {
     const double h = 0.25 * dt;
-    work.from = state;  // as it moves: friction resists less, the faster it slips
+    work.from = state;  // with its velocities: friction resists less at a higher slip velocity
     work.from.q -= h * state.v;
     equations.begin(work.from, parameters, StepRule::verlet, h, prescribed);
     if (Contact* contact = equations.contact()) contact->begin(work.from, parameters, dt, Pressing::still);

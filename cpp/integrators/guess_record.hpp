@@ -9,7 +9,7 @@ namespace withe {
 /// Success rate of a guess that need not lead to the solution: a guess that fails repeatedly is tried more
 /// rarely.
 struct GuessRecord {
-  int misses = 0;  ///< in a row
+  int misses = 0;  ///< number of consecutive failures
   int waits = 0;   ///< solves to come without it
 
   bool skipped() { return waits > 0 && waits-- > 0; }

@@ -7,8 +7,8 @@
 namespace withe {
 namespace {
 
-// Turn of edges in the difference that stands for a derivative [rad], and the factor of it where hands yield. A forward
-// difference by d has a truncation error of about d and a rounding error of about epsilon / d: both are below 1e-6.
+// Rotation of edges in a finite difference [rad], and its factor for yielding hands. A forward difference by d has a
+// truncation error of about d and a rounding error of about epsilon / d: both are below 1e-6.
 constexpr double kDifference = 1e-6;
 
 bool turns(const LoadPiece& piece) { return piece.shape != LoadShape::dead_node && piece.load >= 0; }

@@ -14,10 +14,10 @@ namespace withe {
 struct Boundary {
   /// Supports, obstacles and custom forces at the factor last gone to; must outlive the path.
   const Prescribed& prescribed = Prescribed::nothing();
-  /// Sets the held unknowns of q to those at `factor`. False where the present state, which is that at `present`, is
-  /// too many turns of a frame away.
+  /// Sets the held unknowns of q to those at `factor`. Returns false if a frame would turn too far from the present
+  /// state, which is the state at `present`.
   std::function<bool(double present, double factor, VectorX& q)> hold = nullptr;
-  /// Sets the poses of supports in `prescribed` to those at a factor; nothing where no hand that yields moves.
+  /// Sets the poses of supports in `prescribed` to those at a factor; does nothing if no yielding hand moves.
   std::function<void(double factor)> move = nullptr;
 };
 /// Sets the parameters that act at a factor; empty if all of them are constant.
@@ -47,13 +47,13 @@ class Homotopy {
         state_(state),
         work_(work) {}
 
-  /// Makes the present state that of s = 0, by what it is out of balance there.
+  /// Makes the present state that of s = 0, with its imbalance of forces.
   void start_out_of_balance();
-  /// Loads and what is left out of balance at a factor; the frames count from the present state.
+  /// Loads and imbalance at a factor; the frames count from the present state.
   void go_to(double factor);
   bool hold(double factor, VectorX& q) const { return boundary_.hold(present_, factor, q); }
   const Prescribed& prescribed() const { return boundary_.prescribed; }
-  /// From here on tangents leave alone what is neutral.
+  /// From here on tangents have no component along neutral motions.
   void hold_neutral() { hold_neutral_ = true; }
   /// True if supports moved where a tangent was last found.
   bool supports_move() const { return moves_; }
@@ -63,8 +63,8 @@ class Homotopy {
   /// Tangent of the path at the present state, and its stability.
   struct Tangent {
     VectorX rate;                 ///< dq / ds
-    double turn = 0;              ///< of edges, per factor [rad]
-    Factorization factorization;  ///< of the stiffness
+    double turn = 0;              ///< rotation of edges, per factor [rad]
+    Factorization factorization;  ///< factorisation of the stiffness
     bool found = false;
   };
   /// At the factor last gone to: the linear solution K dq/ds = df/ds - r - K q_held', the last by a difference.
@@ -73,14 +73,14 @@ class Homotopy {
   void find_pull(const VectorX& z, VectorX& pull, VectorX& held);
   /// Makes contact stiffer where surfaces at q are too deep in each other; whether q is out of balance by that.
   bool stiffen_deep(const VectorX& q);
-  /// Goes on from q: contacts, frames and hands remember it.
+  /// Continues from q: updates contacts, frames and hands.
   void accept(const VectorX& q);
   /// Makes an earlier state, that at a factor, the present one.
   void go_back(const State& state, double factor) {
     state_ = state;
     present_ = factor;
   }
-  /// Residual F(z, s), and the matrix when asked for.
+  /// Residual F(z, s), and optionally the matrix.
   void evaluate(const VectorX& z, bool with_matrix, const double* axial_force);
 
  private:

@@ -9,8 +9,8 @@
 namespace withe {
 namespace {
 
-/// Initial guesses of a step, in the order in which they are tried. The last two cost nothing where an earlier one
-/// leads to the solution.
+/// Initial guesses of a step, in the order in which they are tried. The last two cost nothing if an earlier guess leads
+/// to the solution.
 enum class Guess : std::size_t {
   /// The extrapolated motion.
   accelerated,
@@ -26,13 +26,13 @@ enum class Guess : std::size_t {
 };
 constexpr std::array kGuesses{Guess::accelerated, Guess::rest, Guess::continuation, Guess::plain};
 
-// Iterations from the extrapolated motion, which may lead nowhere.
+// Iterations from the extrapolated motion, which may not converge.
 constexpr int kMaxTrialIterations = 12;
-// Slip over which friction grows, over that of the scene, in the steps of the continuation.
+// Slip tolerance of friction, over that of the scene, in the steps of the continuation.
 constexpr std::array<double, 7> kRegularisation{8192.0, 4096.0, 512.0, 64.0, 16.0, 4.0, 1.0};
 
-/// Axial forces at the start of a step [N]: where the mixed method sets out from, for those of an extrapolated motion,
-/// whose edges turn along straight lines and so stretch, mean nothing.
+/// Axial forces at the start of a step [N]. The mixed method starts from these. Axial forces of an extrapolated motion
+/// would be meaningless, because its edges turn along straight lines and so stretch.
 void start_axial_force(const Equations& equations, const VectorX& q, VectorX& out) {
   const Model& model = equations.model();
   const ElasticCoefficients& k = equations.elastic();
@@ -45,9 +45,9 @@ void start_axial_force(const Equations& equations, const VectorX& q, VectorX& ou
   }
 }
 
-/// Adds the displacement of supports within a part of the step to `work.move`. Where supports move farther than the
-/// edges next to them bear, the rod follows by the linear step. A clamp that jumps by a hundred edges in one step needs
-/// that; else Newton's method fails, and the step is subdivided.
+/// Adds the displacement of supports within a part of the step to `work.move`. If supports move farther than the edges
+/// next to them can deform, the rod follows by the linear step. A clamp that jumps by a hundred edges in one step needs
+/// this; otherwise Newton's method fails, and the step is subdivided.
 void follow_supports(Equations& equations, const Newton& newton, const Options& options, double part,
                      const State& state, StepWorkspace& work) {
   const Assembler& assembler = equations.assembler();
@@ -131,7 +131,7 @@ class InnerSolve {
 
   bool uses(Heuristic h) const { return options_.heuristics.uses(h); }
 
-  /// Puts the guess into `work.z`.
+  /// Writes the guess to `work.z`.
   void guess_at(Guess guess) {
     if (guess == Guess::accelerated) {
       predictor_.predict({state_.time + 0.5 * plan_.dt, h_, plan_.dt, plan_.slot}, state_.v, work_.mean);
@@ -188,7 +188,7 @@ class InnerSolve {
   StepWorkspace& work_;
   GuessRecords& records_;
   bool frictional_;
-  bool regularised_;  ///< whether friction's regularisation is what Newton's method may fail on
+  bool regularised_;  ///< true if Newton's method may fail because of friction's regularisation
   /// True if no past motion predicts the step better than the present velocity, and friction acts: that velocity lets
   /// surfaces slip that stick. Energy-momentum steps of twelve rods that pile up take 17 % more iterations without.
   bool starts_at_rest_;

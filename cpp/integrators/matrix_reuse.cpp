@@ -9,8 +9,8 @@ namespace {
 constexpr double kMaxContractionAcross = 0.15;
 // Steps after which one is tried again whose contraction rate was greater.
 constexpr int kStepsUntilTrial = 16;
-// Decay of the known contraction rate within a step, in one step: a rate that only asks for new matrices is measured no
-// more, and would stay.
+// Decay of the known contraction rate per step. A rate so high that every solve computes new matrices is no longer
+// measured, and would otherwise never change.
 constexpr double kRateDecay = 0.96;
 // Chord iterations that cost as much as a new matrix: see FACTORISATION of benchmarks/ablation.py.
 constexpr int kIterationsPerMatrix = 3;

@@ -15,9 +15,9 @@ enum class MatrixAge { fresh, within, across };
 
 /// Contraction rates of chord iterations with earlier factorisations.
 struct MatrixHistory {
-  double interval = 0;  ///< that the last one belongs to [s]
-  /// Contraction rate per MatrixAge: error after an iteration over error before. The greatest of a solve: the nearer to
-  /// the solution, the smaller it is, and what the last iterations had says nothing of the first ones of the next step.
+  double interval = 0;  ///< interval of the last matrix [s]
+  /// Contraction rate per MatrixAge: error after an iteration over error before. It is the greatest rate of a solve.
+  /// The rate decreases towards the solution, so the last iterations do not predict the first ones of the next step.
   std::array<double, 3> contraction{1e-2, 1e-2, 1e-2};
   int waited = 0;     ///< time steps since one was last tried across
   bool slow = false;  ///< the last time step took many iterations with one
@@ -25,8 +25,8 @@ struct MatrixHistory {
 
 /// Matrix that the factorisation in a solver belongs to, and its history.
 struct MatrixRecord : MatrixHistory {
-  const Equations* owner = nullptr;  ///< nothing: not to be used again
-  int generation = 0;                ///< of the solver
+  const Equations* owner = nullptr;  ///< null: must not be reused
+  int generation = 0;                ///< generation of the solver
   bool factorized = true;            ///< false: the matrix in the solver is newer than its factorisation
 
   bool belongs_to(const Equations& equations, double h) const { return owner == &equations && interval == std::abs(h); }
@@ -41,21 +41,21 @@ class MatrixReuse {
 
   /// True if the coming iteration makes a matrix.
   bool fresh() const { return fresh_; }
-  /// True if the one before it has to be factorised: it was made for an iteration that was not needed.
+  /// True if the previous matrix must be factorised: it was computed for an iteration that was not needed.
   bool pending() const { return !fresh_ && !record_.factorized; }
   /// True if the residual alone is looked at first: it may show the end, and a matrix would have been made in vain.
   bool near_end() const;
-  /// True if it is within the tolerance, by what is known of the matrix.
+  /// True if the error is within the tolerance, by the known contraction rate of the matrix.
   bool at_end() const { return distance_ <= tolerance_; }
-  /// Length of the last step and of the one before [m]; infinite where it was shortened, or there was none.
+  /// Length of the last step and of the previous one [m]; infinite if it was shortened, or there was none.
   double step() const { return step_; }
   double last_step() const { return last_step_; }
   double tolerance() const { return tolerance_; }
 
   /// A matrix was factorised; `whole`: all of the Jacobian, so that it may serve again.
   void note_matrix(bool whole = true);
-  /// A matrix was made and the solve ended. It serves the next one, not the factorisation of one before it: what lasts
-  /// from step to step is then a function of the matrix alone.
+  /// Notes that a matrix was computed and the solve ended. The next solve uses this matrix, not an older factorisation.
+  /// The memory between steps is then a function of the matrix alone.
   void note_spare_matrix();
   void note_factorized() { record_.factorized = true; }
   /// After a step: learns how well matrices serve, and decides about the next one.
@@ -75,7 +75,7 @@ class MatrixReuse {
   std::array<double, 3> measured_{};  ///< greatest contraction rates of this solve
   MatrixAge age_ = MatrixAge::fresh, last_age_ = MatrixAge::fresh;
   double step_ = INFINITY, last_step_ = INFINITY;
-  double distance_ = INFINITY;  ///< from the solution, estimated [m]
+  double distance_ = INFINITY;  ///< estimated distance from the solution [m]
 };
 
 }  // namespace withe

@@ -10,15 +10,15 @@
 namespace withe {
 namespace {
 
-// Steps that are within the tolerance, while so many in a row have not halved the residual, end at a jump of forces. In
-// time a shorter interval leads past it; a solve at rest has nothing better than to go on.
+// Number of consecutive steps within the tolerance without a halved residual that ends a solve at a jump of forces. In
+// time integration a shorter interval leads past the jump; a solve at rest continues, for want of an alternative.
 constexpr int kMaxStalls = 4;
 
 // Corrections, over the prediction, and over the tolerance, up to which they need not shrink: so near to the path a
 // kink, or rounding, may stop that, and no other path is.
 constexpr double kMaxSettledShare = 0.05, kMaxSettledTolerances = 1e4;
 
-/// True if corrections of a prediction are too long, or do not shrink, for what they lead to to lie on the same path.
+/// True if corrections of a prediction are too long, or do not shrink, so that the result may lie on another path.
 bool loses_path(const Prediction& predicted, const MatrixReuse& reuse, bool first, double length) {
   if (predicted.strict)
     return leaves_path(reuse.step(), first ? predicted.length : kMaxContraction * reuse.last_step(), predicted.length,
@@ -26,7 +26,7 @@ bool loses_path(const Prediction& predicted, const MatrixReuse& reuse, bool firs
   return predicted.length > 0.0 && length > std::max(predicted.length, kMaxSettledTolerances * reuse.tolerance());
 }
 
-/// In packs: what is not finite is none times zero either.
+/// Checks packs: a number that is not finite stays so when multiplied by zero.
 bool is_finite(const VectorX& x) { return (0.0 * x).sum() == 0.0; }
 
 /// A user's force tolerance is that of a whole step.
@@ -115,7 +115,7 @@ class Newton::Solve {
     spare_matrix_ = matrix;
   }
 
-  /// Evaluates, where the search has not done so, with what the coming iteration wants; and judges.
+  /// Evaluates what the next iteration needs, unless the search has done so, and judges the result.
   Verdict look() {
     const bool near_end = reuse_.near_end();
     if (!search_.evaluated() || (reuse_.fresh() && !near_end)) evaluate(reuse_.fresh() && !near_end);
@@ -132,9 +132,9 @@ class Newton::Solve {
     return Verdict::go_on;
   }
 
-  /// A guess is no solution before a step shows it: residuals within the bound of rounding, and within the tolerance of
-  /// what a rod is stressed by, may be all of its weight. Points on the way end by their steps alone, whatever rounding
-  /// leaves: the same scene elsewhere in space takes the same steps.
+  /// A guess is accepted only after a step. A residual below the rounding error bound, and below the tolerance from a
+  /// rod's stresses, may still be all of its weight. Intermediate points of a path end by their steps alone, for any
+  /// rounding errors. The same scene at another place in space then takes the same steps.
   bool converged() const {
     if (how_.predicted && how_.predicted->enough > 0.0) return reuse_.step() <= how_.predicted->enough;
     if (result_.iterations == 0) return (work_.data.residual.array() == 0.0).all();
@@ -156,7 +156,7 @@ class Newton::Solve {
     return is_finite(work_.step);
   }
 
-  /// Takes a step; false where there is none, or none that may lead to the solution.
+  /// Takes a step; returns false if there is none, or none that may lead to the solution.
   bool iterate() {
     ++work_.counters.iterations;
     if (!find_step()) return false;
@@ -172,7 +172,7 @@ class Newton::Solve {
       z_ += work_.step;
     const double length = newton_.norms_.displacement(work_.step);
     if (shorten == 1.0) ++whole_steps_;
-    // A step that is cut says nothing of where the solution is, unless all of it is within the tolerance.
+    // A shortened step does not locate the solution, unless the whole step is within the tolerance.
     const bool near = shorten > 0.0 && length <= shorten * reuse_.tolerance();
     reuse_.note_step(shorten == 1.0 || near ? length : INFINITY);
     if (!how_.predicted) return true;
@@ -180,7 +180,7 @@ class Newton::Solve {
            ++kinks_met_ <= how_.predicted->kinks;
   }
 
-  /// True if nothing touches where the step begins and ends: then it is one as in a scene without surfaces.
+  /// True if nothing touches at the start and the end of the step, which is then a step without surfaces.
   bool leaves_surfaces_alone() {
     if (contact_->count() > 0) return false;
     work_.trial = z_ + work_.step;

@@ -20,7 +20,7 @@ struct NewtonResult {
 /// Size of the residuals.
 struct Balance {
   bool finite = false;  ///< all are numbers; else none of the below holds
-  bool floor = false;   ///< all within what rounding leaves
+  bool floor = false;   ///< true if all rows are within their rounding error bounds
   bool either = false;  ///< each within that, or below the tolerance times the forces in the scene
 };
 
@@ -55,8 +55,8 @@ inline constexpr int kMaxPathIterations = 20;
 /// Contraction of corrections on a path: Newton's method converges where they halve [Deuflhard 2011, section 5.1].
 inline constexpr double kMaxContraction = 0.5;
 
-/// True if a correction of a prediction is too long for what it leads to to lie on the same path [m]. `bound`: the
-/// prediction for the first correction, kMaxContraction times the one before for others.
+/// True if a correction [m] of a prediction is so long that its result may lie on another path. `bound` is the
+/// prediction for the first correction, and kMaxContraction times the previous correction for others.
 bool leaves_path(double correction, double bound, double predicted, double tolerance);
 
 /// A solution predicted from another one on the same path, with its axial forces in work.axial_force if it has them.
@@ -72,15 +72,15 @@ struct Prediction {
 
 /// Options of one solve.
 struct SolveOptions {
-  const VectorX* target = nullptr;  ///< what F(z) is to be; nothing: zero
+  const VectorX* target = nullptr;  ///< required value of F(z); null: zero
   int max_iterations = 40;
-  int free_steps = 0;   ///< so many iterations whose steps are taken whole do not count
-  bool mixed = true;    ///< with the axial forces as unknowns of their own, where the options allow it
-  double interval = 0;  ///< of a time step [s], whose matrix may serve several iterations and the steps to come; the
-                        ///< mixed method then sets out from work.axial_force. 0: a new matrix every iteration
+  int free_steps = 0;   ///< number of full steps that do not count as iterations
+  bool mixed = true;    ///< true to use axial forces as unknowns, if the options allow it
+  double interval = 0;  ///< interval of a time step [s], whose matrix may serve several iterations and later steps. The
+                        ///< mixed method then starts from work.axial_force. 0: a new matrix every iteration
   bool hold_neutral = false;              ///< keeps neutral motions from going anywhere by rounding; slows fine rods
-  double regularisation = 1;              ///< by which friction's slip tolerance is greater, in a continuation
-  const Prediction* predicted = nullptr;  ///< how z was found, if it was from another solution
+  double regularisation = 1;              ///< factor of friction's slip tolerance in a continuation
+  const Prediction* predicted = nullptr;  ///< prediction of z from another solution, or null
 };
 
 class Newton {

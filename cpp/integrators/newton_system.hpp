@@ -22,21 +22,21 @@ struct NewtonWorkspace {
   ContactLinearisation contact;
   MatrixRecord matrix;
   GuessRecords guesses;
-  double finest = INFINITY;  ///< [m], a step tolerance that error control wants; that of the options is an upper bound
+  double finest = INFINITY;  ///< step tolerance of the error control [m]; that of the options is an upper bound
   Counters counters;
-  std::function<void()> poll = [] {};  ///< asked once an iteration; what it throws ends the solve
+  std::function<void()> poll = [] {};  ///< called once per iteration; its exception ends the solve
 };
 
-/// Rounding error of a number, over it; and the bound of what the rounding errors of a sum over many of them may reach:
-/// larger numbers are surely not zero.
+/// Relative rounding error of a number, and the relative bound of the rounding error of a sum of many numbers. Larger
+/// numbers are certainly not zero.
 inline constexpr double kEpsilon = std::numeric_limits<double>::epsilon(), kMaxRounding = 64.0 * kEpsilon;
 /// Share of the diagonal of a stiffness, per row. Adding the share kEpsilon keeps neutral motions (of a free body, of a
 /// rod that may spin about its axis) from going anywhere by rounding. Subtracting the share kMaxRounding leaves motions
 /// positive that are surely not neutral. Needs the matrix of the last evaluation.
 VectorX neutral_shift(const Equations& equations, double share);
 
-/// Factorises the matrix as it is, `hold_neutral` with what keeps neutral modes from going anywhere by rounding; one
-/// that is singular is held by a shift far below every stiffness.
+/// Factorises the matrix; with `hold_neutral` it adds the shift that keeps rounding from moving neutral modes. A
+/// singular matrix gets a shift far below every stiffness.
 bool factorize(Equations& equations, NewtonWorkspace& work, bool hold_neutral = false);
 
 struct NewtonSystem {
@@ -45,10 +45,10 @@ struct NewtonSystem {
   NewtonWorkspace& work;
   bool hold_neutral = false;
 
-  /// Residual, and matrix where it is asked for.
+  /// Computes the residual, and optionally the matrix.
   void evaluate(const VectorX& z, bool matrix, const double* axial_force = nullptr) const;
   bool factorize() const { return withe::factorize(equations, work, hold_neutral); }
-  /// step = -A^-1 residual, with the matrix as it is factorised.
+  /// step = -A^-1 residual, with the factorised matrix.
   void solve_for(VectorX& step) const;
 };
 

@@ -25,9 +25,9 @@ struct Options {
   double step_tolerance = 1e-9;   ///< Newton step, relative to the length of the scene
   double force_tolerance = 1e-8;  ///< residual, relative to the forces in the scene
   int max_iterations = 40;        ///< per Newton solve
-  std::optional<long> max_steps;  ///< inner steps in one time step under `tolerance`; nothing: see `kMaxWork`
+  std::optional<long> max_steps;  ///< inner steps in one time step under `tolerance`; empty: see `kMaxWork`
   int max_halvings = 12;          ///< smallest step is time_step / 2^max_halvings
-  Without heuristics;             ///< all are used but for measurements
+  Without heuristics;             ///< heuristics that measurements switch off
 };
 
 /// True for rules that conserve energy or gain it as the midpoint rule does, with forces in the middle of each step.

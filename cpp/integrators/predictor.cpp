@@ -59,7 +59,7 @@ void Predictor::record(const Step& step, const VectorX& v0, const VectorX& veloc
                        const VectorX& weight) {
   resize(acceleration.size());
   for (int i = 0; i < count_; ++i)
-    if (time_[static_cast<std::size_t>(i)] == step.middle) count_ = i;  // the same step again
+    if (time_[static_cast<std::size_t>(i)] == step.middle) count_ = i;  // a repetition of this step
   choose(step, v0, velocity, weight);
   for (History* history : {&acceleration_, &velocity_})
     std::rotate(history->begin(), history->end() - 1, history->end());

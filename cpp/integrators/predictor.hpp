@@ -17,7 +17,7 @@ class Predictor {
  public:
   static constexpr int kDepth = 4, kSlots = 5;
 
-  /// Quantity that is extrapolated, and the number of last steps; accelerations through none: v0 goes on.
+  /// Extrapolated quantity, and its number of last steps. With no accelerations, v0 is constant.
   struct Choice {
     bool velocities = false;
     int points = 1;
@@ -34,7 +34,7 @@ class Predictor {
     for (VectorX& a : slow_) a.resize(0);
   }
   bool empty() const { return count_ == 0; }
-  /// Mean velocity of the last step, where there is one.
+  /// Mean velocity of the last step, if there is one.
   const VectorX& latest() const { return velocity_[0]; }
   Choice choice(int slot) const {
     const Choice best = best_[static_cast<std::size_t>(slot)];
@@ -42,12 +42,12 @@ class Predictor {
   }
   /// Mean velocity expected of a step that starts with `v0`.
   void predict(const Step& step, const VectorX& v0, VectorX& out) const;
-  /// Takes in a step from velocity `v0`; `weight` per unknown says how much an error there matters.
+  /// Adds a step from velocity `v0`; `weight` is the weight of errors per unknown.
   void record(const Step& step, const VectorX& v0, const VectorX& velocity, const VectorX& acceleration,
               const VectorX& weight);
 
-  /// Derivative of the accelerations in time, of an odd `order` up to three, through order + 2 running means that each
-  /// forget `share` of the past in a step of dt. To be asked for in every step or in none.
+  /// Derivative of the accelerations in time, of an odd `order` up to three, from order + 2 running means. Each mean
+  /// forgets `share` of the past in a step of dt. Call it in every step or in none.
   void differentiate(int order, double share, double dt, const VectorX& acceleration, VectorX& out);
 
   void resize(Eigen::Index size) {
@@ -78,7 +78,7 @@ class Predictor {
  private:
   using History = std::array<VectorX, kDepth>;
 
-  /// Calls `use` with an expression, so that what it is compared with is computed in the same pass.
+  /// Calls `use` with an expression, so that the comparison is computed in the same pass.
   template <class Use>
   void extrapolated(double time, const History& history, int points, const Use& use) const;
   template <class Use>

@@ -36,9 +36,9 @@ double free_slope(const Equations& equations, int contact, VectorX& out) {
   return all;
 }
 
-/// Contact opposite to one: a motion that relieves one contact presses on the other by the share `c`: neither is
-/// relieved where the sum of their depths is too great, whatever moves. Such a contact moves what moves the first most,
-/// which few do.
+/// Contact opposite to another one. A motion that relieves the first contact presses on the opposite one by the share
+/// `c`. If the sum of their depths is too great, no motion relieves both. The opposite contact is found on the unknowns
+/// that move the first contact most, which are few.
 int opposite_contact(const Equations& equations, int contact, double allowed, double free, const VectorX& slope,
                      VectorX& other) {
   const ContactSet& set = equations.contact()->contacts();

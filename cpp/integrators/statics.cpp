@@ -36,21 +36,20 @@ constexpr int kMaxKinksOfRing = 2;
 constexpr int kMaxPoints = 1000;
 // Jumps between branches on the way to one equilibrium.
 constexpr int kMaxJumps = 20;
-// Increments from the end of a path to where the scene goes on, of the length of the last one tried.
+// Increments from the end of a path to the start of the dynamic continuation, in lengths of the last one tried.
 constexpr double kJumpIncrements = 4.0;
 // Turn in a jump from which on the branch has changed [rad].
 constexpr double kMinJumpTurn = 0.25 * kMaxPointTurn;
 // Displacement in an interval over the length of the scene, below which the scene is slow, and below which Newton's
 // method without inertia takes it to its equilibrium.
 constexpr double kMaxSlowMove = 1e-4, kMaxNearMove = 1e-7;
-// Displacement over that of the last failure of Newton's method without inertia, from which on it is tried again.
+// Displacement, over that of the last failure of Newton's method without inertia, at which the method is tried again.
 constexpr double kMaxRetryMove = 0.1;
 // Intervals in which a scene settles.
 constexpr int kMaxIntervals = 400;
 // Intervals after which they may be twice as long, where loads without a potential drive the scene round.
 constexpr int kIntervalsPerDoubling = 50;
-// Difference of the gains on the two sides of a saddle, over the gain, up to which the sides are alike but for
-// rounding.
+// Difference of the gains on the two sides of a saddle, over the gain, up to which the sides count as equal.
 constexpr double kMaxGainDifference = 1e-6;
 
 class Statics {
@@ -158,7 +157,7 @@ class Statics {
     return Point::on_path;
   }
 
-  /// Goes to the next point, tries a smaller increment, or jumps. False where there are too many jumps, or one fails.
+  /// Goes to the next point, tries a smaller increment, or jumps. False after too many jumps, or if one fails.
   bool walk_on(Walk& walk, StaticResult& result) {
     // The tangent of an unsupported mechanism is rounding: its path ends where it begins.
     const bool singular = tangent_.found && tangent_.turn > kMinSingularTurn;
@@ -213,7 +212,7 @@ class Statics {
     return true;
   }
 
-  /// Forces may come all at once to a scene that goes on dynamically; supports may not.
+  /// A scene that continues dynamically may receive all forces at once, but not all motion of supports.
   double beyond_jump(double reached, double increment) const {
     return path_.supports_move() ? std::min(1.0, reached + kJumpIncrements * increment) : 1.0;
   }
@@ -221,8 +220,8 @@ class Statics {
   /// The point of the path at the factor `next`, predicted along the tangent.
   bool reach(double next, double increment, NewtonResult& last) {
     path_.go_to(next);
-    // With contact, corrections shrink less than on smooth paths, but lead no farther than the prediction does:
-    // what slides without friction would go off. Rings have kinks.
+    // With contact, corrections shrink less than on smooth paths, but they are no longer than the prediction: surfaces
+    // that slide without friction would otherwise slide away. Rings have kinks.
     const bool touching = equations_.contact() && equations_.contact()->count() > 0;
     const int rings = equations_.hands() ? equations_.hands()->rings().count() : 0;
     Prediction prediction{.length = 0.0, .strict = !touching, .kinks = kMaxKinksOfRing * rings};
@@ -232,7 +231,7 @@ class Statics {
       prediction.length = newton_.norms().displacement(step_);
       if (next < 1.0 && !touching && rings == 0)
         prediction.enough = kMaxWaypointCorrection * equations_.model().length_scale;
-      // Axial forces by the linear solution: those of the prediction are of edges that stretch as they turn.
+      // Axial forces come from the linear solution: the edges of the prediction stretch as they turn.
       equations_.evaluate(state_.q, false, nullptr, work_.data);
       predict_axial_force(equations_.problem(), work_.data, step_, work_.axial_force);
       z_ = state_.q + step_;
@@ -270,7 +269,7 @@ class Statics {
     return !equations_.contact() || equations_.allowed(state_.q, z - state_.q) == 1.0;
   }
 
-  /// Jump at the end of the path: goes on dynamically, to what the scene settles in a little behind.
+  /// Jump at the end of the path: the scene moves dynamically to the next equilibrium.
   bool jump(double next, double increment, StaticResult& result) {
     path_.go_to(next);
     const VectorX before = state_.q;
@@ -289,14 +288,16 @@ class Statics {
     return true;
   }
 
-  /// Pseudo-transient: backward Euler from rest, over and over, with intervals that grow as the scene settles. They are
-  /// no time: what resists rates does not act, so that equilibria do not depend on viscosity or drag. Each
-  /// one minimises the potential plus M |z - q|^2 / (2 h^2), which is convex where the interval begins: Newton's method
-  /// is not drawn back to a saddle, nor across it. Mixed Newton keeps slender rods from crawling. Where next to nothing
-  /// moves any more, Newton's method without inertia ends it, unless it leads away, as back to a saddle.
-  /// Loads without a potential drive the scene round its equilibria, if not for ever. Their problem is monotone,
-  /// instead of convex, where an interval begins; intervals are kept so short only until the scene is slow. After every
-  /// kIntervalsPerDoubling intervals the longest interval is twice as long, as longer intervals damp more.
+  /// Pseudo-transient continuation: backward Euler from rest, repeatedly, with intervals that grow as the scene
+  /// settles. The intervals are no physical time: rate-dependent resistance does not act, so equilibria do not depend
+  /// on viscosity or drag. Each interval minimises the potential plus M |z - q|^2 / (2 h^2), which is convex where the
+  /// interval begins. Newton's method is then neither drawn back to a saddle, nor across it. Mixed Newton keeps slender
+  /// rods from slow progress. When almost nothing moves, Newton's method without inertia ends the search, unless it
+  /// leads away, for example back to a saddle.
+  ///
+  /// Loads without a potential may drive the scene around its equilibria for a long time. Their problem is monotone,
+  /// instead of convex, where an interval begins. Intervals stay short enough for this only until the scene is slow.
+  /// After every kIntervalsPerDoubling intervals the longest interval doubles, because longer intervals damp more.
   bool settle(double factor, StaticResult& result) {
     const bool conservative = equations_.has_potential();
     evaluate(factor);
@@ -440,8 +441,8 @@ class Statics {
     return false;
   }
 
-  /// At the present state, with loads and supports at a factor: what is left out of balance there, the matrix, and the
-  /// potential of the problem with it.
+  /// Evaluates the present state, with loads and supports at a factor: its imbalance, its matrix, and the potential
+  /// of the problem with this imbalance.
   void evaluate(double factor) {
     path_.go_to(factor);
     path_.evaluate(state_.q, true, nullptr);
@@ -452,8 +453,8 @@ class Statics {
     return signs_.stable(state_, work_.data);
   }
 
-  /// Goes off along the lowest mode, to the side where the potential is lower, whichever way the scene lies in space;
-  /// every other try to the other one. The sides of a symmetric scene are alike but for rounding.
+  /// Moves along the lowest mode, to the side with the lower potential, for any orientation of the scene. Every other
+  /// try goes to the other side. The sides of a symmetric scene differ only by rounding.
   void leave_saddle(double factor, int tries) {
     evaluate(factor);
     const double here = work_.data.potential;
@@ -487,7 +488,7 @@ class Statics {
   Homotopy path_;
   Homotopy::Tangent tangent_;
   StiffnessSigns signs_;
-  bool neutral_ = false;  ///< whether something may move at no cost, and is held by as much as rounding
+  bool neutral_ = false;  ///< true if a motion is neutral, and is held by a shift as small as rounding
   VectorX step_, z_;
 };
 

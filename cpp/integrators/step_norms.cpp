@@ -10,7 +10,7 @@ namespace {
 // Longer steps are shortened: beyond a right angle the linear solution has no meaning.
 constexpr double kMaxMove = 0.5, kMaxAngle = 1.5, kMaxEdgeTurn = 1.0;
 
-/// Greatest square of vectors of so many unknowns.
+/// Greatest squared norm of vectors of this number of unknowns.
 template <int Size>
 double greatest_square(const std::vector<int>& firsts, const VectorX& step) {
   double square = 0.0;

@@ -18,14 +18,14 @@ class StiffnessSigns {
   LinearSolver& symmetric_part();
   /// Factorises a symmetric matrix plus `damping` of the weight; whether all its eigenvalues are positive.
   bool definite(LinearSolver& stiffness, double damping, const VectorX& weight);
-  /// True if no motion lowers the potential; of unsymmetric equations where there is none, whether they can be solved.
-  /// `data`: of the evaluation, and scratch.
+  /// True if no motion lowers the potential. For unsymmetric equations without a potential: true if the matrix is
+  /// regular. `data` has the evaluation, and is scratch.
   bool stable(const State& state, StepData& data);
   /// True if a motion is neutral, as of a free body, or of a rod that may spin about its axis; of unsymmetric
   /// equations, whether one may be.
   bool neutral(const State& state, StepData& data);
-  /// Neutral motion of length 1 where there is a potential, or nothing. `slack`: times what is rounded here, as what
-  /// was given may be: a drawing that is straight but for its last digits prefers one side.
+  /// Neutral motion of length 1 if there is a potential, or empty. `slack` multiplies the rounding error, because input
+  /// may be rounded: a drawing that is straight except for its last digits prefers one side.
   VectorX neutral_motion(const State& state, StepData& data, double slack = 1.0);
   /// Direction of the most negative curvature against mass, by inverse iteration on a matrix that is shifted
   /// until it is definite.
@@ -33,14 +33,14 @@ class StiffnessSigns {
 
  private:
   struct Lowest {
-    double curvature, unknown;  ///< along a mode, and what rounding and the imbalance may make of it
+    double curvature, unknown;  ///< curvature along a mode, and its uncertainty from rounding and imbalance
   };
   Lowest lowest(const VectorX& mode, const State& state, StepData& data);
 
   Equations& equations_;
   const StepNorms& norms_;
   Counters& counters_;
-  std::unique_ptr<LinearSolver> symmetric_;  ///< of the assembler's `generation_`
+  std::unique_ptr<LinearSolver> symmetric_;  ///< solver for the assembler's `generation_`
   int generation_ = -1;
   VectorX shift_;
 };

@@ -3,7 +3,7 @@
 namespace withe {
 namespace {
 
-// Halvings of a step before it is taken as it is: a thousandth of the step is left.
+// Halvings before a step is accepted without a test: a thousandth of the step is left.
 constexpr int kMaxHalvings = 10;
 // Share of an uphill step that must be kept; else the step is solved again with a matrix that lacks the geometric
 // stiffness of contact. Three halvings cost about as much as a new matrix.
@@ -39,7 +39,7 @@ bool SurfaceSearch::run(const VectorX& z, double& shorten) {
   return true;
 }
 
-/// Share of the step that leads on, and more than `least`; else as it is at the last, not evaluated.
+/// Share of the step that passes a test, if above `least`; otherwise the last share, not evaluated.
 double SurfaceSearch::search(const VectorX& z, double least, double shorten) {
   NewtonWorkspace& work = system_.work;
   const StepData& e = work.data;

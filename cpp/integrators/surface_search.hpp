@@ -20,10 +20,9 @@ class SurfaceSearch {
   SurfaceSearch(const StepNorms& norms, const NewtonSystem& system, const Without& heuristics)
       : norms_(norms), system_(system), heuristics_(heuristics) {}
 
-  /// Shortens a step from z to what neither turns nor moves anything too far, and brings no surfaces too near; returns
-  /// by how much.
+  /// Shortens a step from z so that nothing turns or moves too far, and no surfaces come too near. Returns the factor.
   double shortened(const VectorX& z, VectorX& step) const;
-  /// Shortens `work.step`, which has been by `shorten` already, to what leads on. False where no step could be made.
+  /// Shortens `work.step`, already shortened by `shorten`, until it passes a test. False if no step could be computed.
   bool run(const VectorX& z, double& shorten);
   void forget() { evaluated_ = solved_ = remade_ = false; }
 

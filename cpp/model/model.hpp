@@ -204,8 +204,8 @@ struct Model {
   std::vector<std::vector<StencilPlace>> place;  ///< [rod][stencil]
   std::vector<Vector2> planar_components;        ///< per rod: kappa = p . (kappa1, kappa2)
   std::vector<std::vector<int>> wall_half;       ///< [rod]: halves at its first and last node, or -1
-  /// Per stencil: discrete strains on top of the natural ones, of the drawing (at joints of form `pairs`, and where
-  /// rods are joined at an angle) and of ends without correction.
+  /// Per stencil: discrete strains that are added to the natural ones. They come from the drawing (at joints of form
+  /// `pairs`, and where rods are joined at an angle) and from ends without correction.
   MatrixX3 bend_offset, half_offset;
   std::vector<std::pair<int, int>> bend_owner;  ///< (rod, stencil), or (-1, -1) across rods
   std::vector<int> bend_across;                 ///< stencils across rods

@@ -64,7 +64,7 @@ void CustomTerm::for_each_derivative(const StepProblem& problem, const Add& add)
   if (problem.resists()) visit(found_.by_velocity, 1.0 / problem.interval);
 }
 
-/// Whole nodes are coupled, so that what supports hold can be projected out.
+/// Couples whole nodes, so that supported directions can be projected out.
 void CustomTerm::couple(const StepProblem& problem, Assembler& assembler) {
   const Model& model = problem.model;
   const std::vector<LoadPiece>& pieces = problem.loads.pieces;

@@ -165,7 +165,7 @@ void register_elastica(py::module_& module) {
              py::arg("sheet_length"), py::arg("width"),
              "A sheet moved from pose to pose, sliding by Coulomb's law: one row a pose, and how far it has slid.");
   module.def("slides_to_rest", &slides_to_rest, py::arg("forces"), py::arg("friction"), py::arg("sheet_length"),
-             py::arg("width"), "How far sheets that are held still slide until friction holds them.");
+             py::arg("width"), "Return the distances that sheets with resting jaws slide until friction holds them.");
 }
 
 }  // namespace withe::bindings

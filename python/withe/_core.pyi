@@ -1502,7 +1502,7 @@ def slides_to_rest(
     width: SheetWidth,
 ) -> numpy.typing.NDArray[numpy.float64]:
     """
-    How far sheets that are held still slide until friction holds them.
+    Return the distances that sheets with resting jaws slide until friction holds them.
     """
 
 def smooth_curvatures(

@@ -36,7 +36,7 @@ class Lanes:
         self._all.flags.writeable = False
         self._rods: dict[str, RodPart] = {}
         self._voronoi: dict[int, FloatArray] = {}
-        self._restorations = np.zeros(len(simulations), np.int64)  # of those that have failed, when they did
+        self._restorations = np.zeros(len(simulations), np.int64)  # counts at which simulations failed
         self._nodes = [len(self.first._session.directory.layout.rows(rod.index)) for rod in self.first.rods]
 
     def __len__(self) -> int:

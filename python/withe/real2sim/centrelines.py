@@ -25,10 +25,10 @@ __all__ = ["Centrelines", "rest_shape"]
 
 FloatArray = npt.NDArray[np.float64]
 
-_RESOLVED = 1e-6  # of the extent of a centreline: what fits resolve
-_FOLLOWED = 1e-3  # of that extent: what a basis may miss of it without a reason
+_RESOLVED = 1e-6  # relative to the extent of a centreline: resolution of fits
+_FOLLOWED = 1e-3  # relative to that extent: largest deviation of a fit that counts as followed
 _ON_THE_WAY = 12  # iterations of fits with fewer functions than the last
-_CHANCE = 1e-6  # probability below which a gain by more functions is none of chance
+_CHANCE = 1e-6  # a gain by more functions is significant if its probability by chance is below this
 
 
 @dataclass(eq=False, repr=False)
