@@ -13,8 +13,7 @@
 ///   dphi_a = (e^0 x du - 2 (t . du) e^0 x t) / |u|^2 + (theta - theta^0) (1 - t t^T) du / |u| + t dtheta,
 ///
 /// where energy-momentum steps use `working_turn` as the angle. The arms are -rho_a c and rho_b c, where c = D or, on
-/// an
-/// obstacle, c = n. With omega = rho_a phi_a + rho_b phi_b, the slip S and the force F are:
+/// an obstacle, c = n. With omega = rho_a phi_a + rho_b phi_b, the slip S and the force F are:
 ///
 ///   S = (1 - n n^T) T,    T = sum_i w_i (x_i - x_i^0) - omega x c less an obstacle's motion,
 ///
@@ -25,8 +24,7 @@
 ///   E = g (1 - n n^T) + 2 g' S S^T,
 ///
 /// where T and S of an anchor include its stick. The force acts as w_i F on the ends, and as couples of m = F x c on
-/// the
-/// edges and their angles:
+/// the edges and their angles:
 ///   rho (m x t / |e| + (t . m) spin),  rho t . m.
 
 #include "contact/friction.hpp"

@@ -20,8 +20,7 @@ enum class Guess : std::size_t {
   /// shorter steps without it.
   continuation,
   /// A steady motion, without axial forces as unknowns. A soft helix whose edges turn by a radian in a step needs
-  /// shorter
-  /// steps without it.
+  /// shorter steps without it.
   plain,
 };
 constexpr std::array kGuesses{Guess::accelerated, Guess::rest, Guess::continuation, Guess::plain};

@@ -50,8 +50,7 @@ struct Hinge {
 
 /// The angle of a revolute joint by the unknowns, 0 as drawn: sign (q[turning] - q[against]). In space a hinge has its
 /// own unknown, and `against` is unused. In a plane the hinge lies between two frames. In a plane nothing turns about
-/// an
-/// axis that lies in it.
+/// an axis that lies in it.
 struct JointAngle {
   int turning = -1, against = -1;
   double sign = 1;
@@ -138,8 +137,7 @@ struct SurfaceParameters {
 };
 
 /// Parameters that may change during a run, with one entry per edge, stencil or node. The parameters that users set
-/// have
-/// names in parameter_index.hpp.
+/// have names in parameter_index.hpp.
 struct Parameters {
   VectorX edge_stretch;  ///< EA [N]
   MatrixX2 edge_bend;    ///< EI1, EI2 [N m^2]
@@ -257,8 +255,7 @@ void update_natural(const Model& model, Parameters& parameters);
 void update_natural(const Model& model, Parameters& parameters, int rod);
 
 /// The plane that contains the whole scene, or none (with the reason). A straight scene has a plane only if `asked`:
-/// the
-/// plane of its first director.
+/// the plane of its first director.
 std::optional<Plane> find_plane(const SceneDescription& description, std::optional<bool> asked, std::string& reason);
 
 /// Square of the angle by which an arc of `arc` over a chord of `chord` turns [rad^2], to its fourth power.

@@ -24,13 +24,14 @@ void add_coefficients(const ContactProblem& problem, const ContactPair& pair, co
     out.friction += by_friction.sum();
 }
 
-/// Contact is as it is where rods and an obstacle are elsewhere by the same: derivatives by the obstacle's place are
-/// those by all nodes, turned round. Its velocity is its way in the step over the time.
+/// Adds derivatives by the position of an obstacle. Contact does not change if rods and obstacle move by the same
+/// displacement. Therefore these derivatives are minus the sum of those by all nodes. The velocity of the obstacle is
+/// its displacement in the step divided by the duration.
 void add_obstacle(const Model& model, const ContactPair& pair, const int (&dofs)[kContactUnknowns],
                   const ContactAdjoint& by, const double (&by_end)[kContactUnknowns], double duration,
                   StepAdjoint& adjoint) {
   const int obstacle = -1 - pair.key.b;
-  constexpr int kCoordinates = 12;  // of nodes, before angles
+  constexpr int kCoordinates = 12;  // number of unknowns of nodes; angles follow
   for (int k = 0; k < kCoordinates; ++k) {
     const int axis = k % 3;
     if (dofs[k] < 0 || axis >= model.dimension) continue;

@@ -1,6 +1,6 @@
 #pragma once
-/// Contact among the equations. It acts at the end of the step: its forces are those there, and its matrix counts twice
-/// where z is the middle.
+/// Contact in the equations. It acts at the end of the step: its forces are the forces at the end. If z is the middle
+/// of the step, its matrix counts twice.
 
 #include "steps/contact_rows.hpp"
 #include "steps/term.hpp"
@@ -25,11 +25,12 @@ class ContactForces final : public Term {
                    StepAdjoint& adjoint) const override;
   void add_rounding(const StepProblem& problem, StepData& data) const override;
 
-  /// True if anything touches at z.
+  /// True if anything is in contact at z. Updates the contacts for an evaluation at z.
   bool touches(const StepProblem& problem, const VectorX& z);
   /// Share of a step of z that contact allows, from 0 to 1.
   double allowed(const StepProblem& problem, const VectorX& z, const VectorX& step);
-  /// Predicts the friction of a step of Newton's method from the last evaluation, of which `kept` is left.
+  /// Predicts the friction of a step of Newton's method from the last evaluation. `kept`: share of its full length to
+  /// which `step` has been shortened.
   void predict_friction(const StepProblem& problem, const VectorX& step, double kept,
                         ContactLinearisation& linearisation);
   /// Energy that contact removes from the motion over `change`, and from moving obstacles, without storing it [J].

@@ -52,7 +52,8 @@ void CustomTerm::add_applied(const StepProblem&, const StepData& data, const Ass
   force += data.custom.force;
 }
 
-/// Calls add(row, column, value) for dF/dz, with v = (z - q0) / h: a row is 3 node + axis, from 3 nodes on of a moment.
+/// Calls add(row, column, value) for dF/dz, with v = (z - q0) / h: a row is 3 node + axis for a force, and 3 (nodes +
+/// node) + axis for a moment.
 template <class Add>
 void CustomTerm::for_each_derivative(const StepProblem& problem, const Add& add) const {
   const auto visit = [&](const SparseMatrix& matrix, double factor) {
@@ -69,7 +70,7 @@ void CustomTerm::couple(const StepProblem& problem, Assembler& assembler) {
   const Model& model = problem.model;
   const std::vector<LoadPiece>& pieces = problem.loads.pieces;
   const int nodes = model.node_count;
-  std::vector<std::pair<int, int>> coupled;  // node, or nodes + node of a moment; and the node that it depends on
+  std::vector<std::pair<int, int>> coupled;  // node (for a moment: nodes + node), and the node on which it depends
   for_each_derivative(problem, [&](int row, int column, double) { coupled.emplace_back(row / 3, column / 3); });
   std::sort(coupled.begin(), coupled.end());
   coupled.erase(std::unique(coupled.begin(), coupled.end()), coupled.end());
@@ -101,7 +102,7 @@ void CustomTerm::add_matrix(const StepProblem& problem, const StepData& data, co
   const Model& model = problem.model;
   const LinearSolver& solver = assembler.solver();
   const int nodes = model.node_count, size = model.dimension;
-  Matrix3 axes = Matrix3::Identity();  // rows: those of the unknowns
+  Matrix3 axes = Matrix3::Identity();  // rows: axes of the unknowns
   if (model.planar()) axes << model.plane->first.transpose(), model.plane->second.transpose(), Vector3::Zero();
   const auto add_row = [&](int row, int column, double value) {
     const int first = model.node_dof[at(column / 3)];
@@ -120,7 +121,7 @@ void CustomTerm::add_matrix(const StepProblem& problem, const StepData& data, co
     const int node = row / 3 - nodes;
     for (std::size_t k : moment_pieces_[at(node)]) {
       load_local(model, *problem.start, data.z, data.configuration, problem.loads.pieces[k], Vector3::Unit(row % 3),
-                 local);  // what a moment does is linear in it
+                 local);  // the effect of a moment is linear in the moment
       const ElementTable& table = loads_->tables()[k];
       for (int i = 0; i < table.width(); ++i)
         if (table.dofs(0)[i] >= 0) add_row(table.dofs(0)[i], column, value * local.gradient[i]);

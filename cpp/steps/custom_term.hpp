@@ -1,5 +1,5 @@
 #pragma once
-/// Custom forces among the equations: see forces/custom_forces.hpp.
+/// Custom forces in the equations: see forces/custom_forces.hpp.
 
 #include "steps/load_forces.hpp"
 
@@ -7,7 +7,7 @@ namespace withe {
 
 class CustomTerm final : public Term {
  public:
-  /// `loads` has the pieces of moments, where there are any, and must outlive it.
+  /// `loads` has the pieces of moments, if there are any, and must outlive the term.
   explicit CustomTerm(const LoadForces* loads) : loads_(loads) {}
 
   bool has_potential() const override { return false; }
@@ -27,11 +27,11 @@ class CustomTerm final : public Term {
                   std::span<double> values) const;
 
   const LoadForces* loads_;
-  CustomForces found_;                                   ///< with derivatives, of the last evaluation with a matrix
-  std::vector<std::vector<std::size_t>> moment_pieces_;  ///< of custom moments, per node
+  CustomForces found_;                                   ///< of the last evaluation with a matrix, with derivatives
+  std::vector<std::vector<std::size_t>> moment_pieces_;  ///< pieces of custom moments, per node
 };
 
-/// Forces and moments (where there are any), per node in world axes, as the equations take them.
+/// Converts forces and moments (if there are any), per node in world axes, to the form of the equations.
 AppliedForces applied_forces(const Model& model, const MatrixX3& forces, const MatrixX3& moments);
 /// Custom forces of a problem that does not solve for them.
 AppliedForces given_forces(const StepProblem& problem);

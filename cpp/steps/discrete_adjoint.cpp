@@ -7,7 +7,7 @@
 namespace withe {
 namespace {
 
-/// By how what is attached to the frame of a half stencil is turned.
+/// Adds derivatives by the rotation of the part that is attached to the frame of a half stencil.
 void add_attachment(const StepProblem& problem, const StepData& data, const Assembler& assembler,
                     const DiscreteAdjoint& discrete, int h, CoefficientAdjoint& by) {
   const Model& model = problem.model;
@@ -23,7 +23,8 @@ void add_attachment(const StepProblem& problem, const StepData& data, const Asse
   add(discrete.backwards(), problem.start_configuration, problem.start->q);
 }
 
-/// Adds derivatives by turns of a half stencil's frame, and of what is attached to it, through the strain at the start.
+/// Adds derivatives by rotations of the frame of a half stencil, and of the attached part, through the strain at the
+/// start.
 void add_start_turns(const StepProblem& problem, int h, const StencilAdjoint& part, const std::array<double, 3>& factor,
                      StepAdjoint& adjoint) {
   const Model& model = problem.model;
@@ -56,7 +57,7 @@ void ElasticForces::add_discrete_adjoint(const StepProblem& problem, const StepD
   const DiscreteStep& step = discrete.forth();
   VectorX axial(model.edge_count), modulus(model.edge_count);
   for (int e = 0; e < model.edge_count; ++e) {
-    // The force is EA (mean strain - natural strain) along this.
+    // The force is EA (mean strain - natural strain) along `mean`.
     const MeanStretch mean = mean_stretch(model, acting, step.start, step.end, e);
     const EdgeFrame<double>& f = step.middle.edge[at(e)];
     gather(assembler.stretch, e, discrete.rows(), rows);

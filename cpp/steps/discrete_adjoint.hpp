@@ -11,9 +11,9 @@
 
 namespace withe {
 
-/// Adjoint of discrete gradients. They are functions of the two ends of a step alone, but for what torques leave nodes
-/// of the directors' transport, spin times the torque; and those which exchange the ends leave alone. So derivatives by
-/// the start are those by the end of the step backwards.
+/// Adjoint of discrete gradients. A discrete gradient depends only on the two ends of a step, apart from the force that
+/// a torque adds at nodes by the transport of the directors: spin times the torque. It does not change if the two ends
+/// are exchanged. Therefore the derivatives by the start are the derivatives by the end of the reversed step.
 class DiscreteAdjoint {
  public:
   DiscreteAdjoint(const StepProblem& problem, const StepData& data, const VectorX& rows, StepAdjoint& adjoint)
@@ -28,12 +28,13 @@ class DiscreteAdjoint {
     const Model& model = problem.model;
     for (int dof : model.frame_dof) {
       if (model.planar()) break;
-      // Backwards a frame turns by the opposite Cayley vector. Its rows are moments.
+      // In the reversed step a frame turns by the opposite Cayley vector. Its rows are moments.
       back_q_.segment<3>(dof) = back_.segment<3>(dof);
       rows_.segment<3>(dof) = (cayley_spin(data.z.segment<3>(dof)) * rows_.segment<3>(dof)).eval();
     }
     for (int e = 0; !model.planar() && e < model.edge_count; ++e) {
-      // The start's angles as those of a step backwards: counted from where the end's tangents are.
+      // Angles at the start, as the reversed step has them: measured from the directors carried to the tangents at the
+      // end.
       EdgeFrame<double>& start = start_.edge[at(e)];
       const Vec3d& source = data.end_configuration.edge[at(e)].tangent;
       start.spin = (-start.inverse_length / (1.0 + dot(source, start.tangent))) * cross(source, start.tangent);
@@ -43,9 +44,9 @@ class DiscreteAdjoint {
     }
   }
 
-  /// `evaluate(step, k, with_matrix, local)`, with stiffnesses and natural strains `k`: those of elasticity, by which
-  /// derivatives are found, or those that are `acting`; `frame`: -1, or whose unknowns are among the element's.
-  /// Returns what rows^T makes of a unit moment on each of the mean strains.
+  /// `evaluate(step, k, with_matrix, local)` takes stiffnesses and natural strains `k`: those of elasticity, by which
+  /// derivatives are taken, or those that are `acting`. `frame`: the frame whose unknowns are among those of the
+  /// element, or -1. Returns rows^T times the forces of a unit moment on each of the mean strains.
   template <class Evaluate>
   std::array<double, 3> add_turning(const ElementTable& table, int i, const TurnCoefficients& k,
                                     const TurnCoefficients& acting, const Angles& angles, int frame,
@@ -55,7 +56,7 @@ class DiscreteAdjoint {
     return add_turning(table, i, rows, k, acting, angles, frame, evaluate, by_stiffness, by_natural).along;
   }
 
-  /// Derivatives of rows^T times what one element adds.
+  /// Derivatives of rows^T times the contribution of one element.
   struct Turning {
     std::array<double, 3> along{};        ///< by unit moments on the mean strains
     std::array<double, kMaxLocal> end{};  ///< by its unknowns at the end of the step
@@ -90,14 +91,13 @@ class DiscreteAdjoint {
     return out;
   }
 
-  /// From derivatives by a frame's Cayley vector at the end of a step to those by its rotation vector there.
+  /// Converts derivatives by the Cayley vector of a frame at the end of a step into derivatives by its rotation vector.
   Vector3 by_spin(const DiscreteStep& step, int frame, const double* by) const {
     const int dof = problem_.model.frame_dof[at(frame)];
     return cayley_spin(step.end_q.segment<3>(dof)).transpose().inverse() * Eigen::Map<const Vector3>(by);
   }
 
-  /// q1 = 2 z - q0, and matrices of steps are twice derivatives by their ends. Returns those by the start and by the
-  /// end.
+  /// Returns the derivatives by the start and by the end. They are half the matrices of steps, since q1 = 2 z - q0.
   template <int size = kMaxLocal, class Evaluate>
   std::pair<std::array<double, size>, std::array<double, size>> add_ends(const ElementTable& table, int element,
                                                                          const double* rows, const Angles& angles,
@@ -121,8 +121,9 @@ class DiscreteAdjoint {
     return {start, end};
   }
 
-  /// Derivatives of ordinary stencils in space, all at once, with the coefficients that act; `axial` and `modulus` per
-  /// edge, see StencilBatch. Returns what rows^T makes of a unit moment on each of the mean strains.
+  /// Adds the derivatives of all ordinary stencils in space, with the coefficients that act. `axial` and `modulus` have
+  /// one entry per edge, see StencilBatch. Returns rows^T times the forces of a unit moment on each of the mean
+  /// strains.
   Columns3 add_regular(const Assembler& assembler, const ElasticCoefficients& k, const VectorX& axial,
                        const VectorX& modulus) {
     const Model& model = problem_.model;
@@ -153,7 +154,8 @@ class DiscreteAdjoint {
   const VectorX& rows() const { return rows_; }
 
  private:
-  /// Derivatives by an edge's angle. From angles counted so to turns of directors that are carried along with the edge.
+  /// Adds derivatives by the angle of an edge. Converts them into derivatives by turns of directors that move with the
+  /// edge.
   void add_turn(int edge, double start, double end) {
     adjoint_.start_turn[edge] += start;
     adjoint_.end_turn[edge] += end;
@@ -165,7 +167,7 @@ class DiscreteAdjoint {
   VectorX back_, back_q_;
   Configuration start_;
   DiscreteStep forth_, backwards_;
-  VectorX rows_;  ///< with what those of nodes make of torques among those of angles
+  VectorX rows_;  ///< rows of angles include the effect of torques on nodes
 };
 
 }  // namespace withe

@@ -117,7 +117,7 @@ void add_half_turns(const StepProblem& problem, const StepData& data, int h, con
     adjoint.end_spin.row(frame) += end.transpose();
   }
   const int hinge = model.half[at(h)].hinge;
-  // A hinge's axis goes with the frame, not with what is attached.
+  // The axis of a hinge rotates with the frame, not with the attached part.
   if (hinge >= 0) spin -= rows[10] * (data.configuration.frame[at(frame)] * model.hinges[at(hinge)].axis).cross(moment);
   attachment += (attached_axes(model, data.configuration, data.z, h).transpose() * spin).transpose();
   if (!viscous) return;

@@ -13,7 +13,7 @@
 namespace withe {
 namespace {
 
-/// The stencils that kernels take, as they lie in the data.
+/// The ordinary stencils, as the kernels need them. The result refers to the data.
 StencilBatch regular_batch(const ElasticCoefficients& k, StepData& data, const Assembler& assembler,
                            std::span<double> values, const double* axial_force) {
   StencilBatch batch = kernel_batch(assembler, k.measure, data.configuration, k.bend_natural, k.bend_stiffness);
@@ -47,8 +47,8 @@ void ElasticForces::begin(StepProblem& problem) {
   add_coefficients(problem.viscous, problem.damped);
 }
 
-/// Configurations; and rates of strain of a midpoint step, from its ends. The Jacobian takes those of its middle
-/// instead. Discrete gradients need no strains in the middle.
+/// Computes configurations and, for a midpoint step, rates of strain from both ends. The Jacobian uses the rates in the
+/// middle instead. Discrete gradients need no strains in the middle.
 void ElasticForces::find(const StepProblem& problem, StepData& data, Assembler&, bool) {
   const Model& model = problem.model;
   const bool viscous = problem.viscous_acts() && problem.rule == StepRule::midpoint;
@@ -97,7 +97,7 @@ void ElasticForces::add_elastic(const StepProblem& problem, const ElasticCoeffic
   add_others(problem, k, data, assembler, values, axial_force);
 }
 
-/// Elements without kernels: edges and stencils of joints and of rods' ends at walls.
+/// Adds elements without kernels: edges, and stencils of joints and of ends of rods at walls.
 void ElasticForces::add_others(const StepProblem& problem, const ElasticCoefficients& k, StepData& data,
                                const Assembler& assembler, std::span<double> values, const double* axial_force) const {
   const Model& model = problem.model;
@@ -231,7 +231,8 @@ void ElasticForces::add_discrete_gradient(const StepProblem& problem, StepData& 
   for (int h = 0; h < static_cast<int>(model.half.size()); ++h) {
     discrete_half_local(model, half_coefficients(k, h), step, h, with_matrix, local);
     if (problem.exact && with_matrix && !model.planar()) {
-      // Inertia turns the rows of frames, from derivatives by a Cayley vector to moments; these are moments already.
+      // Inertia converts the rows of frames from derivatives by a Cayley vector to moments. These rows are moments
+      // already.
       Eigen::Map<Eigen::Matrix<double, 3, kMaxLocal, Eigen::RowMajor>> rows(&local.hessian[7][0]);
       const int frame = model.frame_dof[at(model.half[at(h)].frame)];
       rows = (cayley_spin(data.z.segment<3>(frame)).transpose() * rows).eval();

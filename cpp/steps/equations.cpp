@@ -28,7 +28,7 @@ std::vector<ElementTable*> tables_of(const Terms& terms) {
   return tables;
 }
 
-/// Who asks for derivatives of a step that has been taken asks no more whether it is solved.
+/// False if derivatives of a completed step are evaluated: they do not need bounds on rounding errors.
 bool bounds_rounding(const StepProblem& problem) { return !(problem.exact && problem.moves()); }
 
 }  // namespace
@@ -108,7 +108,7 @@ void Equations::clear(const VectorX& z, StepData& data) const {
   data.z = z;
 }
 
-/// Active terms, with entries in the matrix.
+/// Finds the forces of all terms, and reserves their entries in the matrix.
 void Equations::find(StepData& data, bool with_matrix) {
   for (const std::unique_ptr<Term>& term : terms_.all) {
     const int before = assembler_.generation();

@@ -12,10 +12,10 @@ namespace withe {
 
 /// Memory for later solves.
 struct EquationsMemory {
-  /// Contacts whose unknowns the order of elimination was found for, and those in the matrix; sorted.
+  /// Contacts for which the order of elimination was determined, and contacts in the matrix; both sorted.
   std::vector<ContactKey> ordered, coupled;
-  std::vector<std::vector<int>> groups;  ///< of unknowns that custom forces couple
-  std::vector<double> matrix;            ///< whose factorisation is in use; empty: none
+  std::vector<std::vector<int>> groups;  ///< groups of unknowns that custom forces couple
+  std::vector<double> matrix;            ///< matrix whose factorisation is in use; empty: none
   double flow_excess = 0;
   StokesletFluid::Memory fluid;
 };
@@ -23,10 +23,10 @@ struct EquationsMemory {
 /// Options that determine the form of the equations.
 struct EquationOptions {
   StepRule rule = StepRule::midpoint;
-  double static_duration = 0;  ///< in which slip happens in statics [s]
+  double static_duration = 0;  ///< time in which slip happens in statics [s]
   SolverKind solver = SolverKind::automatic;
-  /// True if matrices have every derivative, and those of held unknowns and by them: then not projected, often
-  /// unsymmetric.
+  /// True if matrices have every derivative, including the rows and columns of held unknowns. They are then not
+  /// projected, and often unsymmetric.
   bool exact = false;
 };
 
@@ -37,7 +37,7 @@ class Equations {
   Equations& operator=(const Equations&) = delete;
 
   const Model& model() const { return problem_.model; }
-  /// The problem that has begun last.
+  /// The problem that was begun last.
   const StepProblem& problem() const { return problem_; }
   Assembler& assembler() { return assembler_; }
   const Assembler& assembler() const { return assembler_; }
@@ -46,7 +46,7 @@ class Equations {
   const MassMatrix& mass() const { return problem_.mass; }
   ElasticCoefficients& elastic() { return problem_.elastic; }
   const ElasticCoefficients& elastic() const { return problem_.elastic; }
-  /// In words, what makes the Jacobian unsymmetric.
+  /// Causes that make the Jacobian unsymmetric, in words.
   const std::vector<std::string>& asymmetries() const { return asymmetries_; }
   /// Notes of the terms for the plan.
   std::vector<std::string> notes() const;
@@ -57,37 +57,38 @@ class Equations {
 
   const std::vector<std::unique_ptr<Term>>& terms() const { return terms_.all; }
 
-  /// Nothing where nothing can touch.
+  /// Null if no contact is possible in the scene.
   Contact* contact() { return terms_.contact ? &terms_.contact->contact() : nullptr; }
   const Contact* contact() const { return terms_.contact ? &terms_.contact->contact() : nullptr; }
   void forget_contacts();
-  /// Nothing where no hand yields.
+  /// Null if no hand yields.
   HandForces* hands() { return terms_.hands; }
   /// Share of a step of z that contact allows, from 0 to 1.
   double allowed(const VectorX& z, const VectorX& step);
-  /// True if anything touches at z: what is evaluated next.
+  /// True if anything is in contact at z. Updates the contacts for an evaluation at z.
   bool touches(const VectorX& z);
-  /// Predicts the friction of a step of Newton's method from the last evaluation, of which `kept` is left.
+  /// Predicts the friction of a step of Newton's method from the last evaluation. `kept`: share of its full length to
+  /// which `step` has been shortened.
   void predict_friction(const VectorX& step, double kept, ContactLinearisation& linearisation);
   double contact_loss(const StepData& data, const VectorX& change, double obstacle_work) const;
 
-  /// Prepares a step from `state` over h (0: statics). The state, the parameters and what is prescribed must outlive
-  /// it. `held_acceleration`: of what supports hold, see StepProblem.
+  /// Prepares a step from `state` over h (0: statics). The state, the parameters and the prescribed motions must
+  /// outlive it. `held_acceleration`: acceleration of supported unknowns, see StepProblem.
   void begin(const State& state, const Parameters& parameters, StepRule rule, double h,
              const Prescribed& prescribed = Prescribed::nothing(), const VectorX* held_acceleration = nullptr);
-  /// True if Stokeslets act: then `begin_flow` follows `begin`, with velocities `v` at positions `q`. False where no
-  /// solution was found.
+  /// True if Stokeslets act. Then `begin_flow` must follow `begin`, with velocities `v` at positions `q`. It returns
+  /// false if no solution was found.
   bool flows() const { return terms_.stokeslets != nullptr; }
   bool begin_flow(const VectorX& q, const VectorX& v);
   double flow_excess() const { return terms_.stokeslets->excess(); }
   void forget_flow();
 
-  /// Residual at z, and the matrix when asked for. `axial_force`: see stretch_hessian. `contact`: how Newton's method
-  /// takes it.
+  /// Evaluates the residual at z, and the matrix if `with_matrix`. `axial_force`: see stretch_hessian. `contact`: the
+  /// linearisation of contact in Newton's method.
   void evaluate(const VectorX& z, bool with_matrix, const double* axial_force, StepData& data,
                 const ContactLinearisation& contact = {});
-  /// Forces without inertia at the start of the problem, whose configuration the data has, with velocities v: the full
-  /// residual alone. No contact, viscosity, drag or fluid.
+  /// Evaluates only the full residual: forces without inertia at the start of the problem, with velocities v. The data
+  /// must have the configuration at the start. Contact, viscosity, drag and fluid are omitted.
   void evaluate_forces(const VectorX& v, StepData& data) const;
 
   /// True if anything but contact takes energy from the motion.
@@ -105,12 +106,12 @@ class Equations {
 
   /// Memory of solves for later ones, with the matrix if its factorisation may serve again.
   EquationsMemory memory(bool with_matrix) const;
-  /// Goes on from there, but for the factorisation. False where there is no matrix to factorise.
+  /// Restores this memory, except the factorisation. False if the memory has no matrix to factorise.
   bool recall(const EquationsMemory& memory);
-  /// From here on what would be lost of that is kept, until the next mark: copied once, when it is about to change.
+  /// Marks the present memory. It is copied once, before it changes for the first time, and kept until the next mark.
   void mark() { mark_ = Mark::set; }
   bool marked() const { return mark_ != Mark::none; }
-  /// Memory at the mark; nothing if it has not changed since.
+  /// Memory at the mark; null if it has not changed since.
   const EquationsMemory* since_mark() const { return mark_ == Mark::passed ? &at_mark_ : nullptr; }
 
  private:
@@ -131,7 +132,7 @@ class Equations {
   enum class Mark { none, set, passed };
   Mark mark_ = Mark::none;
   EquationsMemory at_mark_;
-  std::vector<ContactKey> ordered_;  ///< contacts for which the assembler has found its order of elimination
+  std::vector<ContactKey> ordered_;  ///< contacts for which the assembler has determined the order of elimination
 };
 
 }  // namespace withe

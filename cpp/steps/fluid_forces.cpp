@@ -47,7 +47,7 @@ bool StokesletForces::solve(const StepProblem& problem, const VectorX& q, const 
   return true;
 }
 
-/// The fluid's force on velocities (z - q0) / h.
+/// Force of the fluid at the velocities (z - q0) / h.
 void StokesletForces::add(const StepProblem& problem, StepData& data, const Assembler& assembler,
                           std::span<double> values) const {
   if (!acts_) return;
@@ -85,7 +85,7 @@ void StokesletForces::recall(const StokesletFluid::Memory& memory, double excess
 
 namespace {
 
-/// Length of each rod along its arc, with those of its row: they are one slender body.
+/// Per rod, the arc length of the whole row of connected rods to which it belongs. A row acts as one slender body.
 std::vector<double> lengths_of_rows(const Model& model) {
   const std::size_t rods = model.description.rods.size();
   std::vector<int> row(rods);
@@ -144,7 +144,7 @@ void ResistiveForces::add(const StepProblem& problem, StepData& data, const Asse
   }
 }
 
-/// By the start alone as far as edges moved from there: their tangents are those at z.
+/// The forces depend on the start only through the displacement of edges: their tangents are those at z.
 void ResistiveForces::add_adjoint(const StepProblem& problem, const StepData& data, const Assembler& assembler,
                                   StepAdjoint& adjoint) const {
   if (!problem.moves()) return;

@@ -9,7 +9,7 @@
 
 namespace withe {
 
-/// Resistive-force theory: each edge for itself.
+/// Resistive-force theory: each edge independently of the others.
 class ResistiveForces final : public Term {
  public:
   explicit ResistiveForces(const Model& model);
@@ -28,15 +28,16 @@ class ResistiveForces final : public Term {
   std::vector<ResistiveCoefficients> resistance_;  ///< per edge
 };
 
-/// Regularised Stokeslets: all edges on each other. The fluid's force is that on velocities `v` at positions `q`, given
-/// before the step, and a local drag for what the velocities of the step differ from them; see fluid_forces.cpp.
+/// Regularised Stokeslets: all edges act on each other. The force of the fluid is the force at velocities `v` and
+/// positions `q`, which are given before the step, plus a local drag on the difference between the velocities of the
+/// step and `v`; see fluid_forces.cpp.
 class StokesletForces final : public Term {
  public:
   explicit StokesletForces(const Model& model) : fluid_(model) {}
 
   bool dissipates(const Parameters&) const override { return true; }
   void begin(StepProblem& problem) override;
-  /// After a step has begun. False where no solution was found.
+  /// Must be called after a step has begun. Returns false if no solution was found.
   bool solve(const StepProblem& problem, const VectorX& q, const VectorX& v);
   void add(const StepProblem& problem, StepData& data, const Assembler& assembler,
            std::span<double> values) const override;
@@ -45,20 +46,20 @@ class StokesletForces final : public Term {
   double dissipated(const StepProblem& problem, const StepData& data, const Assembler& assembler,
                     const VectorX& change) const override;
 
-  /// By which the local drag of the last step was greater than that of single rods; 0: not known.
+  /// Factor by which the local drag of the last step exceeded the drag of single rods; 0: unknown.
   double excess() const { return excess_; }
-  /// Without what earlier solutions left behind.
+  /// Discards all data of earlier solutions.
   void forget();
   const StokesletFluid::Memory& memory() const { return fluid_.memory(); }
   void recall(const StokesletFluid::Memory& memory, double excess);
 
  private:
   StokesletFluid fluid_;
-  MassMatrix drag_;        ///< local [N s/m]
-  VectorX start_, local_;  ///< the fluid's force but for the local drag [N]
+  MassMatrix drag_;        ///< local drag [N s/m]
+  VectorX start_, local_;  ///< force of the fluid without the local drag [N]
   VectorX inertia_;        ///< per node, mass over viscosity and step [m]
   double excess_ = 0;
-  long version_ = -1;  ///< of the parameters that the local drag belongs to
+  long version_ = -1;  ///< version of the parameters of the local drag
   bool acts_ = false;
 };
 

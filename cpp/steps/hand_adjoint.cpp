@@ -1,7 +1,7 @@
-// Derivatives of what yielding hands do by their poses, by how what they hold has slipped, and by their stiffness.
+// Derivatives of the forces of yielding hands by their poses, by slips, and by their stiffness.
 //
-// Of one edge -f = G C(K u) with u = G^T (x - p - R a) - s, in an energy-momentum step with means of both ends for G
-// and u. A hand that is displaced by dp and turned by w changes
+// The force f on one edge has -f = G C(K u) and u = G^T (x - p - R a) - s. An energy-momentum step uses the means of G
+// and u at both ends. A hand that is displaced by dp and turned by w changes
 //   G by w x G,    u by -G^T (dp + w x (x - p)).
 
 #include <optional>
@@ -22,7 +22,7 @@ Vector3 rows_of_point(const Model& model, const VectorX& rows, const TouchedEdge
 
 }  // namespace
 
-/// From derivatives by where forces act to those by both ends of the step.
+/// Converts derivatives by the pose where forces act into derivatives by the poses at both ends of the step.
 void HandForces::add_pose(const StepProblem& problem, int support, const Vector3& by_position,
                           const Vector3& by_rotation, StepAdjoint& adjoint) const {
   const double share = problem.in_middle() ? 0.5 : 1.0;
@@ -79,7 +79,7 @@ void HandForces::add_shift_adjoint(const StepProblem& problem, const StepData& d
   add_to_point(model_, p.touched, start.point - end.point, adjoint.start);  // q1 = 2 z - q0
 }
 
-/// Returns the derivative by how the hand is turned where forces act.
+/// Returns the derivative by the rotation of the hand where forces act.
 Vector3 HandForces::add_turn_adjoint(const StepProblem& problem, const StepData& data, int element, const double* rows,
                                      CoefficientAdjoint& by) const {
   const Piece p = piece(problem, data, element);
@@ -116,7 +116,7 @@ Vector3 HandForces::add_turn_adjoint(const StepProblem& problem, const StepData&
   add_turn_stiffness(model_, G, p.touched.share, by_stiffness, support, by.hand_stiffness);
   bend_twist_hessian(measure, grip, edge, strain, {0.0, 0.0, 0.0}, turn_stiffness(p.hand, p.touched.share), d);
   apply_transport(grip, edge, d);
-  // The grip is turned as an edge of unit length would be, and about itself.
+  // The grip rotates like an edge of unit length, and about itself.
   Vector3 by_vector;
   for (int i = 0; i < 3; ++i) {
     by_vector[i] = rows[3] * d.e_angle[0][1][i];
@@ -180,7 +180,7 @@ std::array<double, kMaxLocal> HandForces::add_discrete_turn_adjoint(const StepPr
   return turning.end;
 }
 
-/// s1 = s + u - c u at q1, c |K u| being the limit where it is reached; else s stays.
+/// At the limit s1 = s + u - c u at q1, where c |K u| is the limit. Below the limit s does not change.
 void HandForces::add_slip_adjoint(const StepProblem& problem, const VectorX& q1, StepAdjoint& adjoint,
                                   VectorX& by_end) const {
   for (int k = 0; k < table_.count(); ++k) {
@@ -210,7 +210,7 @@ void HandForces::add_slip_adjoint(const StepProblem& problem, const VectorX& q1,
 }
 
 bool HandForces::at_limit(const State& state) const {
-  constexpr double kNear = 1e-6;  // over the limit
+  constexpr double kNear = 1e-6;  // relative to the limit
   for (const Held& held : held_) {
     const TouchedEdge& touched = model_.supports[at(held.support)].touched[at(held.touched)];
     const HandDescription& own = model_.supports[at(held.support)].description.hand;

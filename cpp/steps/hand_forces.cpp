@@ -9,7 +9,7 @@
 namespace withe {
 namespace {
 
-/// Adds what a force at a place on an edge is to its nodes, `first_head` being where the head's numbers begin.
+/// Distributes a force at a place on an edge to its nodes. `first_head`: index of the first unknown of the head.
 template <int Size>
 void put_shift(const Eigen::Matrix<double, Size, 1>& gradient, const Eigen::Matrix<double, Size, Size>& hessian,
                double place, int first_head, bool with_matrix, Local& out) {
@@ -107,7 +107,7 @@ HandForces::Piece HandForces::piece(const StepProblem& problem, const StepData& 
 
 /// Moment on a held edge by its rotation against its pose when it was grasped.
 struct HandForces::Turn {
-  Vector3 moment = Vector3::Zero();  ///< on the hand's side
+  Vector3 moment = Vector3::Zero();  ///< moment on the hand
   double energy = 0.0;
 };
 
@@ -218,7 +218,7 @@ void HandForces::add(const StepProblem& problem, StepData& data, const Assembler
   if (rings_.count() > 0) rings_.add(problem, data, values);
 }
 
-/// Positions round by eps |x|, and with them what is between an edge and where it was grasped.
+/// Rounding errors of positions are eps |x|. They also affect the displacement of an edge from its grasped pose.
 void HandForces::add_rounding(const StepProblem& problem, StepData& data) const {
   if (rings_.count() > 0) rings_.add_rounding(problem, data);
   for (int k = 0; k < table_.count(); ++k) {
@@ -247,11 +247,11 @@ double HandForces::dissipated(const StepProblem& problem, const StepData& data, 
       return shift_of(model_, q, hand, pose, p.touched, at(held.touched)).by;
     };
     const Vector3 u0 = shift(problem.start->q, from), there = shift(data.z, to);
-    // By the place, for a given pose, u is linear: z is the middle, or the end.
+    // For a given pose, u is linear in the place. z is the middle or the end of the step.
     const Vector3 u1 = problem.in_middle() ? Vector3(2.0 * there - shift(problem.start->q, to)) : there;
     const CappedForce last = capped(p.stiffness.cwiseProduct(u1), p.touched.share * p.hand.force_limit);
     if (last.share >= 1.0 && p.elastic.share >= 1.0) continue;
-    // Energy that both sides add, less the stored energy; at a step's end, the force times the slip.
+    // Energy that both sides add, minus the stored energy. At the end of a step it is the force times the slip.
     const Vector3 kept = last.share * u1;
     lost += problem.in_middle()
                 ? p.elastic.force.dot(u1 - u0) - 0.5 * p.stiffness.dot(kept.cwiseAbs2() - u0.cwiseAbs2())

@@ -1,5 +1,5 @@
 #pragma once
-/// Hands that yield, see forces/hand.hpp: each holds every edge that it touches by a share of its stiffness.
+/// Hands that yield, see forces/hand.hpp. A hand holds every edge that it touches with a share of its stiffness.
 
 #include <array>
 #include <vector>
@@ -30,21 +30,23 @@ class HandForces final : public Term {
   double dissipated(const StepProblem& problem, const StepData& data, const Assembler& assembler,
                     const VectorX& change) const override;
 
-  /// Adds to derivatives by what a step is given those by what it leaves of slips, `adjoint.hands_after`: to `by_end`,
-  /// that by q1, and to the adjoint. To come before `add_adjoint`.
+  /// Converts the derivatives by slips at the end of a step, `adjoint.hands_after`, into derivatives by q1, which it
+  /// adds to `by_end`, and by the input of the step, which it adds to the adjoint. Must be called before `add_adjoint`.
   void add_slip_adjoint(const StepProblem& problem, const VectorX& q1, StepAdjoint& adjoint, VectorX& by_end) const;
-  /// Adds derivatives of a scalar that goes with what one hand holds with, by that force and moment: what they depend
-  /// on at z to `by_z`, all else to the adjoint. Throws std::invalid_argument where none is known.
+  /// Adds derivatives of a scalar that depends on the force and the moment of one hand. `by_force` and `by_moment` are
+  /// its derivatives by these. Derivatives by z are added to `by_z`, all others to the adjoint. Throws
+  /// std::invalid_argument if the derivatives are unknown.
   void add_wrench_adjoint(const StepProblem& problem, const StepData& data, int support, const Vector3& by_force,
                           const Vector3& by_moment, StepAdjoint& adjoint, VectorX& by_z) const;
   bool slips() const { return slips_; }
   const RingForces& rings() const { return rings_; }
-  /// True if something slips where a state is, or would with any more force.
+  /// True if a rod slips in a hand in this state, or would slip under any greater force.
   bool at_limit(const State& state) const;
   /// Work of hands in a step that has just been evaluated [J].
   double work(const StepProblem& problem, const StepData& data, const VectorX& q1) const;
-  /// Takes a state whose q is that of the end of a step there: supports are at `end`, and hands slip where the force is
-  /// too great. `c`: of that q; not used in a plane. Returns what stays with rings that rods have left [J].
+  /// Moves the hands of a state to the end of a step, where its q is already. Supports are at `end`, and hands slip if
+  /// their force is too great. `c`: configuration at this q, not used in a plane. Returns the energy that remains in
+  /// rings that rods have left [J].
   double accept(const std::vector<SupportPose>& end, const Configuration& c, State& state) const;
 
  private:
@@ -54,14 +56,14 @@ class HandForces final : public Term {
   struct Piece;
   struct Grip;
   struct Turn;
-  /// Pose of a hand at which its forces act, and at the end of the step.
+  /// Poses of a hand: `pose_of` where its forces act, `end_pose` at the end of the step.
   SupportPose pose_of(const StepProblem& problem, int support) const;
   SupportPose end_pose(const StepProblem& problem, int support) const;
   Piece piece(const StepProblem& problem, const StepData& data, int element) const;
   Turn put_planar_turn(const StepProblem& problem, const StepData& data, const Piece& p, bool with_matrix,
                        Local& local) const;
   Turn put_turn(const StepProblem& problem, const StepData& data, const Piece& p, double twist, Local& local) const;
-  /// Whose work in an energy-momentum step is what the energy changes by.
+  /// Moment whose work in an energy-momentum step is the change of the energy.
   Turn put_discrete_turn(const StepProblem& problem, const StepData& data, const Held& held, bool with_matrix,
                          Local& local) const;
   Grip grip_over(const StepProblem& problem, const StepData& data, const Held& held) const;
@@ -84,10 +86,10 @@ class HandForces final : public Term {
 
   const Model& model_;
   RingForces rings_;
-  std::vector<Held> held_;  ///< of each element
+  std::vector<Held> held_;  ///< per element
   ElementTable table_;
-  bool slips_ = false;            ///< whether any may
-  std::vector<SupportPose> now_;  ///< where forces act
+  bool slips_ = false;            ///< true if any hand may slip
+  std::vector<SupportPose> now_;  ///< poses at which forces act
 };
 
 /// Energy of hands that yield, or of only one of them [J].

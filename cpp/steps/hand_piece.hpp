@@ -44,7 +44,7 @@ inline BendTwistStiffness<double> turn_stiffness(const HandDescription& hand, do
   return {share * hand.stiffness[4], share * hand.stiffness[3], share * hand.stiffness[5]};
 }
 
-/// In a plane a hand turns about its normal alone.
+/// In a plane a hand turns only about the normal of the plane.
 inline double planar_stiffness(const Model& model, const HandDescription& hand, double share, const Matrix3& grip) {
   const Vector3 n = grip.transpose() * model.plane->normal;
   double sum = 0.0;
@@ -52,7 +52,7 @@ inline double planar_stiffness(const Model& model, const HandDescription& hand, 
   return sum;
 }
 
-/// The direction of what is grasped, as an edge of unit length in the axes of the plane.
+/// Direction of the grasped edge, as an edge of unit length in the axes of the plane.
 inline PlanarEdge<double> planar_grip(const Model& model, const Matrix3& grip) {
   const Vector3 t = grip.col(2);
   return {{t.dot(model.plane->first), t.dot(model.plane->second)}, 1.0};
@@ -65,13 +65,14 @@ inline PlanarBend<double> planar_turn(const Model& model, const BendMeasure& mea
   return planar_bend(measure, kappa, 0.0, planar_stiffness(model, hand, share, grip));
 }
 
-/// Adds to the rows of an edge's nodes what is by the point that is held.
+/// Adds derivatives by the held point to the rows of the nodes of its edge.
 inline void add_to_point(const Model& model, const TouchedEdge& touched, const Vector3& by, VectorX& out) {
   add_to_node(model, model.edge_tail[at(touched.edge)], (1.0 - touched.place) * by, out);
   add_to_node(model, model.edge_head[at(touched.edge)], touched.place * by, out);
 }
 
-/// By stiffnesses about d1, d2, t, from what is found by those of both bendings and of twist, or in a plane of the one.
+/// Converts derivatives by the stiffnesses of both bendings and of twist, or of the one bending in a plane, into
+/// derivatives by the stiffnesses about d1, d2, t.
 inline void add_turn_stiffness(const Model& model, const Matrix3& grip, double share, const Vector3& by, int support,
                                MatrixX6& out) {
   if (model.planar())
@@ -80,7 +81,7 @@ inline void add_turn_stiffness(const Model& model, const Matrix3& grip, double s
     out.row(support).tail<3>() += share * Vector3(by.y(), by.x(), by.z()).transpose();
 }
 
-/// One edge that a hand holds, as an evaluation finds it.
+/// One edge that a hand holds, in one evaluation.
 struct HandForces::Piece {
   const TouchedEdge& touched;
   const HandDescription& hand;

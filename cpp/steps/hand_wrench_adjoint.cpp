@@ -1,6 +1,6 @@
-// Derivatives of what a yielding hand holds with, about where it is at the end of the step, p:
+// Derivatives of the force F and the moment M of a yielding hand, about its position p at the end of the step:
 //   F = sum f,    M = sum ((x - p) x f + m),
-// where -f = G C(K u), and m is by what E changes as what is grasped turns.
+// where -f = G C(K u), and m is the derivative of E by the rotation of the grasped part.
 
 #include <array>
 #include <optional>
@@ -37,8 +37,8 @@ void HandForces::add_wrench_adjoint(const StepProblem& problem, const StepData& 
   adjoint.hands_end.positions.row(support) -= force.cross(by_moment).transpose();
 }
 
-/// Derivatives of m. Where edge and hand turn alike it turns with them, so that derivatives by the hand follow from
-/// those by the edge.
+/// Derivatives of m. If edge and hand rotate together, m rotates with them. Therefore derivatives by the hand follow
+/// from derivatives by the edge.
 void HandForces::add_moment_adjoint(const StepProblem& problem, const StepData& data, int element,
                                     const Vector3& by_moment, StepAdjoint& adjoint, VectorX& by_z) const {
   const Piece p = piece(problem, data, element);
@@ -47,7 +47,7 @@ void HandForces::add_moment_adjoint(const StepProblem& problem, const StepData& 
   const BendMeasure& measure = problem.parameters->measure;
   const BendTwistStrain<double> strain =
       bend_twist_strain(grip, edge, problem.start->hands[at(support)].twist(held_[at(element)].touched));
-  // The grasped part turns as an edge of unit length would, and about itself.
+  // The grasped part rotates like an edge of unit length, and about itself.
   const Vector3 T = p.shift.grip.col(2);
   const Vec3d way = to_vec3(Vector3(by_moment.cross(T)));
   const double angle = by_moment.dot(T);
@@ -69,7 +69,7 @@ void HandForces::add_moment_adjoint(const StepProblem& problem, const StepData& 
   add_to_edge(model_, p.touched.edge, to_vec3(by_edge), by_z);
   by_z[model_.edge_dof[at(p.touched.edge)]] += by_angle;
   adjoint.middle_turn[p.touched.edge] += by_angle;
-  // At fixed angles directors follow their edge without what `spin` says.
+  // At fixed angles directors follow their edge without the rotation `spin`.
   const Vector3 t = to_eigen(edge.tangent), e = t / edge.inverse_length,
                 by_turn = moment.cross(by_moment) - e.cross(by_edge - by_angle * to_eigen(edge.spin)) - by_angle * t;
   add_pose(problem, support, Vector3::Zero(), by_turn, adjoint);
@@ -112,7 +112,7 @@ void HandForces::add_discrete_moment_adjoint(const StepProblem& problem, const S
   const Grip grip = grip_over(problem, data, held);
   const bool planar = model_.planar();
   const int n = model_.dimension, head = planar ? 2 : 4;
-  const Vector3 t = to_eigen(edge.tangent),  // in a plane, in its axes
+  const Vector3 t = to_eigen(edge.tangent),  // in a plane: in the axes of the plane
       b = planar ? Vector3(0.0, 0.0, -by_moment.dot(model_.plane->normal)) : Vector3(-by_moment),
                 apart = b.cross(t) / edge.inverse_length;
   double rows[kMaxLocal] = {};

@@ -16,7 +16,7 @@
 namespace withe {
 namespace {
 
-/// Forces and torques of edges that spin and turn, whose moments of inertia are these.
+/// Finds forces and torques of edges that spin and turn, for given moments of inertia.
 void find_turning(const StepProblem& problem, const StepData& data, const VectorX& inertia, TurningForces& out) {
   const Model& model = problem.model;
   out.head.resize(3 * Eigen::Index{model.edge_count});
@@ -44,8 +44,8 @@ void find_turning(const StepProblem& problem, const StepData& data, const Vector
   kernel(batch);
 }
 
-/// Inertia of edges that spin and turn: under backward Euler what the mass matrix knows nothing of, under the midpoint
-/// rules all of it.
+/// Adds the inertia of edges that spin and turn. Under backward Euler it is the part that the mass matrix does not
+/// contain, under the midpoint rules the whole inertia.
 void add_turning_edges(const StepProblem& problem, StepData& data) {
   const Model& model = problem.model;
   TurningForces& forces = data.turning_forces;
@@ -56,8 +56,8 @@ void add_turning_edges(const StepProblem& problem, StepData& data) {
   }
 }
 
-/// Inertia of frames under the midpoint rules: moments J^T m where a Cayley vector's spin is J dw; in energy-momentum
-/// steps all but elastic forces become moments.
+/// Sets the inertia of frames under the midpoint rules: moments J^T m, where J dw is the spin of a Cayley vector. In
+/// energy-momentum steps the rows of all forces except elastic forces become moments.
 void set_turning_frames(const StepProblem& problem, StepData& data) {
   const Model& model = problem.model;
   const double inverse = 0.5 / problem.interval;
@@ -70,7 +70,7 @@ void set_turning_frames(const StepProblem& problem, StepData& data) {
       continue;
     }
     const Matrix3 J = cayley_spin(data.z.segment<3>(dof)).transpose();
-    if (problem.conserves_energy()) {  // whose rows are moments
+    if (problem.conserves_energy()) {  // their rows are moments
       const Vector3 other = data.gradient.segment<3>(dof) - data.elastic_rows.segment<3>(dof);
       data.gradient.segment<3>(dof) += J.inverse() * other - other;
     } else {
@@ -143,7 +143,8 @@ void add_frame_slopes(const StepProblem& problem, const StepData& data, const As
     }
     const Vector3 w = data.z.segment<3>(dof);
     if (problem.conserves_energy()) {
-      // Others' rows times T = J^-T = I + w^ / 2 + w w^T / 4; those of elastic forces have been divided by it.
+      // Rows of other forces are multiplied by T = J^-T = I + w^ / 2 + w w^T / 4. Rows of elastic forces are already
+      // divided by it.
       const Vector3 moment = data.gradient.segment<3>(dof) - data.elastic_rows.segment<3>(dof),
                     other = cayley_spin(w).transpose() * moment;
       assembler.turn_rows(dof, cayley_spin(w).transpose().inverse(), values);
@@ -220,7 +221,7 @@ void Inertia::add_adjoint(const StepProblem& problem, const StepData& data, cons
     }
     return;
   }
-  TurningForces unit;  // of edges with unit moments of inertia
+  TurningForces unit;  // forces of edges with unit moments of inertia
   find_turning(problem, data, VectorX::Ones(model.edge_count), unit);
   for (int e = 0; e < model.edge_count; ++e) add_turning_adjoint(problem, data, unit, e, adjoint);
 }
@@ -255,7 +256,7 @@ void add_explicit_spin_couple(const StepProblem& problem, StepData& data, int ed
 
 namespace {
 
-/// Visits every angle whose rate is that of a finite rotation: joints' in a plane, edges' in space.
+/// Visits every angle whose rate comes from a finite rotation: angles of joints in a plane, of edges in space.
 template <class Set>
 void for_each_turn(const Model& model, const Set& set) {
   if (model.planar())
@@ -264,7 +265,7 @@ void for_each_turn(const Model& model, const Set& set) {
     for (int e = 0; e < model.edge_count; ++e) set(model.edge_dof[at(e)]);
 }
 
-/// The same with their `finite_turn`, by `change`.
+/// Visits the same angles with the `finite_turn` of their change.
 template <class Use>
 void for_each_finite_turn(const Model& model, const VectorX& change, const Use& use) {
   if (model.planar()) {

@@ -5,10 +5,10 @@
 
 namespace withe {
 
-/// M ((z - q0) / h^2 - v0 / h), and what turning adds. Under backward Euler an edge that spins at omega and turns also
-/// needs the couple I omega t x dt/dt; under the midpoint rules angular momentum is kept exactly (turning_inertia.hpp).
-/// Derivatives of what turning adds are a small part of the mass term, and unsymmetric: they are in exact matrices
-/// alone.
+/// M ((z - q0) / h^2 - v0 / h), and the contribution of turning. Under backward Euler an edge that spins at omega and
+/// turns also needs the couple I omega t x dt/dt. The midpoint rules conserve angular momentum exactly
+/// (turning_inertia.hpp). Derivatives of the contribution of turning are a small part of the mass term, and they are
+/// unsymmetric. Only exact matrices contain them.
 class Inertia final : public Term {
  public:
   Inertia(const Model& model, bool exact);
@@ -20,10 +20,10 @@ class Inertia final : public Term {
                    StepAdjoint& adjoint) const override;
 
  private:
-  ElementTable edges_;  ///< tail, angle, head; in space, where the matrix is exact
+  ElementTable edges_;  ///< tail, angle, head; only in space, with an exact matrix
 };
 
-/// Entries of a matrix such as that of masses: its diagonal, and what couples nodes off it.
+/// Entries of a matrix such as the mass matrix: its diagonal, and the entries off the diagonal that couple nodes.
 void add_mass_matrix(const StepProblem& problem, const MassMatrix& mass, double factor, const Assembler& assembler,
                      std::span<double> values);
 
@@ -34,12 +34,12 @@ void add_explicit_spin_couple(const StepProblem& problem, StepData& data, int ed
 double farthest_turn(const Model& model, const VectorX& q0, const VectorX& q1);
 /// Velocities of angles at the end of an energy-momentum step that changes the unknowns by `change`.
 void set_turning_velocities(const Model& model, const VectorX& v0, const VectorX& change, double dt, VectorX& v1);
-/// Derivatives of these velocities by `change`, per unknown: 2 / dt where it turns nothing.
+/// Derivatives of these velocities by `change`, per unknown: 2 / dt for unknowns that are not angles.
 void set_velocity_rates(const Model& model, const VectorX& change, double dt, VectorX& rates);
-/// Displacement over which forces of an energy-momentum step do work: its change of the unknowns, but for angles and
-/// frames, whose torques and moments are those about where they are in the middle.
+/// Displacement over which forces of an energy-momentum step do work. It is the change of the unknowns, except for
+/// angles and frames: their torques and moments are about their positions in the middle of the step.
 void set_working_change(const StepProblem& problem, const StepData& data, const VectorX& change, VectorX& working);
-/// Work of elastic torques on what supports hold over the working change, less that over `change` itself [J].
+/// Work of elastic torques on supported unknowns over the working change, minus their work over `change` itself [J].
 double finite_turn_work(const StepProblem& problem, const StepData& data, const VectorX& change,
                         const VectorX& working);
 

@@ -7,7 +7,8 @@
 namespace withe {
 namespace {
 
-/// T over the step [N m], by the unknowns of what turns and of what it turns against, at z and at the start.
+/// Torque T in the step [N m]. It depends on the angles of the turning part and of the part against which it turns, at
+/// z and at the start.
 template <class Scalar>
 Scalar torque_on(const StepProblem& problem, const JointTorque& torque, const JointAngle& joint, const Scalar (&z)[2],
                  const Scalar (&start)[2]) {
@@ -20,7 +21,7 @@ Scalar torque_on(const StepProblem& problem, const JointTorque& torque, const Jo
 
 double unknown(const VectorX& q, int dof) { return dof < 0 ? 0.0 : q[dof]; }
 
-/// At z.
+/// Torque at z.
 double torque_now(const StepProblem& problem, const StepData& data, const JointTorque& torque,
                   const JointAngle& joint) {
   const double z[2] = {unknown(data.z, joint.turning), unknown(data.z, joint.against)};
@@ -28,7 +29,7 @@ double torque_now(const StepProblem& problem, const StepData& data, const JointT
   return torque_on(problem, torque, joint, z, start);
 }
 
-/// T, and its derivatives by z of both unknowns, then by the start's.
+/// T, its derivatives by both unknowns at z, and its derivatives by both unknowns at the start.
 Dual<4> torque_with_slopes(const StepProblem& problem, const StepData& data, const JointTorque& torque,
                            const JointAngle& joint) {
   using D = Dual<4>;
@@ -73,7 +74,7 @@ void JointForces::add(const StepProblem& problem, StepData& data, const Assemble
     }
     if (symmetric) local.hessian[0][1] = local.hessian[1][0] = 0.5 * (local.hessian[0][1] + local.hessian[1][0]);
     add_element(table_, j, local, data, values);
-    // Rows of planar frames in energy-momentum steps go by Cayley vectors, as those of elastic forces do.
+    // In energy-momentum steps the rows of planar frames are by Cayley vectors, like the rows of elastic forces.
     if (problem.conserves_energy() && joint.against >= 0)
       for (int i = 0; i < 2; ++i) data.elastic_rows[table_.dofs(j)[i]] += local.gradient[i];
     const double angle = joint.angle(data.z);

@@ -7,8 +7,8 @@
 namespace withe {
 namespace {
 
-/// By the drawn edge that a piece goes by, `by` being that by its value: what follows keeps its components towards the
-/// drawn directors.
+/// Adds derivatives by the drawn edge of a load piece. `by`: derivative by the value of the piece. A load that follows
+/// keeps its components along the drawn directors.
 void add_drawn(const StepProblem& problem, const LoadPiece& piece, const Vector3& by, CoefficientAdjoint& out) {
   const Vector3 value = problem.parameters->loads.row(piece.load);
   if (piece.along) out.rest_length(piece.edge) += by.dot(value) / problem.model.edge_arc(piece.edge);
@@ -16,8 +16,9 @@ void add_drawn(const StepProblem& problem, const LoadPiece& piece, const Vector3
   if (follows && piece.edge >= 0) out.edge_turn.row(piece.edge) += by.cross(value).transpose();
 }
 
-/// By how a joint's frame F is turned beyond its unknowns, of the rows -J(w)^T F M of a moment M that follows it, or of
-/// the row -(F a) . M of one that does not, on what turns about the axis a of a hinge.
+/// Adds derivatives by the rotation of the frame F of a joint, beyond its unknowns. The rows are -J(w)^T F M for a
+/// moment M that follows the frame. For a moment that does not follow, on a part that turns about the axis a of a
+/// hinge, the row is -(F a) . M.
 void add_frame_turn(const StepProblem& problem, const StepData& data, const LoadPiece& piece, const double* rows,
                     StepAdjoint& adjoint) {
   const Matrix3& frame = data.configuration.frame[at(piece.frame)];

@@ -1,5 +1,5 @@
 #pragma once
-/// Loads that a user puts on, see forces/loads.hpp.
+/// Loads that a user applies, see forces/loads.hpp.
 
 #include "steps/term.hpp"
 

@@ -9,7 +9,7 @@
 namespace withe {
 namespace {
 
-/// Adds what edges under pressure give way by, times the pressure; returns whether any does.
+/// Adds the pressure on edges times the length by which they yield. Returns true if any edge yields.
 bool add_turns(const StepProblem& problem, const StepData& data, VectorX& gains) {
   const Model& model = problem.model;
   const VectorX& start = problem.start->q;
@@ -25,7 +25,7 @@ bool add_turns(const StepProblem& problem, const StepData& data, VectorX& gains)
   return any;
 }
 
-/// Adds what elastic energies grow by beyond the work of elastic forces at the end.
+/// Adds the growth of elastic energies beyond the work of elastic forces at the end of the step.
 void add_elastic_gains(const StepProblem& problem, StepData& data, const Assembler& assembler, const VectorX& change,
                        VectorX& gains) {
   const Model& model = problem.model;
@@ -72,7 +72,7 @@ void find_pressure_gains(const StepProblem& problem, StepData& data, const Assem
   gains = -taken;
   change = data.z - problem.start->q;
   add_elastic_gains(problem, data, assembler, change, gains);
-  // Energies round by forces times what positions round by.
+  // Rounding errors of energies are forces times rounding errors of positions.
   for (int i = 0; i < model.dof_count; ++i)
     gains[model.dof_component[at(i)]] -= kRounding * data.rounding.reach * data.magnitude[i];
 }

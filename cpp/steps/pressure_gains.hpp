@@ -1,9 +1,9 @@
 #pragma once
 /// Energy that backward Euler steps add where edges are under compression.
 ///
-/// The forces of a step are those at its end, so a step takes energy from every convex potential. The potential of an
-/// edge under compression is not convex. As the edge turns by an angle a it yields by l0 (1 - cos a). Over this length
-/// its force -n at the end of the step does n l0 (1 - cos a) more work than the edge loses energy.
+/// A step uses the forces at its end, and therefore takes energy from every convex potential. The potential of an edge
+/// under compression is not convex. If the edge turns by an angle a, it yields by l0 (1 - cos a). Over this length its
+/// force -n at the end of the step does more work than the edge loses in energy, by n l0 (1 - cos a).
 
 #include "assembly/assembler.hpp"
 #include "steps/step_problem.hpp"
@@ -17,8 +17,8 @@ struct PressureGains {
   VectorX change, momentum;
 };
 
-/// Finds the gains of a backward Euler step to the configuration of the data, with the velocities v1. Gains are zero
-/// where the step takes energy. Overwrites the configuration at the end of `data`.
+/// Finds the gains of a backward Euler step to the configuration of the data, with the velocities v1. A gain is zero if
+/// the step takes energy. Overwrites the configuration at the end of `data`.
 void find_pressure_gains(const StepProblem& problem, StepData& data, const Assembler& assembler, const VectorX& v1,
                          PressureGains& out);
 

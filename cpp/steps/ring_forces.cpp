@@ -10,7 +10,7 @@
 namespace withe {
 namespace {
 
-/// `reach`: greatest distance from the origin of what its places are found from [m].
+/// `reach`: greatest distance from the origin of the positions from which its places are computed [m].
 Ring ring_of(const Support& support, double reach) {
   const HandDescription& hand = support.description.hand;
   return {hand.stiffness[0], hand.feeds || hand.friction > 0.0, hand.friction, hand.force_limit,
@@ -43,7 +43,7 @@ Eigen::Matrix<double, 3, 2> planar_axes(const Model& model) {
   return axes;
 }
 
-/// u that is left of it within the limit, at a place.
+/// Part of u that remains within the limit, at a place.
 double kept_way(const Ring& ring, const RodCurve& curve, const SplinePlace& place, const SplinePoint<double>& point,
                 double u) {
   const double slope = spline_arc_slope(curve.piece(place.piece), place.along),
@@ -51,13 +51,13 @@ double kept_way(const Ring& ring, const RodCurve& curve, const SplinePlace& plac
   return tension == ring.stiffness * u ? u : tension / ring.stiffness;
 }
 
-/// Which of a rod's pieces, of a closed one that goes on for ever.
+/// Index of a piece of a rod. The pieces of a closed rod repeat periodically.
 int own_piece(const RodCurve& curve, int piece) {
   const int count = curve.pieces();
   return ((piece % count) + count) % count;
 }
 
-/// As `use` is given it, of either dimension.
+/// Calls `use` with the result of `ring_found`, in the plane or in space.
 template <class Use>
 auto with_found(const StepProblem& problem, const RingStep& step, const NodePlaces& z, const Use& use) {
   if (problem.model.planar()) {
@@ -68,7 +68,7 @@ auto with_found(const StepProblem& problem, const RingStep& step, const NodePlac
   return use(ring_found<9>(axes, problem, step, z), axes);
 }
 
-/// From three nodes' forces in space to their unknowns.
+/// Converts the forces on three nodes in space into derivatives by their unknowns.
 template <int Size>
 Local local_of(const RingFound<Size>& found, const typename RingFound<Size>::Axes& axes) {
   constexpr int n = RingFound<Size>::kAxes;
@@ -119,7 +119,7 @@ void RingForces::add(const StepProblem& problem, StepData& data, std::span<doubl
   }
 }
 
-/// Positions round by eps |x|, and with them what is between a rod and its ring.
+/// Rounding errors of positions are eps |x|. They also affect the displacement between a rod and its ring.
 void RingForces::add_rounding(const StepProblem& problem, StepData& data) const {
   for (const Held& held : rings_) {
     const HandState& start = problem.start->hands[at(held.support)];
@@ -147,7 +147,7 @@ double RingForces::dissipated(const StepProblem& problem, const VectorX& z) cons
     const double kept = kept_way(step.ring, step.curve, place, point_at(step.curve, place, last, step.to), u1);
     lost += with_found(problem, step, acting, [&](const auto& found, const auto& /*axes*/) {
       if (!found.slips && kept == u1) return 0.0;
-      // Energy that both sides add, less the stored energy; at a step's end, T times the slip.
+      // Energy that both sides add, minus the stored energy. At the end of a step it is T times the slip.
       return problem.in_middle() ? found.tension * (u1 - u0) - 0.5 * k * (kept * kept - u0 * u0)
                                  : found.tension * (u1 - kept);
     });

@@ -1,5 +1,5 @@
 #pragma once
-/// Rings that rods pass through, see forces/ring.hpp: the part of `HandForces` that slides along.
+/// Rings that rods pass through, see forces/ring.hpp: the part of `HandForces` that slides along rods.
 
 #include <vector>
 
@@ -15,7 +15,7 @@ class RingForces {
 
   ElementTable& table() { return table_; }
   int count() const { return static_cast<int>(rings_.size()); }
-  /// True if friction or a limit lets any slip along.
+  /// True if any ring can slip along its rod, because of friction or a limit.
   bool slips() const { return slips_; }
 
   void add(const StepProblem& problem, StepData& data, std::span<double> values) const;
@@ -24,7 +24,8 @@ class RingForces {
   double dissipated(const StepProblem& problem, const VectorX& z) const;
   /// Work of rings and their drives in a step that ends at `q1` [J].
   double work(const StepProblem& problem, const VectorX& q1) const;
-  /// Takes a state there whose hands are where they go to. Returns what stays with rings that rods have left [J].
+  /// Moves the rings of a state to the end of a step. The hands of the state are already there. Returns the energy that
+  /// remains in rings that rods have left [J].
   double accept(State& state) const;
 
  private:
@@ -43,7 +44,7 @@ struct Passage {
   SplinePlace place;
   Vector3 across = Vector3::Zero();  ///< r [m]
   double at = 0;                     ///< arc length [m]
-  double slipped = 0;                ///< what there is of u beyond the limit [m]
+  double slipped = 0;                ///< part of u beyond the limit [m]
   double tension = 0;                ///< T [N]
   double pull = 0;                   ///< P [N]
   double energy = 0;                 ///< [J]

@@ -16,12 +16,12 @@
 
 namespace withe {
 
-/// Positions of nodes in space: in a configuration, or between two and beyond.
+/// Positions of nodes in space: of one configuration, or interpolated or extrapolated from two.
 struct NodePlaces {
   const Model& model;
   const VectorX& q;
-  double share = 1.0;              ///< of q
-  const VectorX* other = nullptr;  ///< the rest
+  double share = 1.0;              ///< weight of q
+  const VectorX* other = nullptr;  ///< has the remaining weight
 
   Vector3 operator()(int node) const {
     const Vector3 own = node_position(model, q, node);
@@ -34,7 +34,7 @@ struct RingStep {
   Ring ring;
   const RodCurve& curve;
   const RingState& start;
-  Vector3 from, to;         ///< where it is [m]
+  Vector3 from, to;         ///< its positions at both ends of the step [m]
   double fed_from, fed_to;  ///< [m]
 
   double origin(double fed) const { return start.origin - fed - start.slip; }
@@ -47,14 +47,14 @@ struct RingFound {
   using Number = Dual<Size>;
   using Axes = Eigen::Matrix<double, 3, kAxes>;
 
-  SplinePlace place;     ///< where forces act
-  Vec3<Number> by[3];    ///< generalised forces of the nodes there [N]
-  double tension = 0.0;  ///< T [N], whose work is that of the drive, of slip, and what is stored along the rod
+  SplinePlace place;     ///< place at which forces act
+  Vec3<Number> by[3];    ///< generalised forces of the nodes at this place [N]
+  double tension = 0.0;  ///< T [N]; its work is that of the drive and of slip, and the energy stored along the rod
   double across = 0.0;   ///< k |r| [N]
   double energy = 0.0;   ///< [J]
-  bool slips = false;    ///< along, at the limit
+  bool slips = false;    ///< true if it slips along the rod, at the limit
 
-  /// Sum of what is on the nodes [N].
+  /// Sum of the forces on the nodes [N].
   Vector3 force() const {
     Vector3 sum = Vector3::Zero();
     for (const Vec3<Number>& f : by) sum += Vector3(f.x.value, f.y.value, f.z.value);
@@ -69,7 +69,7 @@ Vec3<Dual<Size>> number(const Vec3<double>& v) {
   return {Dual<Size>(v.x), Dual<Size>(v.y), Dual<Size>(v.z)};
 }
 
-/// The i-th node's place, which changes with its unknowns at a rate.
+/// Position of the i-th node, whose derivative by its own unknowns is `rate`.
 template <int Size>
 Vec3<Dual<Size>> unknown(const typename RingFound<Size>::Axes& axes, int i, double rate, const Vec3<double>& at) {
   constexpr int n = RingFound<Size>::kAxes;
@@ -82,7 +82,7 @@ Vec3<Dual<Size>> unknown(const typename RingFound<Size>::Axes& axes, int i, doub
   return v;
 }
 
-/// Place where forces act: nodes from the ring, and a.
+/// Place where forces act: positions of the nodes relative to the ring, and a.
 template <int Size>
 struct Middle {
   SplinePiece piece;
@@ -90,8 +90,8 @@ struct Middle {
   Dual<Size> along;
 };
 
-/// From the start of an energy-momentum step to its end. What lies on pieces beyond that in the middle counts, but the
-/// matrix leaves its derivatives out: they are of second order in the step.
+/// Change from the start of an energy-momentum step to its end. Passages may lie on other pieces of the rod than the
+/// passage in the middle. The matrix omits the derivatives by their nodes, which are of second order in the step.
 template <int Size>
 struct Change {
   Vec3<Dual<Size>> mean, way;  ///< (r0 + r1) / 2, r1 - r0 [m]
@@ -117,7 +117,7 @@ Change<Size> change_over(const typename RingFound<Size>::Axes& axes, const RingS
   const Vec3<Dual<Size>> r1 = spline_point(w, to).across;
   Change<Size> out;
   out.mean = 0.5 * (number<Size>(point_at(step.curve, p0, start, step.from).across) + r1);
-  // As the nodes go, and as the place goes along the rod: differences that are exact however small they are.
+  // Motion of the nodes, and motion of the place along the rod: differences that are exact for any small step.
   out.way = number<Size>(way_between(step.curve, p0, p1, start)) +
             beyond * number<Size>(point_at(step.curve, p1, start, step.from).along);
   for (int i = 0; i < 3; ++i) out.way += w.value[i] * (to[i] - number<Size>(x0[i]));
@@ -125,7 +125,7 @@ Change<Size> change_over(const typename RingFound<Size>::Axes& axes, const RingS
   return out;
 }
 
-/// Adds what makes the work of the forces in the middle that of an energy-momentum step.
+/// Adds the forces that make the work of the forces in the middle equal to the change of energy.
 template <int Size>
 void conserve(const typename RingFound<Size>::Axes& axes, const StepProblem& problem, const RingStep& step,
               const NodePlaces& z, const Middle<Size>& middle, RingForce<Dual<Size>>& force, RingFound<Size>& out) {
@@ -158,8 +158,8 @@ void conserve(const typename RingFound<Size>::Axes& axes, const StepProblem& pro
 
 }  // namespace ring_detail
 
-/// Forces at the end of a step, or in its middle, with nodes at `z`: the place is not a number if the rod
-/// never is near the ring.
+/// Forces at the end of a step, or in its middle, with nodes at `z`: the place is not a number (NaN) if the rod is
+/// never near the ring.
 template <int Size>
 RingFound<Size> ring_found(const typename RingFound<Size>::Axes& axes, const StepProblem& problem, const RingStep& step,
                            const NodePlaces& z) {

@@ -1,5 +1,5 @@
-// Rounding error of a residual, which no iteration removes: positions, angles and strains carry errors of a few
-// eps, and stiffness, or inertia over a short step, turns them into forces.
+// Rounding error of a residual, which no iteration removes. Positions, angles and strains have errors of a few eps.
+// Stiffness, or inertia in a short step, converts these errors into forces.
 
 #include "steps/rounding.hpp"
 
@@ -16,8 +16,8 @@ void add_to_node(const Model& model, int node, double bound, VectorX& floor) {
   for (int k = dof; k < dof + model.dimension; ++k) floor(k) += bound;
 }
 
-/// Rounding error of inertia. A part that spins for long has turned by many radians. Sets the greatest coordinate, and
-/// returns the greatest angle, one radian at least.
+/// Rounding error of inertia. A part that has spun for a long time has turned by many radians. Sets the greatest
+/// coordinate, and returns the greatest angle, one radian at least.
 double set_inertial_bounds(const StepProblem& problem, const StepData& data, RoundingBounds& out) {
   const Model& model = problem.model;
   VectorX& floor = out.rows;
@@ -36,7 +36,7 @@ double set_inertial_bounds(const StepProblem& problem, const StepData& data, Rou
   floor.array() *= rounding * problem.mass.rows.array();
   if (!problem.moves() || model.planar()) return turned;
   for (int e = 0; e < model.edge_count; ++e) {
-    // add_spin_couple: `spin` of the torque, and no more than twice that of the couple.
+    // add_spin_couple: bounded by `spin` times the torque, and twice that for the couple.
     const Vec3d& spin = data.configuration.edge[at(e)].spin;
     const double couple = 3.0 * rounding * turned * problem.parameters->edge_inertia[e] * std::sqrt(dot(spin, spin));
     add_to_node(model, model.edge_tail[at(e)], couple, floor);
@@ -47,8 +47,8 @@ double set_inertial_bounds(const StepProblem& problem, const StepData& data, Rou
 
 }  // namespace
 
-/// Rounding of a strain is about eps (|x| / l + |theta|); its stiffness turns it into a force that no iteration
-/// removes. Curvature, 2 tan(phi / 2), grows by 2 / (1 + cos phi) a radian, and so does its slope.
+/// The rounding error of a strain is about eps (|x| / l + |theta|). Its stiffness converts it into a force that no
+/// iteration removes. The curvature 2 tan(phi / 2) and its slope grow by a factor 2 / (1 + cos phi) per radian.
 void set_rounding_bounds(const StepProblem& problem, StepData& data) {
   const ElasticCoefficients& k = acting_coefficients(problem, data);
   RoundingBounds& out = data.rounding;

@@ -1,4 +1,4 @@
-// Memory of solves for later ones: the matrix in use, contacts and the order of elimination, the fluid's force.
+// Memory of solves for later solves: the matrix in use, contacts, the order of elimination, and the force of the fluid.
 
 #include <algorithm>
 
@@ -12,7 +12,7 @@ void Equations::forget_contacts() {
   order_for_contacts();
 }
 
-/// Finds an order of elimination for the contacts that are coupled now, and no others.
+/// Finds an order of elimination for the present contacts only.
 void Equations::order_for_contacts() {
   assembler_.order_for(terms_.contact->rows().unknowns(), kContactUnknowns);
   ordered_ = terms_.contact->rows().keys();
@@ -30,7 +30,7 @@ void Equations::pass_mark() {
   mark_ = Mark::passed;
 }
 
-/// Without allocation where `out` has had the sizes before.
+/// Allocates nothing if `out` already has the necessary sizes.
 void Equations::remember(EquationsMemory& out, bool with_matrix) const {
   if (terms_.contact) {
     out.ordered = ordered_;

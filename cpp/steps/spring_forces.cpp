@@ -12,7 +12,7 @@ Spring spring_of(const Parameters& p, int spring) {
   return {p.spring_stiffness[spring], p.spring_rest_length[spring], p.spring_damping[spring]};
 }
 
-/// From its first node to its second, in the axes of the unknowns; of a configuration or of velocities.
+/// Vector from the first node of a spring to its second, in the axes of the unknowns, of positions or of velocities.
 Vec3d between(const Model& model, const VectorX& q, int spring) {
   const auto& [first, second] = model.description.springs[at(spring)].nodes;
   const double *a = &q[model.node_dof[at(first)]], *b = &q[model.node_dof[at(second)]];
@@ -64,7 +64,8 @@ void SpringForces::add(const StepProblem& problem, StepData& data, const Assembl
       local.gradient[i] = -f[i];
       local.gradient[n + i] = f[i];
       for (int j = 0; j < n; ++j) {
-        // Symmetric matrices take the symmetric part, which leaves out that a damper's direction lags its length.
+        // Symmetric matrices contain only the symmetric part. It omits the lag of the direction of a damper behind its
+        // length.
         const double entry = symmetric ? 0.5 * (K.row[i][j] + K.row[j][i]) : K.row[i][j];
         local.hessian[i][j] = local.hessian[n + i][n + j] = entry;
         local.hessian[i][n + j] = local.hessian[n + i][j] = -entry;
@@ -107,7 +108,7 @@ void SpringForces::add_adjoint(const StepProblem& problem, const StepData& data,
   }
 }
 
-/// Positions round by eps |x|, and lengths with them.
+/// Rounding errors of positions are eps |x|. They also affect lengths.
 void SpringForces::add_rounding(const StepProblem& problem, StepData& data) const {
   const int n = problem.model.dimension;
   for (int s = 0; s < table_.count(); ++s) {

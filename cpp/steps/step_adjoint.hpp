@@ -1,5 +1,5 @@
 #pragma once
-/// Derivatives of a step by what it is given, times a vector: what the adjoint method asks of each term.
+/// Derivatives of a step by its input, times a vector. The adjoint method needs them of each term.
 
 #include <map>
 
@@ -23,10 +23,10 @@ struct CoefficientAdjoint {
   VectorX spring_stiffness, spring_rest_length, spring_damping;            ///< per spring
   VectorX joint_stiffness, joint_rest_angle, joint_damping, joint_moment;  ///< per revolute joint
   VectorX tendon_tension;                                                  ///< per tendon
-  VectorX edge_mass;                          ///< by line density times length, in contacts
-  double gravity_size = 0;                    ///< by the magnitude of gravity, in contacts [s^2/m]
+  VectorX edge_mass;                          ///< by line density times length, only through contacts
+  double gravity_size = 0;                    ///< by the magnitude of gravity, only through contacts [s^2/m]
   double fluid_viscosity = 0;                 ///< [1/(Pa s)]
-  double friction = 0, slip_tolerance = 0;    ///< of the scene [-], [s/m]
+  double friction = 0, slip_tolerance = 0;    ///< by the values of the scene [-], [s/m]
   MatrixX3 obstacle_friction, pair_friction;  ///< per obstacle, per pair of bodies [-]
   VectorX obstacle_rolling;                   ///< per obstacle [-]
   MatrixX6 hand_stiffness;                    ///< per support, see `HandDescription` [m/N], [rad/(N m)]
@@ -81,10 +81,10 @@ struct CoefficientAdjoint {
   static MatrixX3 rows_of_three(std::size_t count) { return MatrixX3::Zero(static_cast<Eigen::Index>(count), 3); }
 };
 
-/// Derivatives of a scalar by where hands are, and by how far what yielding ones hold has slipped in them.
+/// Derivatives of a scalar by the poses of hands, and by the slips of edges in yielding hands.
 struct HandAdjoint {
   MatrixX3 positions, rotations;  ///< per support, the latter by a rotation vector [1/m], [1/rad]
-  MatrixX3 slips;                 ///< per edge that is held, hand by hand [1/m]
+  MatrixX3 slips;                 ///< per held edge, in the order of hands [1/m]
 
   HandAdjoint() = default;
   explicit HandAdjoint(const Model& model)
@@ -101,24 +101,25 @@ struct HandAdjoint {
   }
 };
 
-/// Derivatives of a scalar by speeds of approach that contacts remember [s/m].
+/// Derivatives of a scalar by the stored speeds of approach of contacts [s/m].
 using ApproachAdjoint = std::map<ContactKey, double>;
 
-/// rows^T times the derivatives of a step's residual, at fixed z. An edge's frame and a joint's are functions of the
-/// start: they are taken by how they turn, in the configuration that they are part of.
+/// rows^T times the derivatives of a step's residual, at fixed z. The frames of edges and joints depend on the start:
+/// derivatives by them are taken by their rotations, in the configuration to which they belong.
 struct StepAdjoint {
-  /// Multipliers of the residual; of frames in space, where a step's rows are moments, those of their J^T moment.
+  /// Multipliers of the residual. The rows of frames in space are moments: for these, multipliers of J^T times the
+  /// moment.
   const VectorX& rows;
-  VectorX start, velocity;       ///< by q0 (its angles: of directors) and v0
-  VectorX acceleration;          ///< by the acceleration of what supports hold; meaningful where held
+  VectorX start, velocity;       ///< by q0 (for its angles: by angles of directors) and v0
+  VectorX acceleration;          ///< by the acceleration of supported unknowns; undefined for others
   VectorX start_turn, end_turn;  ///< per edge: by the angle of its directors at the start, at q1 [rad]
   VectorX middle_turn;  ///< per edge: by the angle of its directors at z, of numbers that are no part of the residual
   MatrixX3 start_spin, middle_spin, end_spin;  ///< per frame: by its rotation vector at the start, at z, at q1 [rad]
-  const ApproachAdjoint& approach_after;       ///< by what is remembered at the end
-  ApproachAdjoint approach;                    ///< by what was remembered at the start
+  const ApproachAdjoint& approach_after;       ///< by the stored approach at the end
+  ApproachAdjoint approach;                    ///< by the stored approach at the start
   const HandAdjoint& hands_after;              ///< by slips at the end
-  HandAdjoint hands, hands_end;                ///< by hands at the start, and by where they are at the end
-  /// Per obstacle, by its place at the start and at the end, in the axes of the unknowns [1/m].
+  HandAdjoint hands, hands_end;                ///< by hands at the start, and by their poses at the end
+  /// Per obstacle, by its position at the start and at the end, in the axes of the unknowns [1/m].
   MatrixX3 obstacles, obstacles_end;
   CoefficientAdjoint& coefficients;
 

@@ -32,9 +32,9 @@ struct StepProblem {
   const Prescribed* prescribed = nullptr;  ///< must outlive the step
   StepRule rule = StepRule::statics;
   double interval = 0;   ///< h, from q0 to z [s]; 0: statics
-  double slip_time = 0;  ///< in which slip happens [s]
-  bool exact = false;    ///< whether the matrix has every derivative; else what is small and unsymmetric is left out
-  long number = 0;       ///< of problems so far: tells one from another
+  double slip_time = 0;  ///< time in which slip happens [s]
+  bool exact = false;    ///< true if the matrix has every derivative; else small unsymmetric ones are omitted
+  long number = 0;       ///< of the problem, counted up: identifies it
 
   /// Versions of the parameters.
   long version = -1, natural_version = -1;
@@ -47,8 +47,9 @@ struct StepProblem {
   ElasticCoefficients viscous;  ///< viscosity alone, over h, from the start's strains
   ElasticCoefficients damped;   ///< elasticity and viscosity as one
 
-  Loads loads;  ///< whose values are among the parameters
-  /// Acceleration of held unknowns, which acts on the edges next to them. Empty: as the rest accelerates.
+  Loads loads;  ///< their values are in the parameters
+  /// Acceleration of held unknowns, which acts on the edges next to them. Empty: they accelerate like all other
+  /// unknowns.
   VectorX held_acceleration;
 
   /// True if z is the middle of the step, and q1 = 2 z - q0.
@@ -60,7 +61,7 @@ struct StepProblem {
   bool viscous_acts() const { return parameters->viscous && resists(); }
   /// Duration of the whole step [s].
   double duration() const { return in_middle() ? 2.0 * interval : interval; }
-  /// q1 that goes with z, and by how much it changes with z.
+  /// q1 that belongs to z, and the derivative of q1 by z.
   void set_end(const VectorX& z, VectorX& end) const {
     if (in_middle())
       end = 2.0 * z - start->q;
@@ -70,12 +71,12 @@ struct StepProblem {
   double end_rate() const { return in_middle() ? 2.0 : 1.0; }
 };
 
-/// Rounding error bounds of a residual, which no iteration removes; see rounding.cpp.
+/// Bounds on the rounding errors of a residual. No iteration removes these errors; see rounding.cpp.
 struct RoundingBounds {
-  long number = -1;     ///< of the problem that they belong to
-  VectorX rows;         ///< of bending, twisting and inertia
+  long number = -1;     ///< number of the problem to which they belong
+  VectorX rows;         ///< bounds of bending, twisting and inertia
   VectorX axial;        ///< per edge [N]
-  double relative = 0;  ///< of a direction in space
+  double relative = 0;  ///< bound of a direction in space
   double reach = 0;     ///< greatest coordinate [m]
 };
 
@@ -104,15 +105,15 @@ struct StepData {
   VectorX residual;       ///< projected onto free directions
   VectorX full_residual;  ///< before projection: minus the reactions
   VectorX magnitude;      ///< per row, sum of the absolute contributions
-  VectorX floor;          ///< per row, what rounding alone leaves
-  double potential = 0;   ///< elastic + gravity - loads that have one [J], where the scene has one
+  VectorX floor;          ///< per row, bound on the rounding error
+  double potential = 0;   ///< elastic + gravity - loads with a potential [J], if the scene has one
 
   VectorX z;
   const ContactLinearisation* contact = nullptr;  ///< how Newton's method takes contact
-  const double* axial_force = nullptr;  ///< of the mixed method, see stretch_local; nothing: that of the configuration
+  const double* axial_force = nullptr;  ///< of the mixed method, see stretch_local; null: that of the configuration
   VectorX end;                          ///< q1
   Configuration configuration;          ///< at z
-  Configuration end_configuration;      ///< at q1, where viscosity or the rule need it
+  Configuration end_configuration;      ///< at q1, if viscosity or the rule needs it
   RoundingBounds rounding;
 
   /// Values that terms share with each other and with read-outs.
@@ -126,13 +127,13 @@ struct StepData {
   VectorX acceleration, inertia;        ///< M times the acceleration [N], [N m]
   TurningForces turning_forces;
   VectorX drag_force;             ///< [N]
-  VectorX flow_force, flow_drag;  ///< of a fluid, and its local drag [N]
+  VectorX flow_force, flow_drag;  ///< force of a fluid, and its local drag [N]
   VectorX contact_gradient, contact_floor;
-  std::vector<Wrench> hands;           ///< per support: of those that yield on the rod, about the origin
+  std::vector<Wrench> hands;           ///< per support that yields: wrench on the rod about the origin
   std::vector<TurningSlopes> turning;  ///< per edge, of an exact matrix in space
 };
 
-/// The step of an evaluation under the energy-momentum rule, from whose data it refers to.
+/// Step of an evaluation under the energy-momentum rule. It refers to `data`, which must outlive it.
 inline DiscreteStep discrete_step(const StepProblem& problem, const StepData& data) {
   return {.start = problem.start_configuration,
           .middle = data.configuration,

@@ -1,6 +1,6 @@
 #pragma once
-/// Derivatives that ordinary and discrete gradients of elastic and viscous forces have in common: those by the
-/// numbers of a stencil, and by the strains at the start of the step.
+/// Derivatives that are common to ordinary and discrete gradients of elastic and viscous forces: by the coefficients of
+/// a stencil, and by the strains at the start of the step.
 
 #include "steps/regular_stencils.hpp"
 
@@ -14,14 +14,14 @@ struct TurningNumbers {
   VectorX& by_time;
   double rate;  ///< 1 / h; without viscosity 0
 
-  /// `along`: rows^T times the strain's gradient; `change`: of the strain from the start, as viscosity takes it.
+  /// `along`: rows^T times the gradient of the strain. `change`: change of the strain from the start, for viscosity.
   void add(Eigen::Index i, int s, double along, double strain, double change) const {
     by_stiffness(i, s) += (strain - natural(i, s)) * along;
     by_natural(i, s) -= stiffness(i, s) * along;
     add_rate(i, s, along, change);
   }
 
-  /// The part of viscosity.
+  /// Adds only the part of viscosity.
   void add_rate(Eigen::Index i, int s, double along, double change) const {
     if (rate == 0.0) return;
     by_stiffness(i, s) += rate * viscous_time(i) * change * along;
@@ -29,7 +29,7 @@ struct TurningNumbers {
   }
 };
 
-/// One stencil's part: its strains in the configurations that matter, and what its numbers are.
+/// Contribution of one stencil: its strains in the necessary configurations, and its coefficients.
 class StencilAdjoint {
  public:
   StencilAdjoint(const StepProblem& problem, const ElementTable& table, int element, StepAdjoint& adjoint)
@@ -52,19 +52,19 @@ class StencilAdjoint {
                                 : middle.strain[strain] - start.strain[strain];
   }
 
-  /// Adds what follows from the start's strain, and from that at q1 = 2 z - q0; `viscous`: kv.
+  /// Adds derivatives through the strain at the start, and through the strain at q1 = 2 z - q0. `viscous`: kv.
   void add_ends(int strain, double viscous) {
     const double factor = viscous * along(strain), share = problem_.in_middle() ? 0.5 : 1.0;
     add_start(strain, -share * factor);
     if (problem_.in_middle()) add_configuration(end.gradient[strain], share * factor, -1.0, adjoint_.end_turn);
   }
 
-  /// Adds `factor` times what the start's strain changes by with the start.
+  /// Adds `factor` times the derivative of the strain at the start by the start.
   void add_start(int strain, double factor) {
     add_configuration(start.gradient[strain], factor, 1.0, adjoint_.start_turn);
   }
 
-  /// `gradient` in a configuration that q0 counts `by_start` times in.
+  /// Adds `gradient` in a configuration whose derivative by q0 is `by_start`.
   void add_configuration(const double* gradient, double factor, double by_start, VectorX& turn) {
     const int* dofs = table_.dofs(element_);
     for (int i = 0; i < table_.width(); ++i)
@@ -90,8 +90,8 @@ class StencilAdjoint {
   double rows_[kMaxLocal];
 };
 
-/// Sum of factors times gradients of strains f (kappa1, kappa2, tau), which are `strain`, of ordinary stencils in
-/// space.
+/// Sum of factors times gradients of the strains f (kappa1, kappa2, tau) of ordinary stencils in space. `strain`:
+/// values of these strains.
 inline VectorX strain_forces(const Model& model, const Assembler& assembler, const BendMeasure& measure,
                              const Configuration& c, const Columns3& strain, const Columns3& factors) {
   // Derivatives of the energy k (s - n)^2 / 2 with s - n = 1.

@@ -22,7 +22,7 @@ Angles angles_of(const TendonSegment& segment) {
   return out;
 }
 
-/// Calls use(place) with where the unknowns of each frame in space begin among those of a segment.
+/// Calls use(place) for each frame in space. `place`: index of its first unknown among the unknowns of a segment.
 template <class Use>
 void for_each_frame(const TendonSegment& segment, const Use& use) {
   const auto& [first, second] = segment.unknowns.guide;
@@ -30,7 +30,7 @@ void for_each_frame(const TendonSegment& segment, const Use& use) {
   if (second.frame >= 0 && second.frame != first.frame) use(second.frame);
 }
 
-/// Refuses what no derivative is known of.
+/// Throws if no derivative is known for this segment.
 void check_differentiable(const StepProblem& problem, const TendonSegment& segment) {
   const auto& [first, second] = segment.seat;
   const std::vector<FrameStencil>& half = problem.model.half;
@@ -64,7 +64,7 @@ void TendonForces::evaluate(const StepProblem& problem, const StepData& data, in
     return tendon_local(model, of, tension, data.z, data.configuration, with_matrix, out);
   discrete_tendon_local(model, of, tension, discrete_step(problem, data), with_matrix, out);
   if (!problem.exact || !with_matrix || model.planar()) return;
-  // Inertia turns the rows of frames, from derivatives by a Cayley vector to moments; these are moments already.
+  // Inertia converts the rows of frames from derivatives by a Cayley vector to moments. These rows are moments already.
   for_each_frame(of, [&](int place) {
     Eigen::Map<Eigen::Matrix<double, 3, kTendonUnknowns, Eigen::RowMajor>> rows(&out.hessian[place][0]);
     rows = (cayley_spin(data.z.segment<3>(of.unknowns.dofs[place])).transpose() * rows).eval();
@@ -113,7 +113,7 @@ void TendonForces::add_adjoint(const StepProblem& problem, const StepData& data,
   }
 }
 
-/// By how frames that carry guides are turned beyond their unknowns, and what is attached to them.
+/// Adds derivatives by rotations of frames that carry guides, beyond their unknowns, and of the attached parts.
 void TendonForces::add_frame_adjoint(const StepProblem& problem, const StepData& data, int segment,
                                      const double (&rows)[kTendonUnknowns], StepAdjoint& adjoint) const {
   const Model& model = problem.model;
@@ -139,7 +139,7 @@ void TendonForces::add_frame_adjoint(const StepProblem& problem, const StepData&
     by -= cayley_moment_slope(w, moment).transpose() * Eigen::Map<const Vector3>(rows + u.frame);
     by = cayley_spin(w).transpose().inverse() * by;
     if (problem.moves()) adjoint.middle_spin.row(model.half[at(h)].frame) += by.transpose();
-    // A hinge's axis goes with the frame, not with what is attached.
+    // The axis of a hinge rotates with the frame, not with the attached part.
     if (u.hinge >= 0) by -= rows[u.hinge] * guide_hinge_axis(model, of, k, data.configuration).cross(moment);
     attachment += (attached_axes(model, data.configuration, data.z, h).transpose() * by).transpose();
   }
@@ -176,7 +176,7 @@ void TendonForces::add_discrete_adjoint(const StepProblem& problem, const StepDa
   }
 }
 
-/// Guides round by eps |x|, and directions with them.
+/// Rounding errors of guides are eps |x|. They also affect directions.
 void TendonForces::add_rounding(const StepProblem& problem, StepData& data) const {
   const Model& model = problem.model;
   for (int s = 0; s < table_.count(); ++s) {

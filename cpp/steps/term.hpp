@@ -1,6 +1,6 @@
 #pragma once
-/// One kind of force among the equations of a step. Terms are named in one table, `make_terms` in terms.cpp; a scene
-/// has those that it needs.
+/// One kind of force in the equations of a step. One table names all terms, `make_terms` in terms.cpp. A scene has the
+/// terms that it needs.
 
 #include <memory>
 #include <span>
@@ -24,37 +24,38 @@ class Term {
   virtual void declare(std::vector<ElementTable*>& /*tables*/) {}
   /// True if its forces are minus the gradient of a potential.
   virtual bool has_potential() const { return true; }
-  /// True if it takes anything from the motion.
+  /// True if it takes energy from the motion.
   virtual bool dissipates(const Parameters&) const { return false; }
-  /// A line for the plan; nothing where there is nothing to say.
+  /// Line for the plan; empty if there is none.
   virtual std::string note() const { return {}; }
 
-  /// Finds what holds through a step that has just begun.
+  /// Computes the values that stay constant during a step that has just begun.
   virtual void begin(StepProblem&) {}
-  /// Finds what acts at data.z before anything is added; where a matrix is wanted, makes room for it.
+  /// Computes the forces at data.z before any term is added. If `with_matrix`, it reserves the entries of the matrix.
   virtual void find(const StepProblem&, StepData&, Assembler&, bool /*with_matrix*/) {}
   /// Adds forces (minus the generalised ones) to the rows, energies to the potential, and derivatives to the matrix:
-  /// `values`, through the assembler's offsets; empty where none is wanted.
+  /// `values`, through the assembler's offsets. `values` is empty if no matrix is needed.
   virtual void add(const StepProblem&, StepData&, const Assembler&, std::span<double> values) const = 0;
-  /// The same of an explicit step with velocities v that nothing resists, at its start: forces alone.
+  /// Adds only the forces at the start of an explicit step with velocities v. Forces that resist velocities are
+  /// omitted.
   virtual void add_explicit(const StepProblem& problem, StepData& data, const Assembler& assembler,
                             const VectorX& /*v*/) const {
     add(problem, data, assembler, {});
   }
-  /// Adds what rounding alone leaves of its rows in the last evaluation, beyond that of their magnitude, to data.floor.
+  /// Adds to data.floor the rounding errors of its rows in the last evaluation that exceed those of their magnitude.
   virtual void add_rounding(const StepProblem&, StepData&) const {}
   /// Energy dissipated over `change` with the forces of the last evaluation [J].
   virtual double dissipated(const StepProblem&, const StepData&, const Assembler&, const VectorX& /*change*/) const {
     return 0.0;
   }
-  /// Adds rows^T times the derivatives of what `add` adds by what the step is given, at z. Throws std::invalid_argument
-  /// where they are not known.
+  /// Adds rows^T times the derivatives of the contribution of `add`, by the input of the step, at z. Throws
+  /// std::invalid_argument if the derivatives are unknown.
   virtual void add_adjoint(const StepProblem&, const StepData&, const Assembler&, StepAdjoint&) const = 0;
-  /// Adds what a user applies, in the last evaluation, to generalised forces.
+  /// Adds the forces that a user applies, of the last evaluation, to generalised forces.
   virtual void add_applied(const StepProblem&, const StepData&, const Assembler&, VectorX& /*force*/) const {}
 };
 
-/// Adds what acts on one element to the rows, and to the matrix where one is wanted.
+/// Adds the forces on one element to the rows and, if `values` is not empty, to the matrix.
 template <int size>
 void add_element(const ElementTable& table, int element, const LocalOf<size>& local, StepData& data,
                  std::span<double> values) {
@@ -62,7 +63,7 @@ void add_element(const ElementTable& table, int element, const LocalOf<size>& lo
   if (!values.empty()) table.add_hessian(element, local.hessian, 1.0, values);
 }
 
-/// Work of what acts on one element over `change` [J].
+/// Work of the forces on one element over `change` [J].
 inline double work_of(const ElementTable& table, int element, const Local& local, const VectorX& change) {
   const int* dofs = table.dofs(element);
   double work = 0.0;

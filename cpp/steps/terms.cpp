@@ -13,7 +13,7 @@
 
 namespace withe {
 
-/// Inertia turns what those before it make of a frame's rows.
+/// Inertia must follow the terms whose rows of frames it converts.
 Terms make_terms(const Model& model, const Loads& loads, StepRule rule, bool exact) {
   const SceneDescription& scene = model.description;
   const bool moves = rule != StepRule::statics;

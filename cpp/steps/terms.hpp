@@ -12,8 +12,8 @@
 
 namespace withe {
 
-/// The terms of a scene in the order in which they are added, and those of them that steps ask by name (nothing where
-/// the scene does without).
+/// The terms of a scene in the order in which they are added, and pointers to the terms that steps use by name (null if
+/// the scene has no such term).
 struct Terms {
   std::vector<std::unique_ptr<Term>> all;
   ContactForces* contact = nullptr;
@@ -22,10 +22,10 @@ struct Terms {
   StokesletForces* stokeslets = nullptr;
 };
 
-/// `rule`: statics know no fluid. `exact`: the Jacobian has every derivative.
+/// `rule`: in statics there is no fluid. `exact`: the Jacobian has every derivative.
 Terms make_terms(const Model& model, const Loads& loads, StepRule rule, bool exact);
 
-/// In words, what makes the Jacobian unsymmetric.
+/// Causes that make the Jacobian unsymmetric, in words.
 std::vector<std::string> asymmetries_of(const Model& model, const Loads& loads, const Terms& terms, StepRule rule,
                                         bool exact);
 

@@ -7,14 +7,15 @@
 
 namespace withe {
 
-/// An edge in a step: as z has it, its vectors at the start (at the end: midpoint rules only), and how its angle moves.
+/// An edge in a step: its frame at z, its vectors at the start and (only for the midpoint rules) at the end, and the
+/// motion of its angle.
 template <class Scalar>
 struct TurningEdge {
   Vec3<Scalar> tangent, spin;  ///< at z
   Scalar inverse_length;
   Vec3<Scalar> start_tangent, end_tangent;
   Scalar start_length, end_length;  ///< energy-momentum steps only
-  Scalar change;                    ///< of the angle from the start to z
+  Scalar change;                    ///< change of the angle from the start to z
   Scalar start_rate;                ///< [rad/s]
 };
 
@@ -25,16 +26,17 @@ struct TurningForce {
   Scalar torque;
 };
 
-/// An edge that spins at omega and turns also needs the couple I omega t x dt/dt: nodal forces
-/// +- I omega (dt/dt x t) / l, which do no work; this one acts at its head. `rate`: of the edge's vector.
+/// An edge that spins at omega and turns also needs the couple I omega t x dt/dt: nodal forces +- I omega (dt/dt x t) /
+/// l, which do no work. The result is the force at its head. `rate`: rate of the vector of the edge.
 template <class Scalar, class Number>
 Vec3<Scalar> spin_couple(const Number& inertia, const Scalar& omega, const Vec3<Scalar>& rate,
                          const Vec3<Scalar>& tangent, const Scalar& inverse_length) {
   return (inertia * omega * inverse_length * inverse_length) * cross(rate, tangent);
 }
 
-/// Inertia of a step of backward Euler over h. psi = theta + spin . e is what turns: the edge's inertia acts on the
-/// nodes as its elastic torque does. It does no work either, since spin is normal to the edge before and now.
+/// Inertia of a step of backward Euler over h. The edge turns by psi = theta + spin . e. Its inertia acts on the nodes
+/// in the same way as its elastic torque. It does no work either, since spin is normal to the edge at the start and at
+/// z.
 template <class Scalar, class Number>
 [[gnu::always_inline]] inline TurningForce<Scalar> euler_turning(const Number& inertia, double interval,
                                                                  const TurningEdge<Scalar>& edge,
@@ -46,11 +48,11 @@ template <class Scalar, class Number>
           torque};
 }
 
-/// Inertia of a step under the midpoint rules over dt, such that angular momentum is kept exactly. The spin's part of
-/// it, I omega t, changes in a step by dt m with m = I (omega1 t1 - omega0 t0) / dt. The moment m acts on the nodes and
-/// the angle of the edge like any other moment, about the edge's position in the middle of the step. In energy-momentum
-/// steps omega is 2 tan(D theta / 2) / dt, as in a rigid rotation of the whole. An axial force that vanishes with the
-/// square of the step makes the work of m equal to the change of kinetic energy.
+/// Inertia of a step under the midpoint rules over dt, such that angular momentum is conserved exactly. The spin's part
+/// of it, I omega t, changes in a step by dt m with m = I (omega1 t1 - omega0 t0) / dt. The moment m acts on the nodes
+/// and the angle of the edge like any other moment, about the edge's position in the middle of the step. In
+/// energy-momentum steps omega is 2 tan(D theta / 2) / dt, as in a rigid rotation of the whole. An axial force that
+/// vanishes with the square of the step makes the work of m equal to the change of kinetic energy.
 template <class Scalar, class Number>
 [[gnu::always_inline]] inline TurningForce<Scalar> midpoint_turning(const Number& inertia, double dt,
                                                                     bool conserves_energy,
@@ -63,7 +65,8 @@ template <class Scalar, class Number>
       Scalar(inertia * inverse) * ((2.0 * inverse * turn - edge.start_rate) * t1 - edge.start_rate * t0);
   const Scalar torque = dot(moment, edge.tangent);
   Vec3<Scalar> force = edge.inverse_length * cross(moment, edge.tangent);
-  // An edge's torque turns its nodes by spin . e as well; that of inertia takes back what all others do.
+  // The torque on an edge also acts on its nodes, through spin . e. The torque of inertia cancels the effect of all
+  // others.
   force += torque * edge.spin;
   if (conserves_energy) {
     const Vec3<Scalar> apart = t1 - t0;

@@ -9,7 +9,7 @@
 namespace withe {
 namespace {
 
-/// A direction, and how it follows its vector: I - t t^T over the length.
+/// A direction, and its derivative by its vector: (I - t t^T) / length.
 struct Direction {
   Vector3 tangent;
   double length;
@@ -21,7 +21,7 @@ struct Direction {
   }
 };
 
-/// Derivatives by the edge's vector at z (`by`) and by that at the start (`by_start`).
+/// Derivatives by the vector of the edge at z (`by`) and at the start (`by_start`).
 struct VectorSlopes {
   Vector3 value;
   Matrix3 by, by_start;
@@ -31,13 +31,13 @@ struct NumberSlopes {
   Vector3 by, by_start;
 };
 
-/// spin = - s x e / G, G = l^2 + l s . e, s the direction at the start.
+/// spin = - s x e / G with G = l^2 + l s . e, where s is the direction at the start.
 [[gnu::always_inline]] inline VectorSlopes spin_slopes(const Vector3& edge, const Direction& middle,
                                                        const Direction& start) {
   const Vector3 &s = start.tangent, across = s.cross(edge);
   const double l = middle.length, along = s.dot(edge), inverse = 1.0 / (l * l + l * along);
   const Vector3 grown = 2.0 * edge + along * middle.tangent + l * s, spin = -inverse * across;
-  // By the vector at the start, A (I - s s^T) / |e0| with A the derivative by s.
+  // The derivative by the vector at the start is A (I - s s^T) / |e0|, where A is the derivative by s.
   const Matrix3 by_direction = inverse * cross_matrix(edge) - (inverse * l) * spin * edge.transpose();
   const Vector3 along_start = by_direction * s;
   return {spin, -inverse * cross_matrix(s) - inverse * spin * grown.transpose(),
@@ -63,7 +63,7 @@ struct NumberSlopes {
   out.by[3][8] = torque_by_rate;
 }
 
-/// The couple I omega (e - e0) x e / (h l^3) and the torque's part.
+/// Derivatives of the couple I omega (e - e0) x e / (h l^3), and of the contribution of the torque.
 ///
 /// Both lie along x = s x e, with the factor -I omega l0 / (h l^3) for the couple and -1 / G for the spin. Their
 /// derivatives contain a rotation of x and a change of its factor: [a] + x g^T by the vector at z, and [b] + x k^T by
@@ -99,7 +99,8 @@ void set_euler_slopes(const TurningStep& step, TurningSlopes& out) {
   out.by[3][8] = -by_rate;
 }
 
-/// Takes away the axial force I r^2 |t1 - t0|^2 / (4 mean cosine) along the edge of energy-momentum steps, r the rate.
+/// Subtracts the axial force I r^2 |t1 - t0|^2 / (4 mean cosine) along the edge of energy-momentum steps, where r is
+/// the rate.
 void add_axial(const TurningStep& step, double rate, double by_angle, const Direction& middle, const Direction& start,
                const Direction& end, VectorSlopes& force, Vector3& force_by_angle) {
   const Vector3 apart = end.tangent - start.tangent, both = end.tangent + start.tangent;
@@ -107,7 +108,7 @@ void add_axial(const TurningStep& step, double rate, double by_angle, const Dire
   const double square = apart.squaredNorm(), lower = 4.0 * mean * cosine;
   const double axial = step.inertia * rate * rate * square / lower;
   const double of_square = step.inertia * rate * rate / lower;
-  // The end is twice z less the start.
+  // The end is q1 = 2 z - q0.
   const Vector3 by_end =
       end.by * (2.0 * of_square * apart - (0.5 * axial / cosine) * middle.tangent) - (0.5 * axial / mean) * end.tangent;
   const Vector3 by_start = -(start.by * (2.0 * of_square * apart + (0.5 * axial / cosine) * middle.tangent)) -
@@ -118,7 +119,7 @@ void add_axial(const TurningStep& step, double rate, double by_angle, const Dire
   force_by_angle -= (2.0 * step.inertia * rate * by_angle * square / lower) * middle.tangent;
 }
 
-/// The moment m = I (omega1 t1 - omega0 t0) / dt: the force m x t / l and the torque m . t.
+/// The moment m = I (omega1 t1 - omega0 t0) / dt gives the force m x t / l and the torque m . t.
 void set_midpoint_slopes(const TurningStep& step, TurningSlopes& out) {
   const Vector3 edge = to_eigen(step.edge), at_start = to_eigen(step.start);
   const Direction middle(edge), start(at_start), end(2.0 * edge - at_start);

@@ -6,13 +6,13 @@
 
 namespace withe {
 
-/// An edge in a step over `duration`, by what its derivatives are taken.
+/// An edge in a step over `duration`: the variables by which derivatives are taken.
 struct TurningStep {
   StepRule rule;
   double duration;      ///< [s]
-  double inertia;       ///< of the edge about itself [kg m^2]
+  double inertia;       ///< moment of inertia about the edge [kg m^2]
   Vec3d edge, start;    ///< its vector at z, and at the start [m]
-  double change, rate;  ///< of its angle, from the start to z, and its rate at the start
+  double change, rate;  ///< change of its angle from the start to z, and its rate at the start
 };
 
 void set_turning_slopes(const TurningStep& step, TurningSlopes& out);
