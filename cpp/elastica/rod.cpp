@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kLongestSegment = 0.6, kLongestStep = 0.6;
 constexpr double kTurnPerStep = 0.7;  ///< [rad]
-constexpr double kDecay = 0.6;        ///< as much of the exponent with which a bend dies out along a pulled rod
+constexpr double kDecay = 0.6;        ///< share of the decay rate of a bend along a rod in tension
 
 double size_of(double x, double y, double z) { return std::sqrt(x * x + y * y + z * z); }
 
@@ -45,7 +45,7 @@ RodField field_of(const RodProblem<end>& problem, const RodVector& force) {
           {static_cast<int>(one), static_cast<int>(other)}};
 }
 
-/// The segments from one on; those beyond the last are the last once more.
+/// The block of segments from `first` on. Lanes beyond the last segment repeat the last one.
 template <RodEnd end>
 RodBlock block_at(const RodProblem<end>& problem, const typename RodProblem<end>::Path& path, const RodVector& force,
                   std::size_t first, int parts) {
@@ -150,7 +150,7 @@ double RodProblem<end>::gap(const Path& path, std::size_t segment, int i, double
 template <RodEnd end>
 void RodProblem<end>::put_end(const Path& path, System& system) const {
   const auto& y = path.nodes.back();
-  // Only two components of m are free, for m.t is known: not the one along which t is greatest.
+  // Only two components of m are free, since m.t is known. The component along which t is greatest is not free.
   std::array<std::size_t, 2> rows{6, 8};
   if constexpr (end == RodEnd::no_moment) {
     std::size_t along = 0;

@@ -34,11 +34,11 @@ constexpr double kRodBendStiffness = 2.0;  ///< EI [w Lgb^2]
 
 /// Condition at the held end, and which two of the floor's three forces are unknown for it.
 enum class RodEnd {
-  no_moment,    ///< a gripper that bends nothing; F along y and z
+  no_moment,    ///< a gripper that exerts no moment; F along y and z
   plane_of_xz,  ///< position along x and z; F along x and z
 };
 
-/// States t, m; with the position r where `end` asks for it.
+/// States t, m, and the position r if `end` requires it.
 template <RodEnd end>
 class RodProblem {
  public:
@@ -49,15 +49,15 @@ class RodProblem {
 
   double stretch_stiffness = 1e9;  ///< EA [w Lgb]
   double given_force = 0;          ///< the third component of F
-  double lever = 0;                ///< of F below the centreline [Lgb]
+  double lever = 0;                ///< distance of F below the centreline [Lgb]
   double behind = 0;               ///< b: how far behind lift-off F_y acts [Lgb]
-  std::array<double, 2> goal{};    ///< of the position
+  std::array<double, 2> goal{};    ///< required position
   std::vector<double> cuts;        ///< s of each node; the last one is the suspended length
 
   RodVector floor_force(const Path& path) const;
   double twist(const Path& path) const { return -lever * floor_force(path)[1]; }  ///< m.t
   void linearise(const Path& path, System& system) const;
-  /// The gaps alone; slopes along the rod stay as they are.
+  /// Computes only the gaps. The slopes along the rod do not change.
   void put_gaps(const Path& path, System& system) const;
 
  private:
@@ -73,7 +73,7 @@ std::vector<double> rod_cuts(double suspended);
 /// A point of a solved rod.
 struct RodPoint {
   RodVector tangent{}, moment{}, position{};
-  Quaternion rotation{1, 0, 0, 0};  ///< from the frame at lift-off
+  Quaternion rotation{1, 0, 0, 0};  ///< rotation relative to the frame at lift-off
 };
 
 /// Everything that a solved path implies, by one more pass along it.
@@ -81,7 +81,7 @@ struct RodShape {
   double suspended = 0, stretch_stiffness = 1e9;
   RodVector floor_force{};
   std::vector<double> places;    ///< s of the points
-  std::vector<RodPoint> points;  ///< at `spread` points a segment of the path, the cuts among them
+  std::vector<RodPoint> points;  ///< `spread` points per segment of the path, including the cuts
   double twist = 0;              ///< m.t, which the points' rotations do not show: they are transported in parallel
   double residual = 0;           ///< largest gap at a cut or at the end
   double lowest = 0;             ///< least height of the points

@@ -1,6 +1,6 @@
 #pragma once
-/// Grasps that lay a rod: for a suspended length and the curvature at lift-off, where a gripper holds it that bends
-/// nothing, while the floor gives no force along the rod, or a given one.
+/// Grasps that lay a rod. For a suspended length and the curvature at lift-off, they give the pose of a gripper that
+/// exerts no moment. The force of the floor along the rod is zero, or given.
 
 #include <vector>
 
@@ -12,25 +12,25 @@ using GraspProblem = RodProblem<RodEnd::no_moment>;
 
 /// Question about a grasp. Lengths in Lgb, forces in w Lgb.
 struct GraspQuestion {
-  double suspended = 1, curvature = 0;  ///< of either sign
+  double suspended = 1, curvature = 0;  ///< the curvature has either sign
   double stretch_stiffness = 1e9;       ///< EA
-  double axial_force = 0;               ///< of the floor on the rod, along x
-  double base_angle = 0;  ///< of the tangent at the floor above x, where a free end stands there: then no curvature
-  double lever = 0;       ///< of the floor's force below the centreline, the radius of a rod that rests on its surface
-  double twist_stiffness = 4.0 / 3.0;  ///< GJ, by default that of a round rod of incompressible material
+  double axial_force = 0;               ///< force of the floor on the rod, along x
+  double base_angle = 0;  ///< angle of the tangent at the floor above x if a free end stands there; then no curvature
+  double lever = 0;       ///< distance of the floor's force below the centreline: the radius of the rod
+  double twist_stiffness = 4.0 / 3.0;  ///< GJ; the default is for a round rod of incompressible material
 };
 
 /// Result of one grasp. Lengths in Lgb, forces in w Lgb.
 struct RodGrasp {
-  RodPoint tip{};  ///< its rotation with the twist
+  RodPoint tip{};  ///< its rotation includes the twist
   RodVector floor_force{};
   double residual = 0;
   bool solved = false;  ///< and above the floor, which pushes
   bool stable = false;
 };
 
-/// Solutions over suspended length and curvature, tabulated once, so that every other solution begins next to its
-/// answer. Beyond kLongestRow the shape near the floor no longer depends on the length, and what hangs above is a
+/// Solutions over suspended length and curvature, tabulated once. Every other solution begins from a tabulated one
+/// nearby. Beyond kLongestRow the shape near the floor no longer depends on the length, and the part above it is a
 /// catenary.
 class GraspTable {
  public:

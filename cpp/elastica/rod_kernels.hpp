@@ -1,6 +1,6 @@
 #pragma once
-/// Integration across the segments of a rod, by the instruction set in use. The segments of multiple shooting know
-/// nothing of each other, so they go side by side, in packs.
+/// Integration across the segments of a rod, by the instruction set in use. The segments of multiple shooting are
+/// independent of each other. They are therefore integrated at once, in packs.
 
 #include "common/instruction_set.hpp"
 
@@ -24,7 +24,7 @@ struct RodField {
 struct RodBlock {
   ByRodSegment s, part, steps;
   int parts, most_steps;
-  ByRodSegment lever, behind;  ///< of the floor's force; zero but where a rod lifts off
+  ByRodSegment lever, behind;  ///< of the floor's force; zero except at the lift-off of a rod
   ByRodSegment state[kRodTurning];
 };
 

@@ -8,8 +8,8 @@
 
 namespace withe {
 
-/// d(t, m)/ds, then of what follows from them: r, or r and the quaternion that turns x as the tangent turns. A Number
-/// has no derivatives.
+/// d(t, m)/ds, then the derivatives of the quantities that follow from t and m: r, or r and the quaternion that rotates
+/// x with the tangent. A Number has no derivatives.
 template <class Scalar, class Number>
 struct RodSlope {
   Scalar floor[3];

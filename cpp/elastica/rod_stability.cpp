@@ -96,7 +96,8 @@ Element element(const RodShape& shape, std::size_t i, double twist_stiffness) {
 }  // namespace
 
 bool rod_is_stable(const RodShape& shape, double twist_stiffness) {
-  // Block elimination of f from node to node; of c what is left in the end. Both ends' f are zero.
+  // Block elimination of f from node to node. The remaining part of c is eliminated at the end. f is zero at both
+  // ends.
   int negative = 0;
   Element last = element(shape, 0, twist_stiffness);
   Matrix pivot = last.after, by_end = last.after_end, end = last.end;

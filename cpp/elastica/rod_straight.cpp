@@ -13,7 +13,7 @@ namespace withe {
 namespace {
 
 using Path = HeldProblem::Path;
-constexpr double kFoldedForce = 4.913426;  ///< of the floor on a long folded rod that does not stretch [w Lgb]
+constexpr double kFoldedForce = 4.913426;  ///< force of the floor on a long folded rod that does not stretch [w Lgb]
 constexpr double kFoldedSolved = 9.0;      ///< length at which that is nearly so
 constexpr double kBelowFloor = 1e-6, kLongestMove = 0.4, kLongestElement = 0.12;
 

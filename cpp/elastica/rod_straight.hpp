@@ -20,7 +20,7 @@ class StraightRod {
   StraightRod(double suspended, double stretch_stiffness);
   static constexpr double kShortest = 0.3, kLongest = 50.0;
 
-  /// The one that bends gently, and the one that is folded over, where it stays above the floor.
+  /// The solution with small bending, and the folded solution, if it stays above the floor.
   const HeldProblem::Path& gentle() const { return gentle_; }
   const std::optional<HeldProblem::Path>& folded() const { return folded_; }
 

@@ -53,8 +53,9 @@ std::array<int, SheetProblem::kSegments> steps_of(const SheetWidth& width, const
 
 using Segments = std::array<BySegment, SheetProblem::kStates>;
 
-/// Steps of an even sheet end at equal shares of the length, those of another one also where pieces of the width do.
-/// The kernels take as many steps of all segments: those that have fewer rest in the end.
+/// Steps of a sheet of uniform width end at equal shares of the length. Steps of other sheets also end at the ends of
+/// pieces of the width. The kernels take the same number of steps in all segments. A segment with fewer steps ends with
+/// steps of zero length.
 class SheetSchedule {
  public:
   SheetSchedule(const SheetWidth& width, const SheetProblem::Path& path) : width_(width), length_(path.values[2]) {
@@ -288,8 +289,8 @@ double zero_between(const Sign& from, const Sign& to, double step) {
   return place;
 }
 
-/// Moves to where a sign is zero within a step from s to s + h: by a cubic, and a step of Newton's method from there.
-/// What is sought there is greatest or least, so an error of 1e-5 of the step is one of 1e-10 in it.
+/// Moves to the zero of a sign within a step from s to s + h: by a cubic, and then by a step of Newton's method. The
+/// requested quantity has an extremum there, so that an error of 1e-5 of the step changes it by only 1e-10.
 void move_to_extreme(const SheetSlope<double, double>& slope, double& s, double h, std::array<double, 4>& y,
                      std::size_t which, const Sign& from, const Sign& to) {
   const double place = h * zero_between(from, to, h);

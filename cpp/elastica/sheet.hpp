@@ -29,7 +29,7 @@ enum class TipTarget {
   position,              ///< x = length - X and z = Z: the tip's way back and up from where it lay in the flat sheet
   length_and_angle,      ///< suspended length, and theta at the tip
   length_and_direction,  ///< suspended length, and the angle atan2(x, z) of that way
-  pose,                  ///< position and theta; the moment at the tip is what comes out
+  pose,                  ///< position and theta are given; the moment at the tip is a result
   sliding                ///< height and theta while the sheet slides, T = friction (R + weight that lies); x comes out
 };
 
@@ -43,11 +43,11 @@ class SheetProblem {
   SheetShape shape;
   TipTarget target = TipTarget::position;
   std::array<double, 3> goal{};  ///< the two or three numbers of the target in the order of its name; x, z, theta
-  double friction = 0;           ///< of `sliding`: coefficient, with the sign of T
-  double sheet_length = 0;       ///< of `sliding`: of the whole sheet [Lgb]
+  double friction = 0;           ///< for `sliding`: coefficient, with the sign of T
+  double sheet_length = 0;       ///< for `sliding`: length of the whole sheet [Lgb]
 
   void linearise(const Path& path, System& system) const;
-  /// The gaps alone; slopes stay as they are.
+  /// Computes only the gaps. The slopes do not change.
   void put_gaps(const Path& path, System& system) const;
 
  private:
@@ -66,7 +66,7 @@ inline double tip_angle(const SheetProblem::Path& path) { return path.nodes.back
 
 /// Extremes along a solved path. Lengths in Lgb, forces in w Lgb.
 struct SheetExtremes {
-  double largest_curvature = 0;  ///< of its absolute value
+  double largest_curvature = 0;  ///< largest absolute curvature
   double smallest_angle = 0;
   double largest_angle = 0;
   double lowest = 0;

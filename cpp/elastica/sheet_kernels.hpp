@@ -1,6 +1,6 @@
 #pragma once
-/// Integration across the segments of a sheet, by the instruction set in use. The segments of multiple shooting know
-/// nothing of each other, so they go side by side, in packs.
+/// Integration across the segments of a sheet, by the instruction set in use. The segments of multiple shooting are
+/// independent of each other. They are therefore integrated at once, in packs.
 
 #include "common/instruction_set.hpp"
 
@@ -13,15 +13,15 @@ constexpr int kSheetUnknowns = 5;
 /// One number a segment.
 using BySegment = double[kSheetSegments];
 
-/// A step of each segment, from s to s + h; both are a constant and a share of the length. A segment that has come to
-/// its end has h = 0. The piece of the width is that of `WidthPiece`.
+/// A step of each segment, from s to s + h. Both are a constant plus a share of the length. A segment that has reached
+/// its end has h = 0. The piece of the width is as in `WidthPiece`.
 struct SheetStep {
   BySegment s, s_by_length, h, h_by_length, begin, width, slope, weight;
 };
 
 struct SheetSegments {
   double up, forward, length;
-  double weight, weight_by_length;  ///< of all that is lifted
+  double weight, weight_by_length;  ///< weight of the lifted part
   bool even;                        ///< steps are of equal shares of the length, and b = 1
   int count;                        ///< of steps
   const SheetStep* steps;

@@ -45,7 +45,7 @@ bool bearable(const SheetWidth& width, const Path& path) {
   return path.values[1] > -SheetManifold::kGreatestPull * narrow && path.values[0] > 0;
 }
 
-/// Numbers that stay smooth towards short lengths, where gravity does nothing; forces over the mean width.
+/// Variables that remain smooth for short lengths, where gravity has no effect. Forces are divided by the mean width.
 void add_scaled(double share, double width, const Path& from, Path& sum) {
   const double length = from.values[2];
   for (std::size_t k = 0; k < from.nodes.size(); ++k) {
@@ -254,7 +254,7 @@ void SheetManifold::interpolate(const Patch& patch, Path& path) const {
   path.values[1] *= width / (length * length);
 }
 
-/// Without moment at the tip, and on from there to the moment that is asked for.
+/// Solves without moment at the tip, and continues from there to the requested moment.
 bool SheetManifold::solve(double tip_moment, Data& data) const {
   SheetProblem& problem = data.problem;
   problem.shape = {width_, 0.0};

@@ -39,7 +39,7 @@ class SheetManifold {
   };
   static constexpr std::size_t kPoints = 4;
   using Weights = std::array<double, kPoints>;
-  /// Rows and columns around a cell that all have solutions, 4 by 4 or just the cell's, and what each of them weighs.
+  /// Rows and columns around a cell that all have solutions (4 by 4, or only those of the cell), and their weights.
   struct Patch {
     Cell first;
     std::size_t points;  ///< each way
@@ -61,8 +61,8 @@ class SheetManifold {
 
   SheetWidth width_;
   std::vector<double> lengths_, directions_;
-  std::vector<SheetProblem::Path> nodes_;          // empty where there is no solution, or a taut one
-  std::vector<std::size_t> first_row_, last_row_;  // of each column
+  std::vector<SheetProblem::Path> nodes_;          // empty if there is no solution, or a taut one
+  std::vector<std::size_t> first_row_, last_row_;  // per column
 };
 
 }  // namespace withe

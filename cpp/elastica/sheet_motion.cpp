@@ -6,7 +6,7 @@ namespace withe {
 
 namespace {
 
-constexpr double kLeastShare = 1.0 / 256;  // of a way between two poses on which a sheet is dragged
+constexpr double kLeastShare = 1.0 / 256;  // smallest share of a motion between two poses, for dragged sheets
 
 bool move_to(const SheetPose& from, const SheetPose& to, SheetMotionData& data, double least = kLeastShare) {
   data.problem.target = TipTarget::pose;
@@ -16,8 +16,8 @@ bool move_to(const SheetPose& from, const SheetPose& to, SheetMotionData& data, 
                 });
 }
 
-/// Height and angle to those of a pose, while the ratio of forces becomes the friction coefficient (with its sign): a
-/// sheet that is held beyond friction is let go little by little.
+/// Moves height and angle to those of a pose, while the ratio of forces approaches the friction coefficient (with its
+/// sign). A sheet that is held beyond friction is thus released gradually.
 bool slide_to(const SheetPose& from, const SheetPose& to, double friction, double sheet_length, SheetMotionData& data,
               double least = kLeastShare) {
   const double lies = lying_weight(data.problem.shape.width, data.path, sheet_length);
@@ -61,7 +61,7 @@ bool drag_sheet(const SheetPose& pose, const SheetFriction& friction, double& sl
   if (!slide_to(pose_of(data.path), pose, sign * friction.coefficient, friction.sheet_length, data)) return false;
   const double slid = pose[0] - tip_back(data.path) - slide;
   slide += slid;
-  // Friction that would push a sheet along is no friction: what was found lies past a snap.
+  // Friction cannot drive the motion of a sheet: such a solution is beyond a snap.
   return sign * slid > -1e-9 && some_lies();
 }
 

@@ -31,16 +31,17 @@ void set_sheet_forces(const SheetShape& shape, const SheetForces& forces, SheetM
 /// smallest increment, `least_share` of the motion.
 bool move_sheet(const SheetPose& pose, SheetMotionData& data, double least_share = 1.0 / 16);
 
-/// Coulomb's law for a sheet that lies as a rigid body behind its lift-off point: |T| <= friction (R + weight of
-/// what lies).
+/// Coulomb's law for a sheet whose part behind the lift-off point lies like a rigid body: |T| <= friction (R + weight
+/// of this part).
 struct SheetFriction {
   double coefficient = 0;
   double sheet_length = 0;  ///< [Lgb]
 };
 
-/// Moves the tip as move_sheet does, and lets the sheet slide where its forces would exceed friction. `slide` is how
-/// far it has slid back, away from where its tip lay [Lgb]; poses are those of the tip in the frame of the floor. False
-/// where no equilibrium is within reach, the sheet snaps, and where nothing of it lies any more.
+/// Moves the tip like move_sheet, and lets the sheet slide if its forces would exceed friction. `slide`: distance that
+/// the sheet has slid back, away from the place where its tip lay [Lgb]. Poses are poses of the tip in the frame of the
+/// floor. Returns false if no equilibrium is within reach (the sheet snaps), or if no part of the sheet lies on the
+/// floor.
 bool drag_sheet(const SheetPose& pose, const SheetFriction& friction, double& slide, SheetMotionData& data);
 
 }  // namespace withe

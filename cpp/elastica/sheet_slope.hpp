@@ -8,7 +8,8 @@
 
 namespace withe {
 
-/// From a place on: b = width + slope (t - begin), t the distance from the tip; `weight` is that of all before it.
+/// Piece of the width from a place on: b = width + slope (t - begin), where t is the distance from the tip. `weight`:
+/// weight of all pieces before it.
 template <class Number>
 struct WidthPiece {
   Number begin = 0.0, width = 1.0, slope = 0.0, weight = 0.0;
@@ -42,7 +43,7 @@ struct SheetSlope {
   Scalar up, forward, length;
   bool even = true;  ///< b = 1 all along; of others:
   WidthPiece<Number> piece{};
-  Scalar weight{};  ///< of all that is lifted
+  Scalar weight{};  ///< weight of the lifted part
 
   std::array<Scalar, 4> operator()(const Scalar& s, const std::array<Scalar, 4>& y) const {
     const auto [sine, cosine] = sine_cosine(y[0]);

@@ -1,6 +1,6 @@
 #pragma once
-/// Width of a sheet along it, in straight pieces: that of a square folded over its diagonal grows from the corner that
-/// is held to the middle, and falls again.
+/// Width along a sheet, piecewise linear. Example: the width of a square that is folded over its diagonal grows from
+/// the held corner to the middle, and then decreases.
 
 #include <cstddef>
 #include <vector>

@@ -22,7 +22,7 @@ struct ShootingPath {
   std::array<double, parameters> values{};
 };
 
-/// The linearised equations: link k says A dy(k) + B dp - dy(k + 1) = -gap, the end C dy(last) + D dp = -gap.
+/// The linearised equations: A dy(k) + B dp - dy(k + 1) = -gap of link k, and C dy(last) + D dp = -gap of the end.
 template <int states, int parameters>
 struct ShootingSystem {
   struct Link {
@@ -50,13 +50,13 @@ class ShootingElimination {
   using System = ShootingSystem<states, parameters>;
   using Path = ShootingPath<states, parameters>;
 
-  /// `step` receives the change of all nodes (0 at the first) and parameters; false where the system is singular.
+  /// `step` receives the change of all nodes (0 at the first) and parameters; returns false if the system is singular.
   bool solve(const System& system, Path& step) {
     const std::size_t links = system.links.size();
     kept_.resize(links);
     step.nodes.resize(links + 1);
     step.nodes[0].fill(0.0);
-    // Rows over dy(k + 1), dp and the right-hand side that hold whatever happened before.
+    // Rows over dy(k + 1), dp and the right-hand side, from which all earlier unknowns are eliminated.
     double carried[states][kCarried] = {};
     put_link(system.links[0], carried);
     for (std::size_t k = 1; k < links; ++k) {
@@ -144,10 +144,10 @@ class ShootingElimination {
 
 struct ShootingOptions {
   int iterations = 20;
-  double step_tolerance = 1e-7;  ///< Newton converges quadratically: what is left after such a step is its square
+  double step_tolerance = 1e-7;  ///< Newton's method converges quadratically: the error after such a step is its square
   double smallest_damping = 1.0 / 64;
-  double chord_step = 1e-2;        ///< after one as short a chord iteration, with the same matrix, is tried
-  double chord_tolerance = 1e-13;  ///< it ends there if what is left of it, at the rate of both steps, is no more
+  double chord_step = 1e-2;        ///< after a shorter step, a chord iteration (with the same matrix) is tried
+  double chord_tolerance = 1e-13;  ///< greatest remaining error, estimated from the rate of both steps
 };
 
 struct ShootingOutcome {
@@ -156,8 +156,8 @@ struct ShootingOutcome {
 };
 
 /// Newton's method with halved steps. A Problem has kStates, kParameters and
-/// `void linearise(const Path&, System&) const`, which fills links and end. The path is left where it came to. A
-/// Problem that finds gaps for much less than slopes has `void put_gaps(const Path&, System&) const` too.
+/// `void linearise(const Path&, System&) const`, which fills links and end. The path is left at the last iterate. A
+/// Problem that can compute gaps much faster than slopes also has `void put_gaps(const Path&, System&) const`.
 template <class Problem>
 class ShootingSolver {
  public:
@@ -197,8 +197,8 @@ class ShootingSolver {
   }
 
  private:
-  /// After a step of that size: takes one more with the same matrix, and says whether that is enough. The rate at which
-  /// such steps contract is their ratio.
+  /// After a step of the given size, takes one more with the same matrix. Returns true if this is enough. The rate of
+  /// convergence of such steps is the ratio of their sizes.
   bool chord_ends(const Problem& problem, double size, const ShootingOptions& options) {
     if constexpr (requires { problem.put_gaps(trial_, system_); }) {
       problem.put_gaps(trial_, system_);
@@ -229,9 +229,9 @@ class ShootingSolver {
   Path step_, chord_, trial_;
 };
 
-/// Continuation: `ask(share, guess)` poses the problem at a share of the way from what `path` solves to what is wanted,
-/// and may change the guess. Steps adapt; false where one below `least` would be needed: then `path` solves the last
-/// problem that had an answer.
+/// Continuation. `ask(share, guess)` sets the problem at a share of the way from the problem that `path` solves to the
+/// requested one, and may change the guess. Steps adapt. Returns false if a step below `least` would be needed. Then
+/// `path` solves the last problem that had a solution.
 template <class Problem, class Ask>
 bool follow(ShootingSolver<Problem>& solver, const Problem& problem, double least,
             typename ShootingSolver<Problem>::Path& path, typename ShootingSolver<Problem>::Path& trial,

@@ -14,8 +14,8 @@ using SparseMatrix = Eigen::SparseMatrix<double>;
 struct CustomForces {
   MatrixX3 forces;   ///< per node [N]
   MatrixX3 moments;  ///< per node, in world axes [N m]; empty: none
-  /// dF/dx [N/m] and dF/dv [N s/m]: three rows a node for forces, then three a node for moments if there are any; three
-  /// columns a node. Empty: zero, or not asked for.
+  /// dF/dx [N/m] and dF/dv [N s/m]: three rows per node for forces, then three per node for moments if there are any;
+  /// three columns per node. Empty: zero, or not requested.
   SparseMatrix by_position, by_velocity;
 };
 

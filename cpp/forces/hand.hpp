@@ -1,8 +1,8 @@
 #pragma once
-/// An elastic connection between a hand and a point of a rod, with the frame of the edge that it is on.
+/// An elastic connection between a hand and a point of a rod, with the frame of the edge that contains the point.
 ///
-/// The hand, at p with its axes R, has grasped the point at p + R a, and the directors G = R F (columns d1, d2, t).
-/// Then
+/// The hand is at p and has the axes R. It has grasped the point at p + R a, with the directors G = R F (columns d1,
+/// d2, t). Then
 ///   E = (K u . u) / 2 + (C1 r1^2 + C2 r2^2 + C3 r3^2) / 2,   u = G^T (x - p - R a) - s.
 /// Here x is the present position of the point, and s its slip. K = diag(k1, k2, k3) [N/m] acts along d1, d2, t. The
 /// strains r from G to the edge's frame are those of elasticity/bend_twist.hpp, with the stiffnesses C1, C2, C3
@@ -22,10 +22,10 @@
 
 namespace withe {
 
-/// Force of a point that slips beyond `limit` [N], with K u in the axes of what is grasped.
+/// Force of a point that slips beyond `limit` [N], with K u in the axes of the grasped part.
 struct CappedForce {
   Vector3 force = Vector3::Zero();  ///< [N]
-  double share = 1.0;               ///< of K u that is left
+  double share = 1.0;               ///< share of K u that remains
 };
 
 inline CappedForce capped(const Vector3& elastic, double limit) {

@@ -1,8 +1,9 @@
 #pragma once
-/// Motor, spring and damper of a revolute joint, by its angle theta since the drawing [rad]: the torque
+/// Motor, spring and damper of a revolute joint. Its angle theta is measured from the drawing [rad]. The torque
 ///   T = m - k (theta - theta0) - c dtheta/dt
-/// on what turns, and its opposite on what it turns against: a motor's moment m [N m], stiffness k [N m/rad] towards
-/// the rest angle theta0 [rad], damping c [N m s/rad]. A servo is a stiffness whose rest angle is moved.
+/// acts on the turning part, and its opposite on the part against which it turns. A
+/// motor has the moment m [N m], a spring the stiffness k [N m/rad] and the rest angle theta0 [rad], and a damper the
+/// damping c [N m s/rad]. A servo is a spring whose rest angle moves.
 ///
 /// T is linear in theta. A step of dt uses the angle at its end, or the middle angle (theta0 + theta1) / 2. With the
 /// middle angle the work T (theta1 - theta0) is exactly the loss of k (theta - theta0)^2 / 2, minus the dissipation of

@@ -162,8 +162,8 @@ void pressure_on_edge(const Model& model, const VectorX& q, int edge, const Vect
     }
 }
 
-/// Edges that a load at a place of a rod acts on: those of the rod, and what is bent against them there, as the next
-/// rod in a row of rods is.
+/// Edges on which a load at a place of a rod acts: edges of the rod, and edges that bend against them at this node,
+/// such as the next rod in a row of rods.
 std::vector<int> edges_at(const Model& model, const RodPass& pass) {
   const RodDescription& rod = model.description.rods[at(pass.rod)];
   const int first = model.rod_first_edge[at(pass.rod)], last = model.rod_first_edge[at(pass.rod) + 1] - 1;
@@ -179,7 +179,8 @@ std::vector<int> edges_at(const Model& model, const RodPass& pass) {
   return edges;
 }
 
-/// Custom moments: each on the joint at its node, what others turn against there, or else shared evenly by the edges.
+/// Adds custom moments. A moment acts on the frame of a joint at its node, preferably on a frame against which others
+/// turn. Without a joint it acts evenly on the edges of the node.
 void add_node_moments(const Model& model, Loads& loads) {
   loads.node_moments = model.node_count;
   std::vector<std::vector<int>> edges(at(model.node_count));
@@ -212,7 +213,7 @@ Loads resolve_loads(const Model& model) {
   for (std::size_t k = 0; k < scene.loads.size(); ++k) {
     const LoadDescription& load = scene.loads[k];
     const auto index = static_cast<int>(first_load_row(scene, k));
-    const int stride = load.values.rows() > 1 ? 1 : 0;  // in rows, from edge to edge
+    const int stride = load.values.rows() > 1 ? 1 : 0;  // rows from one edge to the next
     const RodDescription& rod = scene.rods[at(load.pass.rod)];
     const int first = model.rod_first_edge[at(load.pass.rod)], last = model.rod_first_edge[at(load.pass.rod) + 1] - 1;
     if (load.kind == LoadKind::pressure) {

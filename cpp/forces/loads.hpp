@@ -16,17 +16,17 @@ namespace withe {
 
 enum class LoadShape { dead_node, follower, edge_moment, frame_moment, edge_pressure };
 
-/// One piece of a load: what it acts on, and its value.
+/// One piece of a load: the node, edge or frame on which it acts, and its value.
 struct LoadPiece {
   LoadShape shape;
   int load;       ///< row of `Parameters::loads`; -1: a custom moment on the node
-  double weight;  ///< how much of the value it is [-], or over which length [m]
+  double weight;  ///< share of the value [-], or length over which it acts [m]
   int node = -1;
-  int edge = -1;  ///< that carries a follower or takes a moment
+  int edge = -1;  ///< edge that carries a follower load or receives a moment
   int frame = -1;
-  int hinge = -1;         ///< in space: of the frame, that what a moment acts on turns about
-  bool follower = false;  ///< of a moment: whether it turns with its edge or frame
-  bool along = false;     ///< of a load along a rod: whether its weight is a part of the edge's length
+  int hinge = -1;         ///< in space: hinge of the frame about which the loaded part turns
+  bool follower = false;  ///< true if a moment turns with its edge or frame
+  bool along = false;     ///< true if the weight is a part of the length of the edge (load along a rod)
 };
 
 struct Loads {
@@ -35,17 +35,17 @@ struct Loads {
   bool unsymmetric = false;
 };
 
-/// Resolves the loads of a description: which node, edge or frame each acts on.
+/// Resolves the loads of a description: finds the node, edge or frame on which each acts.
 Loads resolve_loads(const Model& model);
 
-/// True if the forces of a piece and its like along the rod are minus the gradient of a potential.
+/// True if the forces of this piece, with all such pieces along the rod, are minus the gradient of a potential.
 bool has_potential(const Model& model, const LoadPiece& piece);
 
 /// Unknowns of a piece in the order of its Local; -1 where there is none.
 int load_dofs(const Model& model, const LoadPiece& piece, int (&dofs)[kMaxLocal]);
 
-/// Minus the generalised force of a piece of a load of that value, and minus its Jacobian (not symmetric in space). The
-/// energy is that of a pressure, which sums to a potential along closed rods; of others it is zero.
+/// Minus the generalised force of a piece for the value `load`, and minus its Jacobian (not symmetric in space). The
+/// energy is only that of a pressure, whose sum along closed rods is a potential. For other loads it is zero.
 void load_local(const Model& model, const State& state, const VectorX& q, const Configuration& c,
                 const LoadPiece& piece, const Vector3& load, Local& out);
 

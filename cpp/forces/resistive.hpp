@@ -16,8 +16,8 @@ struct ResistiveCoefficients {
 /// Resistance coefficients of waves of length L (along the rod): c_t = 2 pi / ln(0.18 L / a), c_n = 4 pi / (ln(0.18 L /
 /// a) + 1/2) [Lighthill 1976, SIAM Review 18, section 5]. Without waves (L = 0), the coefficients are those of a
 /// straight rod of length l, taken as the spheroid with its length and radius. They are c_t = 2 pi / (ln(l / a) - 1/2)
-/// and c_n = 4 pi / (ln(l / a) + 1/2) [Happel and Brenner 1965, section 5-11]. Throws std::invalid_argument where the
-/// rod is too thick for either.
+/// and c_n = 4 pi / (ln(l / a) + 1/2) [Happel and Brenner 1965, section 5-11]. Throws std::invalid_argument if the rod
+/// is too thick for these formulas.
 ResistiveCoefficients resistive_coefficients(double radius, double length, double wavelength);
 
 /// Minus the force on an edge's nodes, half of it on each, over a step in which they move by `change` within
@@ -26,9 +26,9 @@ ResistiveCoefficients resistive_coefficients(double radius, double length, doubl
 struct ResistiveEdge {
   int dimension;            ///< 3, or 2 in a plane
   double along, across;     ///< resistance of half the edge [N s / m]
-  double tangent[3];        ///< at the end
-  double inverse_length;    ///< at the end [1 / m]
-  double change[2][3];      ///< of tail and head [m]
+  double tangent[3];        ///< at the end of the step
+  double inverse_length;    ///< at the end of the step [1 / m]
+  double change[2][3];      ///< displacements of tail and head [m]
   double inverse_duration;  ///< [1 / s]
 };
 void resistive_local(const ResistiveEdge& edge, bool with_hessian, Local& out);

@@ -28,7 +28,7 @@ struct Ring {
   double stiffness = 0;           ///< k [N/m]
   bool holds = false;             ///< along the rod
   double friction = 0;            ///< mu [-]
-  double force_limit = INFINITY;  ///< of a drive [N]
+  double force_limit = INFINITY;  ///< greatest force of a drive [N]
   double rounding = 0;            ///< bound of the rounding error of u [m]
 
   bool slips() const { return friction > 0.0 || std::isfinite(force_limit); }

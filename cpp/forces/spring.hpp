@@ -1,17 +1,18 @@
 #pragma once
-/// A spring with a damper beside it (Kelvin and Voigt) between two nodes that are d = x1 - x0 apart, l = |d|:
+/// A spring with a parallel damper (Kelvin and Voigt) between two nodes at x0 and x1, with d = x1 - x0 and l = |d|:
 ///   E = (k / 2) (l - L)^2,   n = k (l - L) + c dl/dt,
-/// with the axial force n [N] along d, positive where it pulls; stiffness k [N/m], rest length L [m], damping c
-/// [N s/m]. With L = 0 the force is k d, and linear. Where d = 0 a spring of L > 0 has no direction: there it does not
-/// push, and its stiffness is taken as k in all directions.
+/// where n is the axial force [N] along d, positive in tension, k the stiffness [N/m], L the rest length [m], and c the
+/// damping [N s/m]. With L = 0 the force is k d, and linear. At d = 0 a spring with L > 0 has no direction. It then
+/// exerts no force, and its stiffness is k in all directions.
 ///
 /// Over a step of dt from d0 to d1 the force acts along w at
 ///   the end, d = d1:        n = k (l1 - L) + c (l1 - l0) / dt,               w = d1 / l1;
 ///   the middle d:           n = k (l - L) + c (l1 - l0) / dt,                w = d / l,  d1 = 2 d - d0;
-///   the mean of both ends:  n = k ((l0 + l1) / 2 - L) + c (l1 - l0) / dt,    w = (d0 + d1) / (l0 + l1),
-/// the last a discrete gradient [Gonzalez 1996, J. Nonlinear Sci. 6; Simo, Tarnow and Doblare 1995]: w . (d1 - d0) is
-/// l1 - l0, so that its work is what E changes by and what the damper takes, c (l1 - l0)^2 / dt. All are along d in the
-/// middle or at the end, where the rule takes moments, so that angular momentum is kept.
+///   the mean of both ends:  n = k ((l0 + l1) / 2 - L) + c (l1 - l0) / dt,    w = (d0 + d1) / (l0 + l1).
+/// The last is a discrete gradient [Gonzalez 1996, J. Nonlinear Sci. 6; Simo, Tarnow and Doblare 1995]. The product
+/// w . (d1 - d0) is l1 - l0. Its work is the change of E plus the dissipation of the damper, c (l1 - l0)^2 / dt. All
+/// forces are along d in the middle or at the end, where the rule evaluates moments. Angular momentum is therefore
+/// conserved.
 
 #include <cmath>
 
@@ -38,7 +39,7 @@ template <class Scalar>
 struct SpringForce {
   Scalar tension;           ///< n [N]
   Vec3<Scalar> direction;   ///< w
-  Mat3<Scalar> derivative;  ///< of n w by d at the end, or in the middle [N/m]
+  Mat3<Scalar> derivative;  ///< derivative of n w by d at the end, or in the middle [N/m]
 };
 
 inline double spring_energy(const Spring& spring, double length) {

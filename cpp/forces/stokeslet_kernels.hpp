@@ -1,6 +1,6 @@
 #pragma once
-/// Regularized Stokeslets on segments by the instruction set in use. Raw pointers only: the kernels behind share no
-/// code with the rest.
+/// Regularized Stokeslets on segments by the instruction set in use. Only raw pointers are used, since the kernels
+/// share no code with the rest.
 ///
 /// A force per length f on the segment from a to b, linear from f_a to f_b, moves the fluid at x by
 ///   8 pi mu u(x) = integral of [(1/R + eps^2 / R^3) f + (f . r) r / R^3] ds,  R^2 = r^2 + eps^2,  r = x - y(s)
@@ -19,7 +19,7 @@ namespace withe {
 
 /// Entries of a symmetric 3 x 3 block: xx, xy, xz, yy, yz, zz.
 constexpr int kBlockEntries = 6;
-/// Lines of numbers are a multiple of so many long, zeros at their end.
+/// The length of a line of numbers is a multiple of this. Zeros fill its end.
 constexpr std::ptrdiff_t kLineUnit = 4;
 constexpr std::ptrdiff_t line_length(std::ptrdiff_t numbers) {
   return (numbers + kLineUnit - 1) / kLineUnit * kLineUnit;
@@ -32,14 +32,15 @@ struct SegmentBatch {
   const double* start[3];
   const double* direction[3];
   const double* length;
-  const double* inverse_length;  ///< 0 where there is none
+  const double* inverse_length;  ///< 0 if there is no edge
 };
 
-/// A symmetric matrix of symmetric 3 x 3 blocks. Blocks left of the diagonal line by line: kBlockEntries rows of
-/// line_length(i) numbers for line i. Those on it as kBlockEntries rows of `line` numbers.
+/// A symmetric matrix of symmetric 3 x 3 blocks. Blocks left of the diagonal are stored line by line: kBlockEntries
+/// rows of line_length(i) numbers for line i. Blocks on the diagonal are stored as kBlockEntries rows of `line`
+/// numbers.
 struct BlockMatrix {
   std::ptrdiff_t size;
-  std::ptrdiff_t line;  ///< of a vector's component: x, y, z follow each other with so many numbers
+  std::ptrdiff_t line;  ///< length of each component of a vector; x, y, z are stored one after another
   const double* lower;
   const double* diagonal;
 };

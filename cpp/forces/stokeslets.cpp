@@ -11,11 +11,11 @@
 namespace withe {
 namespace {
 
-constexpr int kMostNodes = 128;  // whose mobility is factorised as one
+constexpr int kMostNodes = 128;  // greatest number of nodes whose mobility is factorised together
 constexpr int kMostIterations = 1000;
-constexpr double kTolerance = 1e-9;  // of the velocity, relative
+constexpr double kTolerance = 1e-9;  // relative error of the velocity
 constexpr int kEntry[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
-constexpr double kRough = 0.03;  // of a motion that is resisted much
+constexpr double kRough = 0.03;  // relative tolerance of rough solutions
 constexpr int kWait = 12;        // solutions until it is looked for again
 // Shortest edge over the regularization: on shorter edges, forces that differ from node to node do not move the fluid.
 constexpr double kFinest = 1.0 / 3.0;
@@ -225,7 +225,7 @@ bool StokesletFluid::factorize(const VectorX& q) {
   return true;
 }
 
-/// to = (factorised parts of A)^-1 from.
+/// Computes to = (factorised parts of A)^-1 from.
 void StokesletFluid::precondition(const VectorX& from, VectorX& to) {
   for (Chunk& chunk : chunks_) {
     for (std::size_t a = 0; a < chunk.nodes.size(); ++a)
@@ -238,7 +238,7 @@ void StokesletFluid::precondition(const VectorX& from, VectorX& to) {
   }
 }
 
-/// Sets out from the parabola through the last three solutions, or what there is of it.
+/// Sets the initial guess: the parabola through the last three solutions, or a lower order if there are fewer.
 void StokesletFluid::guess() {
   image_ = memory_.solution;
   if (memory_.known == 0)
@@ -304,7 +304,7 @@ bool StokesletFluid::solve(const VectorX& q, const VectorX& velocity, VectorX& f
   return true;
 }
 
-/// y = what local drag and inertia do to x.
+/// Computes y, the force of local drag and inertia at the velocities x.
 void StokesletFluid::multiply_held(const VectorX& x, VectorX& y) const {
   for (int k = 0; k < model_.dimension; ++k) {
     const double* from = x.data() + k * line_;
@@ -319,7 +319,7 @@ void StokesletFluid::multiply_held(const VectorX& x, VectorX& y) const {
   }
 }
 
-/// Its inverse, roughly, by conjugate gradients.
+/// Applies its inverse to x, approximately, by conjugate gradients.
 void StokesletFluid::solve_held(VectorX& x) {
   residual_ = x;
   x.setZero();
@@ -339,7 +339,7 @@ void StokesletFluid::solve_held(VectorX& x) {
   }
 }
 
-/// One power iteration; resistance of the motion that it finds over what local drag and inertia do.
+/// One power iteration. Returns the resistance of the resulting motion relative to that of local drag and inertia.
 double StokesletFluid::sharpen_wave() {
   right_ = memory_.wave;
   memory_.solution.setZero();

@@ -51,8 +51,8 @@ class StokesletFluid {
   /// Memory for later solutions: the last ones, as initial guesses, and the state at which the parts of A were
   /// factorised.
   struct Memory {
-    VectorX solution, past[2];  ///< the last one, and those before
-    int known = 0;              ///< how many there are
+    VectorX solution, past[2];  ///< last solution, and the two before it
+    int known = 0;              ///< number of known solutions
     VectorX factorized_at;      ///< empty: not yet
     int iterations = 0, fresh_iterations = 0;
     VectorX wave;  ///< the motion that is resisted most compared with local drag and inertia
@@ -61,7 +61,7 @@ class StokesletFluid {
     double regularization = 0;  ///< [m]
   };
   const Memory& memory() const { return memory_; }
-  /// Goes on from there, with the same bits.
+  /// Continues from this memory, with bit-identical results.
   void recall(const Memory& memory);
   /// As it was before its first solution.
   void forget();
@@ -94,7 +94,7 @@ class StokesletFluid {
   // One slot for each node of each rod, one after the other; segment s runs from slot s to s + 1, or is none.
   std::vector<int> slot_node_;
   std::vector<int> segment_edge_;  ///< -1: none
-  std::ptrdiff_t segments_;        ///< with those that fill the last line
+  std::ptrdiff_t segments_;        ///< including those that fill the last line
   VectorX start_, direction_, length_, inverse_segment_, of_start_, of_end_;
   VectorX lower_, diagonal_;
   std::vector<std::ptrdiff_t> row_start_;

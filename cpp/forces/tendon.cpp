@@ -25,7 +25,7 @@ struct Carried {
   }
 };
 
-/// The second derivatives of v . f on an edge, and, of a force along it, those of its length.
+/// Second derivatives of v . f on an edge and, for a force along it, second derivatives of its length.
 TurnSquare edge_curvature(const EdgeFrame<double>& e, const Turn& turn, const Carried& carried, double axial) {
   const Vector3 t = to_eigen(e.tangent), spin = to_eigen(e.spin), &m = carried.moment;
   const double k = e.inverse_length, about = m.dot(t);
@@ -216,7 +216,7 @@ void add_local(const Model& model, const TendonSegment& segment, double tension,
     work.own(k) += seat.half < 0 ? edge_curvature(e, by->turn[k], carried, axial)
                                  : frame_curvature(model, seat, by->turn[k], carried, q, c);
   }
-  if (by) {  // those of a pull are by one of two that are the same: half of all
+  if (by) {  // pull has derivatives by one of two equal arguments: half of the total
     work.hessian.noalias() += 2.0 * (by->arms.transpose() * pull.by_g);
     if constexpr (width == kSmooth)
       work.hessian.noalias() += 2.0 * (by->sum.transpose() * pull.by_y) + 2.0 * (by->span.transpose() * pull.by_axial);

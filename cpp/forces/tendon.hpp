@@ -37,18 +37,18 @@ using TendonLocal = LocalOf<kTendonUnknowns>;
 struct GuideSeat {
   int edge = 0;
   double share = 0.5;  ///< along the edge, 0 at its tail
-  int half = -1;       ///< of the stencil between the edge and a frame: on what is attached there, not on the edge
-  double sign = 1.0;   ///< of the tangent along the tendon
-  Vector2 offset;      ///< along d1, d2; in a plane (normal x tangent, nothing) [m]
+  int half = -1;       ///< stencil between edge and frame, if the guide is on the attached part; else -1
+  double sign = 1.0;   ///< sign of the tangent along the tendon
+  Vector2 offset;      ///< along d1, d2; in a plane (normal x tangent, unused) [m]
 };
 
-/// Places of the unknowns of a guide's seat among those of its segment; -1: none.
+/// Indices of the unknowns of the seat of a guide among the unknowns of its segment; -1: none.
 struct GuideUnknowns {
-  int tail = -1, angle = -1, head = -1;   ///< of an edge
-  int node = -1, frame = -1, hinge = -1;  ///< of what is attached to a frame
+  int tail = -1, angle = -1, head = -1;   ///< unknowns of an edge
+  int node = -1, frame = -1, hinge = -1;  ///< unknowns of the part that is attached to a frame
 };
 struct SegmentUnknowns {
-  int size = 0, dofs[kTendonUnknowns];  ///< behind its size -1
+  int size = 0, dofs[kTendonUnknowns];  ///< -1 after the first `size`
   GuideUnknowns guide[2];
 };
 
@@ -71,15 +71,16 @@ void tendon_local(const Model& model, const TendonSegment& segment, double tensi
 void discrete_tendon_local(const Model& model, const TendonSegment& segment, double tension, const DiscreteStep& step,
                            bool with_matrix, TendonLocal& out);
 
-/// The moment on what carries a guide [N m], and the axis in space of the hinge that it turns about.
+/// Moment on the part that carries a guide [N m], and the axis in space of the hinge about which it turns.
 Vector3 guide_moment(const Model& model, const TendonSegment& segment, int end, double tension, const VectorX& q,
                      const Configuration& c);
 Vector3 guide_hinge_axis(const Model& model, const TendonSegment& segment, int end, const Configuration& c);
 
 /// L [m].
 double segment_length(const Model& model, const TendonSegment& segment, const VectorX& q, const Configuration& c);
-/// Shortening of a segment by the bending of half an edge at a free end, per tension [m/N]: r^2 l / (2 EI), that of an
-/// arc of length l / 2 under the moment T r. The elastic energy has no stencil there, so that L does not contain it.
+/// Shortening of a segment by the bending of half an edge at a free end, per tension [m/N]. It is
+/// r^2 l / (2 EI), the value for an arc of length l / 2 under the moment T r. The elastic energy has no stencil there,
+/// so that L does not contain it.
 double free_end_compliance(const Model& model, const Parameters& parameters, const TendonSegment& segment);
 /// Positions of the guides of a tendon, in the axes of space [m].
 MatrixX3 guide_points(const Model& model, int tendon, const VectorX& q, const Configuration& c);

@@ -117,7 +117,7 @@ inline int node_dof_at(const Model& model, const GuideSeat& seat) {
 struct Guide {
   EdgeFrame<double> frame;
   Vector3 arm, tangent, point;  ///< the tangent along the tendon
-  double length;                ///< of its edge; of none 0
+  double length;                ///< length of its edge; 0 if there is none
 
   /// `node(dof)`: where a node is.
   template <class NodeAt>
@@ -197,7 +197,7 @@ inline Turn turn_of(const Model& model, const TendonSegment& of, int k, const Gu
 template <int width>
 struct Changes {
   Turn turn[2], arm[2], tangent[2];
-  Columns<width> arms, sum;  ///< of r, of s; of a straight piece the former is that of D
+  Columns<width> arms, sum;  ///< of r, and of s; for a straight piece, of D instead of r
   Row<width> span;           ///< of l
 
   Changes(const Model& model, const TendonSegment& of, const Segment& segment, const VectorX& q, const Configuration& c)
@@ -219,7 +219,7 @@ struct Changes {
   }
 };
 
-/// Forces of a tension on arms (that of the second seat; the first has the opposite), on tangents and on l. They act
+/// Forces of a tension on arms (of the second seat; the first has the opposite force), on tangents and on l. They act
 /// over a step from one segment to another, or at one segment if both are equal. Derivatives are by the second segment.
 template <int width>
 struct Pull {

@@ -15,8 +15,8 @@ Segment segment_at_start(const Model& model, const TendonSegment& segment, const
   return {model, segment, node, step.start};
 }
 
-/// Map from the moment m on a guide's seat to generalised forces, in an energy-momentum step, such that they
-/// work what the moment does over the finite turn; and their derivatives where the moment stays.
+/// Map from the moment m on the seat of a guide to generalised forces, in an energy-momentum step, and their
+/// derivatives at constant moment. The work of these forces equals the work of the moment over the finite rotation.
 struct WorkingTurn {
   Turn columns = Turn::Zero();
   TurnSquare slopes = TurnSquare::Zero();

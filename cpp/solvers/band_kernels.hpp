@@ -25,31 +25,34 @@ struct BandFactor {
   int size = 0;
   double* upper = nullptr;           ///< U beyond its diagonal
   double* lower = nullptr;           ///< L beyond its diagonal; of a symmetric matrix L^T = D U with it, by rows
-  double* inverse_pivots = nullptr;  ///< of the diagonal of L
+  double* inverse_pivots = nullptr;  ///< inverse of the diagonal of L
   double* scale = nullptr;           ///< 1 / sqrt |a_ii|: units in which the diagonal is one
   double* reach = nullptr;           ///< sum of |u_ij| scale_j over a row of U
 };
 
 struct BandKernels {
   int half_bandwidth;
-  /// From row after row of the band, 2 w + 1 numbers each (w the half bandwidth), kBandPadding numbers before and after
-  /// them, and what is added to the diagonal (or nothing). False where | L | | U |, by which errors of the factors are
-  /// bounded [Higham 2002, thm 9.3], is beyond kGreatestGrowth in units in which the diagonal of A is one.
+  /// Factorises a matrix. `values` has the rows of the band one after another, each of 2 w + 1 numbers for the half
+  /// bandwidth w, with kBandPadding numbers before and after them. `shift` is added to the diagonal, or is null.
+  /// Returns false if | L | | U | exceeds kGreatestGrowth, in units in which the diagonal of A is one. This product
+  /// bounds the errors of the factors [Higham 2002, thm 9.3].
   bool (*factorize)(const BandFactor& factor, const double* values, const double* shift);
-  /// From column after column of the lower triangle, band_column_stride(w) numbers each.
+  /// The same for a symmetric matrix. `values` has the columns of the lower triangle, band_column_stride(w) numbers
+  /// each.
   void (*factorize_symmetric)(const BandFactor& factor, const double* values, const double* shift);
   void (*solve)(const BandFactor& factor, double* x);
   void (*solve_transposed)(const BandFactor& factor, double* x);
   void (*solve_symmetric)(const BandFactor& factor, double* x);
 };
 
-/// Numbers a column of a symmetric matrix.
+/// Number of stored values per column of a symmetric matrix.
 constexpr int band_column_stride(int half_bandwidth) { return (half_bandwidth + 3) / 2 * 2; }
 
 /// Greatest growth of the factors: above it, their rounding would cost more than two digits.
 constexpr double kGreatestGrowth = 100.0;
 
-/// Those of the narrowest band that holds this one: 5 (a rod in a plane), 10 (in space), 16, 24; none of a wider.
+/// Kernels of the narrowest band that contains this one: 5 (a rod in a plane), 10 (in space), 16, 24. Null for a wider
+/// band.
 const BandKernels* band_kernels(int half_bandwidth);
 
 }  // namespace withe

@@ -44,7 +44,7 @@ template <int width, int phase>
 struct Row {
   static constexpr int stride = band_stride(width);
   static constexpr int diagonal = phase + width;
-  static constexpr int home = diagonal / kLanes, lane = diagonal % kLanes;  // of the diagonal
+  static constexpr int home = diagonal / kLanes, lane = diagonal % kLanes;  // place of the diagonal
   static constexpr int packs = (diagonal + width) / kLanes + 1;
 
   Pack at[packs];
@@ -56,7 +56,7 @@ struct Row {
   static Numbers* place(Numbers* rows, int row, int i) {
     return rows + static_cast<std::ptrdiff_t>(row) * stride + first_column(i);
   }
-  /// Packs from pack `begin` on, of a row of the matrix whose first column would stand at `value`; and a shift.
+  /// Reads the packs from pack `begin` of a row of the matrix, and adds a shift. `value`: address of its first column.
   template <int begin>
   [[gnu::always_inline]] void read(const double* value, const double* shift, int i) {
     each<begin, packs>([&](auto p) { at[p.value] = load(value + p.value * kLanes); });
@@ -66,7 +66,7 @@ struct Row {
   /// Packs from the diagonal on that hold U, without it.
   Pack beyond_diagonal(int pack) const { return pack == home ? lanes_between(at[pack], lane + 1, kLanes) : at[pack]; }
 
-  /// Takes off its multiple of rows i - width ... i - 1 of U, one after another: l_ik stays in its place.
+  /// Subtracts multiples of the rows i - width ... i - 1 of U, one after another. The factor l_ik stays in its place.
   [[gnu::always_inline]] void reduce(const double* upper, int i) {
     const double* u = place(upper, i - width, i);
     each<0, width>([&](auto step) {
@@ -76,7 +76,7 @@ struct Row {
     });
   }
 
-  /// The same from the diagonal on, by what stands above it in L^T.
+  /// The same from the diagonal on, with the entries above the diagonal in L^T.
   [[gnu::always_inline]] void reduce_symmetric(const double* upper, const double* lower, int i) {
     const double* u = place(upper, i - width, i);
     const double* l = place(lower, i - width, i) + diagonal;
@@ -154,7 +154,7 @@ bool factorize(const BandFactor& a, const double* values, const double* shift) {
     });
     const Pack scale = Pack(1.0) / square_root(absolute(diagonal));
     store(a.scale + i, lanes_between(scale, 0, a.size - i));
-    store(a.reach + i, Pack(0.0));  // what an earlier matrix left need not be finite
+    store(a.reach + i, Pack(0.0));  // values of an earlier matrix may not be finite
   }
   bool within = true;
   each_row<width>(a.size, [&](auto phase, int i) { within &= factorize_row<width, phase.value>(a, values, shift, i); });

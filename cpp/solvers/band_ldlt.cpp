@@ -10,7 +10,8 @@
 namespace withe {
 namespace {
 
-/// values(): column after column of the lower band, `stride` numbers each, those below the matrix never used.
+/// values(): the columns of the lower band one after another, `stride` numbers each. Numbers below the matrix are
+/// unused.
 class SymmetricBand : public LinearSolver {
  public:
   SymmetricBand(const SparsityPattern& pattern, int width)
@@ -33,7 +34,7 @@ class SymmetricBand : public LinearSolver {
   Factorization factorize(std::span<const double> shift) override {
     require_shift(shift, size());
     const std::span<const double> inverse_pivots = eliminate(shift.empty() ? nullptr : shift.data());
-    factorized_ = std::all_of(inverse_pivots.begin(), inverse_pivots.end(), is_usable_pivot);  // as good as its inverse
+    factorized_ = std::all_of(inverse_pivots.begin(), inverse_pivots.end(), is_usable_pivot);
     if (!factorized_) return {FactorStatus::singular, 0};
     const auto negative = std::count_if(inverse_pivots.begin(), inverse_pivots.end(), [](double d) { return d < 0.0; });
     return {FactorStatus::ok, static_cast<int>(negative)};
@@ -61,7 +62,7 @@ class SymmetricBand : public LinearSolver {
   }
 
  protected:
-  /// Factors of the matrix, with a shift of the diagonal or nothing; what the pivots are the inverse of.
+  /// Factorises the matrix, with a shift of the diagonal or without. Returns the inverse pivots.
   virtual std::span<const double> eliminate(const double* shift) = 0;
   virtual void substitute(double* x) const = 0;
 

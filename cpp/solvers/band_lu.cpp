@@ -120,7 +120,7 @@ class BandLu final : public LinearSolver {
 
  private:
   SparsityPattern pattern_;
-  const BandKernels* kernels_;  // without exchanges, where there are any for this band
+  const BandKernels* kernels_;  // kernels without row exchanges; null if there are none for this band
   int width_;
   int value_stride_;
   BandEntries values_;

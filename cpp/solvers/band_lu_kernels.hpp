@@ -18,16 +18,16 @@ struct BandLuFactor {
   int size = 0, width = 0;
   int value_stride = 0, work_stride = 0, multiplier_stride = 0;
   double* work = nullptr;         ///< column 0 of row 0, aligned to packs; of size rows: U from the diagonal on
-  double* multipliers = nullptr;  ///< size rows: of the rows below, by which the pivot row was taken off them
+  double* multipliers = nullptr;  ///< size rows: multiples of the pivot row that were subtracted from the rows below
   double* inverse_pivots = nullptr;
   double* row_scales = nullptr;  ///< 1 / the greatest entry of each row of the matrix
-  int* pivot_rows = nullptr;     ///< with which row each was exchanged
-  int* last_columns = nullptr;   ///< of each row of U
+  int* pivot_rows = nullptr;     ///< row with which each row was exchanged
+  int* last_columns = nullptr;   ///< last column of each row of U
 };
 
 struct BandLuKernels {
-  /// From row after row of the band, 2 w + 1 numbers each, and what is added to the diagonal (or nothing); false where
-  /// a pivot is zero or not finite.
+  /// Factorises a matrix. `values` has the rows of the band one after another, 2 w + 1 numbers each. `shift` is added
+  /// to the diagonal, or is null. Returns false if a pivot is zero or not finite.
   bool (*factorize)(const BandLuFactor& factor, const double* values, const double* shift);
   void (*solve)(const BandLuFactor& factor, double* x);
   void (*solve_transposed)(const BandLuFactor& factor, double* x);

@@ -8,9 +8,9 @@ namespace {
 
 static_assert(kBandPadding % kLanes == 0);
 
-/// Threshold pivoting: the diagonal is kept where nothing in its column is greater by more than this factor, for
-/// exchanges widen the band [Duff, Erisman and Reid 2017, sec. 5.2]. Entries are measured by the greatest of their row,
-/// so that pivots do not depend on units [Golub and Van Loan 2013, sec. 3.5.2].
+/// Threshold of pivoting. The diagonal remains the pivot if its magnitude is at least this share of the greatest in its
+/// column, since exchanges widen the band [Duff, Erisman and Reid 2017, sec. 5.2]. Entries are measured relative to the
+/// greatest of their row, so that pivots do not depend on units [Golub and Van Loan 2013, sec. 3.5.2].
 constexpr double kPivotThreshold = 0.1;
 
 double magnitude(double a) { return __builtin_fabs(a); }
@@ -48,7 +48,7 @@ int find_pivot(const BandLuFactor& a, int column, int last_row) {
   const double own = most;
   for (int row = column + 1; row <= last_row; ++row) {
     const double other = measure(row);
-    if (!(other <= most)) {  // one that is not finite wins, so that it is met as a pivot and reported
+    if (!(other <= most)) {  // an entry that is not finite becomes the pivot, so that it is reported
       most = other;
       best = row;
     }
@@ -64,8 +64,8 @@ void exchange(double* a, double* b, int count) {
   }
 }
 
-/// Takes multiples of row j off the rows below: `packs` packs from column `first` on, or as many as `count` says. Of
-/// the first pack columns up to j are never read again.
+/// Subtracts multiples of row j from the rows below: `packs` packs from column `first` on, or `count` columns if
+/// `packs` is 0. In the first pack, columns up to j are never read again.
 template <int packs>
 void eliminate(const BandLuFactor& a, int j, int last_row, int first, int count, double inverse) {
   const double* pivot_row = entry(a, j, first);
@@ -85,8 +85,8 @@ void eliminate(const BandLuFactor& a, int j, int last_row, int first, int count,
   }
 }
 
-/// Packs begin at multiples of their length, so that each is read as it was last written: a read across two that are on
-/// their way to memory waits for both.
+/// Packs begin at multiples of their length, so that each is read with the boundaries with which it was last written. A
+/// read across two packs that are not yet in memory would wait for both.
 void eliminate(const BandLuFactor& a, int j, int last_row, int last_column, double inverse) {
   const int first = (j + 1) / kLanes * kLanes, count = last_column + 1 - first;
   switch (padded(count) / kLanes) {
@@ -129,7 +129,8 @@ bool factorize(const BandLuFactor& a, const double* values, const double* shift)
   return true;
 }
 
-/// Takes `factor` times `count` numbers off as many of x, of which `room` are there. Numbers are padded with zeros.
+/// Subtracts `factor` times `count` numbers from as many elements of x, which has `room` elements. The numbers are
+/// padded with zeros.
 void take_off(const double* numbers, int count, double factor, double* x, int room) {
   const int all = padded(count);
   if (all <= room) {
@@ -140,8 +141,8 @@ void take_off(const double* numbers, int count, double factor, double* x, int ro
   }
 }
 
-/// `start` less the products of `count` numbers. The sum ends with the first, which is the newest unknown, so that only
-/// its term waits. `known`: how many, or 0.
+/// `start` minus the products of `count` numbers. The sum ends with the first number, which belongs to the newest
+/// unknown, so that only this term waits. `known`: the count as a constant, or 0.
 template <int known>
 double less_products(double start, const double* numbers, const double* x, int count) {
   double sum = start;

@@ -7,28 +7,29 @@
 
 namespace withe {
 
-/// Columns lie one after another, their length a multiple of kFrontPadding; what is above the diagonal, and past the
-/// last row, means nothing. kPadding numbers past the end of each array may be read.
+/// Columns are stored one after another. Their length is a multiple of kFrontPadding. Values above the diagonal and
+/// after the last row are undefined. kPadding numbers after the end of each array may be read.
 constexpr int kFrontPadding = 4;
 
 struct Front {
-  int columns = 0;           ///< eliminated
-  int rows = 0;              ///< theirs and further ones
-  int length = 0;            ///< of a column of `factor` and of `scratch`
-  int rest_length = 0;       ///< of a column of `rest`
-  double* factor = nullptr;  ///< `columns`: the matrix; becomes L below D on the diagonal
-  double* rest = nullptr;    ///< rows - columns, square: becomes what is left to eliminate
+  int columns = 0;           ///< number of eliminated columns
+  int rows = 0;              ///< number of rows: of these columns, and further ones
+  int length = 0;            ///< length of a column of `factor` and of `scratch`
+  int rest_length = 0;       ///< length of a column of `rest`
+  double* factor = nullptr;  ///< `columns` columns of the matrix; becomes D, with L below the diagonal
+  double* rest = nullptr;    ///< square of size rows - columns: becomes the remaining matrix
   double* inverse_pivots = nullptr;
-  double* scratch = nullptr;  ///< as large as `factor`: gets L D; to solve with, `length`
+  double* scratch = nullptr;  ///< receives L D, size of `factor`; for solves, size `length`
 };
 
 struct FrontKernels {
-  /// A = L D W^T, W in place of L in `upper`: A's columns from the diagonal down in `lower`, its rows from the diagonal
-  /// on, without it, in `upper`. Where A is symmetric, W = L, and both are the same front.
+  /// Factorises A = L D W^T. `lower` has the columns of A from the diagonal down, and L replaces them. `upper` has
+  /// its rows to the right of the diagonal, and W replaces them. If A is symmetric, W = L, and both are the same front.
   void (*eliminate)(const Front& lower, const Front& upper);
-  /// L x = x in place; takes what goes with x from `all`, at `rows`, those below the front's columns.
+  /// Solves L x = x in place. Subtracts the products with x from `all` at `rows`, the rows below the columns of the
+  /// front.
   void (*solve_down)(const Front& front, double* x, const int* rows, double* all);
-  /// L^T x = D^-1 x in place, `all` being known at `rows`.
+  /// Solves L^T x = D^-1 x in place, where `all` is known at `rows`.
   void (*solve_up)(const Front& front, double* x, const int* rows, const double* all);
 };
 

@@ -8,7 +8,7 @@ namespace {
 
 static_assert(kFrontPadding == 4 && kFrontPadding % kLanes == 0);
 
-/// `packs` packs of a column that is eliminated: less what earlier columns take from it, then scaled.
+/// Updates `packs` packs of an eliminated column: subtracts the products with earlier columns, then scales.
 template <int packs>
 void finish_rows(const Front& a, const Front& other, int column, int row, double inverse) {
   double* own = a.factor + std::ptrdiff_t{a.length} * column + row;
@@ -51,7 +51,7 @@ void eliminate_columns(const Front& lower, const Front& upper) {
   }
 }
 
-/// A block of `rest`, less what all eliminated columns take from it.
+/// Subtracts the products of all eliminated columns from a block of `rest`.
 template <int columns, int packs>
 void update_block(const Front& a, const Front& other, int column, int row) {
   double* place = a.rest + std::ptrdiff_t{a.rest_length} * column + row;
@@ -112,7 +112,7 @@ void solve_down(const Front& a, double* x, const int* rows, double* all) {
   }
 }
 
-/// `columns` columns up to `end`, less what later rows take from them: one by one up to `row`, then in packs.
+/// Subtracts the products with later rows from `columns` columns up to `end`: one by one up to `row`, then in packs.
 template <int columns>
 void take_known(const Front& a, int end, int row, double* x) {
   const int first = end - columns;

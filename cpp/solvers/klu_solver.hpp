@@ -1,5 +1,6 @@
 #pragma once
-/// LU with pivots off the diagonal, by KLU [Davis and Palamadai Natarajan 2010]. The only header that knows of it.
+/// LU with pivots off the diagonal, by KLU [Davis and Palamadai Natarajan 2010]. Other code uses KLU only through this
+/// header.
 
 #include <memory>
 #include <span>
@@ -9,8 +10,8 @@
 
 namespace withe {
 
-/// Pivots are sought anew for each matrix, which allocates: bit-exact restarts need factors that depend on the matrix
-/// alone, not on the pivots of an earlier one. A copy has the same factors.
+/// Pivots are determined again for each matrix, which allocates memory. Bit-exact restarts need factors that depend
+/// only on the matrix, not on the pivots of an earlier matrix. A copy has the same factors.
 class KluSolver {
  public:
   /// The pattern must be valid (require_valid); it is analysed here, once.

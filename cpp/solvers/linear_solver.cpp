@@ -37,7 +37,7 @@ void require_length(std::string_view argument, std::size_t got, int expected) {
 
 SparsityPattern SparsityPattern::from_cliques(int size, const std::vector<std::vector<int>>& cliques) {
   require(size >= 1, "size of a sparsity pattern must be at least 1, got ", size);
-  std::vector<int> starts(size + 1, 0);  // of the cliques that each column is in
+  std::vector<int> starts(size + 1, 0);  // start of the list of cliques that contain each column
   for (const std::vector<int>& clique : cliques) {
     for (int column : clique) {
       require(column < size, "unknown in cliques must be below size ", size, ", got ", column);
@@ -109,7 +109,7 @@ void require_valid(const SparsityPattern& pattern) {
     for (int p = starts[column]; p < starts[column + 1]; ++p) {
       const int row = pattern.row_indices[p], mirrored = next[row]++;
       if (mirrored >= starts[row + 1] || pattern.row_indices[mirrored] != column)
-        find_entry(pattern, column, row);  // says what lacks its mirror image
+        find_entry(pattern, column, row);  // throws if the mirrored entry is missing
     }
   }
 }

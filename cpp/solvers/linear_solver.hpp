@@ -1,6 +1,6 @@
 #pragma once
-/// The one door to linear algebra: a matrix with a fixed pattern, filled through precomputed offsets,
-/// factorised and solved again and again without allocation. SuiteSparse is hidden behind it.
+/// The only interface to linear algebra: a matrix with a fixed pattern, which is filled through precomputed offsets. It
+/// is factorised and solved many times without allocation. Only its implementation uses SuiteSparse.
 
 #include <cstddef>
 #include <memory>
@@ -47,8 +47,8 @@ class LinearSolver {
   virtual Symmetry symmetry() const = 0;
   /// "band LDLT (half bandwidth 10)", "sparse LDLT", "band LU", "sparse LU": for `plan`.
   virtual std::string name() const = 0;
-  /// Place of entry (row, column) in values(). Symmetric: only row >= column may be asked for.
-  /// Throws std::invalid_argument outside the pattern.
+  /// Place of entry (row, column) in values(). In a symmetric matrix row >= column is required. Throws
+  /// std::invalid_argument outside the pattern.
   virtual std::ptrdiff_t offset(int row, int column) const = 0;
   /// Place of an entry or its mirror image, which are one in a symmetric matrix.
   std::ptrdiff_t place(int row, int column) const {

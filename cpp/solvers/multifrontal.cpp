@@ -14,9 +14,9 @@ int padded(int length) { return (length + kFrontPadding - 1) / kFrontPadding * k
 
 /// values(): column by column, in the order of the pattern; symmetric: the lower triangle.
 ///
-/// Multifrontal [Liu 1992]: a supernode's columns are eliminated in a dense front, what is left of the front waits on a
-/// stack, and its parent adds it to its own. Patterns and places are found once; the numeric phase follows them. An
-/// unsymmetric matrix has two sides, L's and W's, each with fronts of its own.
+/// Multifrontal method [Liu 1992]. The columns of a supernode are eliminated in a dense front. The remaining matrix of
+/// the front is put on a stack, and the front of the parent adds it. Patterns and places are computed once, and the
+/// numeric phase uses them. An unsymmetric matrix has two sides, one for L and one for W. Each side has its own fronts.
 class Multifrontal final : public LinearSolver {
  public:
   Multifrontal(const SparsityPattern& pattern, Symmetry symmetry)
@@ -48,7 +48,7 @@ class Multifrontal final : public LinearSolver {
     for (std::size_t p = 0; p < places_.size(); ++p) factor_[places_[p]] = values_[p];
     if (!shift.empty())
       for (int k = 0; k < size(); ++k) factor_[pivots_[k]] += shift[nodes_.order[k]];
-    std::ptrdiff_t top = 0;  // of the stack
+    std::ptrdiff_t top = 0;  // top of the stack
     for (int s = 0; s < nodes_.count(); ++s) {
       Front fronts[2];
       for (int side = 0; side < sides_; ++side) {
@@ -122,7 +122,7 @@ class Multifrontal final : public LinearSolver {
   std::ptrdiff_t rest_size(int s) const { return sides_ * rest_side_size(s); }
   std::ptrdiff_t rest_side_size(int s) const { return std::ptrdiff_t{padded(nodes_.rest(s))} * nodes_.rest(s); }
 
-  /// Adds what is left of a child to its parent's front.
+  /// Adds the remaining matrix of a child to the front of its parent.
   void add_rest(int child, const double* rest, const Front& parent) const {
     const int rows = nodes_.rest(child), length = padded(rows);
     const int* place = rows_in_parent_.data() + nodes_.row_starts[child];
@@ -135,7 +135,7 @@ class Multifrontal final : public LinearSolver {
     }
   }
 
-  /// For L and W, and for what waits on the stack when it is highest.
+  /// Allocates memory for L and W, and for the greatest size of the stack.
   void make_room() {
     const int count = nodes_.count();
     last_child_.assign(count, -1);
@@ -174,7 +174,7 @@ class Multifrontal final : public LinearSolver {
     return p - pattern_.column_starts[column + 1] + value_starts_[column + 1];
   }
 
-  /// Entry across the diagonal for each entry of the pattern; rows being sorted, those of a row come up in the order
+  /// Mirrored entry for each entry of the pattern. Rows are sorted, so that the entries of a row are found in the order
   /// of their columns.
   std::vector<int> find_mirrors() const {
     std::vector<int> mirror, next(pattern_.column_starts);
@@ -183,7 +183,7 @@ class Multifrontal final : public LinearSolver {
     return mirror;
   }
 
-  /// Places of values in L and W, and of the rests of children in their parents' fronts.
+  /// Finds the places of values in L and W, and of the remaining matrices of children in the fronts of their parents.
   void find_places() {
     const std::vector<int> mirror = find_mirrors();
     std::vector<int> place(size()), row_of(size());
@@ -212,7 +212,7 @@ class Multifrontal final : public LinearSolver {
             places_[other >= old ? own : mirrored] = to;
           } else {
             places_[mirrored] = side_size_ + to;
-            places_[own] = to;  // the diagonal, its own mirror, belongs below
+            places_[own] = to;  // the diagonal is its own mirrored entry and belongs to the lower side
           }
         }
       }
@@ -221,16 +221,16 @@ class Multifrontal final : public LinearSolver {
 
   SparsityPattern pattern_;
   int sides_;
-  std::vector<int> value_starts_;  // of the columns in values_
+  std::vector<int> value_starts_;  // starts of the columns in values_
   std::vector<double> values_;
 
   Supernodes nodes_;
-  std::vector<int> last_child_, sibling_;            // of each supernode; a sibling comes before
-  std::vector<int> rows_in_parent_;                  // of each of its rows below, the row in its parent's front
-  std::ptrdiff_t side_size_ = 0, scratch_size_ = 0;  // of one side
-  std::vector<std::ptrdiff_t> factor_starts_;        // of each supernode
-  std::vector<std::ptrdiff_t> places_;               // of each value in factor_
-  std::vector<std::ptrdiff_t> pivots_;               // of each column, in the new order
+  std::vector<int> last_child_, sibling_;            // of each supernode; a sibling precedes it
+  std::vector<int> rows_in_parent_;                  // per row below a supernode: its row in the parent's front
+  std::ptrdiff_t side_size_ = 0, scratch_size_ = 0;  // sizes for one side
+  std::vector<std::ptrdiff_t> factor_starts_;        // per supernode
+  std::vector<std::ptrdiff_t> places_;               // place of each value in factor_
+  std::vector<std::ptrdiff_t> pivots_;               // place of the pivot of each column, in the new order
   mutable std::vector<double> factor_, inverse_pivots_;
   std::vector<double> rest_;
   mutable std::vector<double> scratch_, work_;

@@ -8,7 +8,7 @@
 
 namespace withe {
 
-/// Throws std::invalid_argument unless the pattern is what SparsityPattern promises.
+/// Throws std::invalid_argument unless the pattern is valid, see SparsityPattern.
 void require_valid(const SparsityPattern& pattern);
 
 /// Place of (row, column) in pattern.row_indices; throws std::invalid_argument outside the pattern.

@@ -7,7 +7,7 @@
 namespace withe {
 namespace {
 
-// Wider ones are taken in pieces, so that what a column is updated by stays in the cache.
+// Wider supernodes are divided, so that the columns that update a column stay in the cache.
 constexpr int kMostColumns = 48;
 
 /// New order of the unknowns that keeps L sparse: order[new] = old.
@@ -89,7 +89,7 @@ std::vector<int> column_counts(const SparsityPattern& pattern, const std::vector
   return counts;
 }
 
-/// Columns that become one supernode: what they hold, and how much of it is not zero.
+/// Columns that become one supernode: number of stored entries, and number of entries that are not zero.
 struct Group {
   int first, columns, rest;
   double entries;
@@ -97,22 +97,22 @@ struct Group {
   double stored() const { return columns * (0.5 * (columns + 1.0) + rest); }
 };
 
-/// True if one that takes in a child is worth its zeros.
+/// True if merging a group with a child is worth the zeros that it adds.
 bool worth_merging(const Group& merged) {
   const double zeros = 1.0 - merged.entries / merged.stored();
   return zeros < (merged.columns <= 8 ? 0.3 : merged.columns <= 16 ? 0.2 : 0.1);
 }
 
-/// From the leaves up: columns join the next one where they have the same rows, and groups their parent where few zeros
-/// come in.
+/// Groups columns from the leaves up. A column joins the next one if both have the same rows. A group joins its parent
+/// if this adds few zeros.
 std::vector<Group> group_columns(const std::vector<int>& parent, const std::vector<int>& counts) {
   std::vector<Group> groups;
   for (int column = 0; column < static_cast<int>(parent.size()); ++column) {
     groups.push_back({column, 1, counts[column] - 1, static_cast<double>(counts[column])});
     while (groups.size() > 1) {
       const Group &child = groups[groups.size() - 2], &own = groups.back();
-      const int above = parent[own.first - 1];  // of the child's last column
-      if (above < 0 || above > column) break;   // it belongs to a group yet to come
+      const int above = parent[own.first - 1];  // parent of the last column of the child
+      if (above < 0 || above > column) break;   // it belongs to a later group
       const Group merged{child.first, child.columns + own.columns, own.rest, child.entries + own.entries};
       const bool same_rows = own.columns == 1 && child.rest == own.rest + 1;
       if (!same_rows && !worth_merging(merged)) break;
@@ -123,7 +123,7 @@ std::vector<Group> group_columns(const std::vector<int>& parent, const std::vect
   return groups;
 }
 
-/// Rows of each group below its own columns: those of the matrix, and what its children leave.
+/// Adds the rows of each group below its own columns: rows of the matrix, and remaining rows of its children.
 void add_groups(const SparsityPattern& pattern, const std::vector<Group>& groups, Supernodes& result) {
   const std::vector<int> place = inverse(result.order);
   std::vector<int> group_of(pattern.size), visitor(pattern.size, -1), rows;

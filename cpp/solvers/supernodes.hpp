@@ -10,11 +10,11 @@ namespace withe {
 
 /// Supernodes: columns of L that follow one another and have their entries in the same rows, or nearly.
 struct Supernodes {
-  std::vector<int> order;          ///< of the unknowns: new -> old
+  std::vector<int> order;          ///< order of the unknowns: new -> old
   std::vector<int> column_starts;  ///< first column of each, count + 1
-  std::vector<int> row_starts;     ///< of each in `rows`, count + 1
+  std::vector<int> row_starts;     ///< start of each supernode in `rows`, count + 1
   std::vector<int> rows;           ///< below its own columns, ascending
-  std::vector<int> parent;  ///< the one that the rest of each is added to, always a later one; -1: nothing is left
+  std::vector<int> parent;         ///< supernode to which the remaining matrix is added, always a later one; -1: none
 
   int count() const { return static_cast<int>(parent.size()); }
   int columns(int s) const { return column_starts[s + 1] - column_starts[s]; }

@@ -28,9 +28,9 @@ class ResistiveForces final : public Term {
   std::vector<ResistiveCoefficients> resistance_;  ///< per edge
 };
 
-/// Regularised Stokeslets: all edges act on each other. The force of the fluid is the force at velocities `v` and
-/// positions `q`, which are given before the step, plus a local drag on the difference between the velocities of the
-/// step and `v`; see fluid_forces.cpp.
+/// Regularised Stokeslets: all edges act on each other. Velocities `v` and positions `q` are given before the step. The
+/// force of the fluid is the force at these, plus a local drag on the difference between the velocities of the step and
+/// `v`; see fluid_forces.cpp.
 class StokesletForces final : public Term {
  public:
   explicit StokesletForces(const Model& model) : fluid_(model) {}
