@@ -6,8 +6,8 @@
 
 namespace withe {
 
-/// Throws std::invalid_argument (ValueError in Python) unless the condition holds. Its message, of strings and numbers
-/// one after the other, is put together only then: a check that passes does not allocate.
+/// Throws std::invalid_argument (ValueError in Python) unless the condition holds. The message is composed of the
+/// strings and numbers only if the check fails: a check that passes does not allocate.
 template <class... Parts>
 void require(bool condition, const Parts&... parts) {
   if (condition) return;

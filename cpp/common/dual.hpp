@@ -1,6 +1,6 @@
 #pragma once
-/// A number with its derivatives by N unknowns: exact first derivatives of what is too long to derive by hand. A
-/// Number is a double, or a pack of such.
+/// A number with its derivatives by N unknowns. It gives exact first derivatives of expressions that are too long to
+/// derive by hand. A Number is a double, or a pack of doubles.
 
 #include <cmath>
 

@@ -5,7 +5,7 @@
 
 namespace withe {
 
-/// Not std::hypot: it asks for glibc 2.35, and a wheel must do with 2.34. Squares must not overflow.
+/// Replaces std::hypot, which requires glibc 2.35, while wheels must run with 2.34. Squares must not overflow.
 inline double hypotenuse(double x, double y) { return std::sqrt(x * x + y * y); }
 
 }  // namespace withe

@@ -5,15 +5,15 @@
 namespace withe {
 
 enum class InstructionSet {
-  baseline,  ///< what every machine of the architecture has, 2 doubles a pack
+  baseline,  ///< available on every machine of the architecture, 2 doubles per pack
   avx2,      ///< x86-64-v3: AVX2 and FMA, 4
 };
 
 /// Kernels that add to an array may read and write this many numbers past its end (adding zeros).
 constexpr int kPadding = 8;
 
-/// The one in use: the best of this machine, or what the environment variable WITHE_SIMD (baseline or avx2) asks for.
-/// Throws std::invalid_argument for another word or one that this machine cannot run.
+/// Instruction set in use: the best of this machine, or the one that the environment variable WITHE_SIMD requests
+/// (baseline or avx2). Throws std::invalid_argument for any other value, or if this machine does not support it.
 InstructionSet instruction_set();
 const char* name_of(InstructionSet set);
 

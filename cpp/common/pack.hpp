@@ -169,7 +169,7 @@ struct SineCosine {
 
 /// Both to about an ulp; polynomials by minimax fit over [-pi/4, pi/4].
 inline SineCosine sine_cosine(Pack angle) {
-  if (!all(absolute(angle).v < Pack(1e6).v))  // beyond what the reduction below is good for
+  if (!all(absolute(angle).v < Pack(1e6).v))  // outside the range of the reduction below
     return {from_lanes([&](int l) { return __builtin_sin(angle[l]); }),
             from_lanes([&](int l) { return __builtin_cos(angle[l]); })};
   const Pack n = round_to_integer(angle * Pack(0.63661977236758134308));
@@ -184,7 +184,7 @@ inline SineCosine sine_cosine(Pack angle) {
                                 0.041666666666666664};
   const Pack s = r + r * (u * polynomial(kSine, u));
   const Pack c = (Pack(1.0) - Pack(0.5) * u) + (u * u) * polynomial(kCosine, u);
-  // n modulo 4 by its two lowest bits, which the sum with 1.5 * 2^52 puts last.
+  // n modulo 4 from its two lowest bits. The sum with 1.5 * 2^52 moves these bits to the end.
   const auto bits = reinterpret_cast<Pack::Integers>((n + Pack(6755399441055744.0)).v);
   const Pack::Integers odd = (bits & 1) != 0, half_turn = (bits & 2) != 0, other = ((bits + 1) & 2) != 0;
   SineCosine out{select(odd, c, s), select(odd, s, c)};

@@ -5,7 +5,7 @@
 
 namespace withe {
 
-/// A number as people write it, with so many digits.
+/// A number in the usual notation, with `digits` digits.
 inline std::string text(double number, int digits = 3) {
   char words[32];
   std::snprintf(words, sizeof words, "%.*g", digits, number);

@@ -28,7 +28,7 @@ struct WorkerPool::Crew {
   Crew(const Crew&) = delete;
   Crew& operator=(const Crew&) = delete;
 
-  /// A list has come: every thread takes what is next until nothing is left.
+  /// Works on a new list: every thread takes the next task until none is left.
   void begin(std::size_t tasks, const std::function<void(std::size_t)>& what) {
     {
       const std::lock_guard lock(mutex);

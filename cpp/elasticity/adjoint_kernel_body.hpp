@@ -119,7 +119,7 @@ void rate_slopes(const StencilBatch& batch, const MomentumBatch& step) {
     are_inner(batch, first) ? rate_pack<true>(batch, step, first) : rate_pack<false>(batch, step, first);
 }
 
-/// rows^T times the derivatives by the end, which are half of those by the middle.
+/// rows^T times the derivatives by the end of the step. They are half of the derivatives by the middle.
 template <bool inner>
 [[gnu::flatten]] void momentum_product_pack(const StencilBatch& batch, const MomentumBatch& step, const double* rows,
                                             double* out, int first) {
@@ -143,7 +143,8 @@ void momentum_product(const StencilBatch& batch, const MomentumBatch& step, cons
                             : momentum_product_pack<false>(batch, step, rows, out, first);
 }
 
-/// Moments are linear in K_i (mean strain_i - n_i): what rows^T makes of one of these, the others being none.
+/// Moments are linear in K_i (mean strain_i - n_i). Returns rows^T times the forces of one of these, with the others
+/// zero.
 template <bool inner>
 [[gnu::flatten]] void momentum_change_pack(const StencilBatch& batch, const MomentumBatch& step, const double* rows,
                                            double* out, int first) {

@@ -42,7 +42,7 @@ PlanarBend<Scalar> planar_bend(const BendMeasure& measure, const Scalar& kappa, 
   return {0.5 * moment * strain, moment * beta.first, stiffness * beta.first * beta.first + moment * beta.second};
 }
 
-/// The direction of an edge, or of what it is attached to, and one over its length.
+/// Direction of an edge, or of the part to which it is attached, and one over its length.
 template <class Scalar>
 struct PlanarEdge {
   Vec2<Scalar> tangent;
@@ -53,10 +53,10 @@ struct PlanarEdge {
 template <class Scalar>
 struct PlanarForces {
   Vec2<Scalar> force[2];  ///< [N]
-  Mat2<Scalar> by[2][2];  ///< of the first by the second [N / m]; where asked for
+  Mat2<Scalar> by[2][2];  ///< derivative of the first by the second [N / m]; if requested
 };
 
-/// Derivatives of the bending `p` between two edges. The bend phi is the angle of the second edge less that of the
+/// Derivatives of the bending `p` between two edges. The bend phi is the angle of the second edge minus that of the
 /// first edge. The angle of an edge has the gradient n = (-ty, tx) / l and the Hessian -(t n^T + n t^T) / l.
 template <bool with_matrix, class Scalar>
 void planar_bend_forces(const PlanarBend<Scalar>& p, const PlanarEdge<Scalar> (&edge)[2], PlanarForces<Scalar>& out) {
@@ -73,7 +73,7 @@ void planar_bend_forces(const PlanarBend<Scalar>& p, const PlanarEdge<Scalar> (&
     }
 }
 
-/// The matrix of three nodes from that of the two edges between them.
+/// Converts the matrix of two edges into the matrix of their three nodes.
 template <class Scalar, class Matrix>
 void put_planar_matrix(const PlanarForces<Scalar>& f, Matrix& out) {
   for (int k = 0; k < 2; ++k)

@@ -4,7 +4,8 @@
 /// Strains [Bergou et al. 2010, section 3; Choi, dissertation 3.3-3.6], with t the tangents and d the directors:
 ///   kb = 2 t0 x t1 / (1 + t0 . t1),  tau = angle about t1 from the transported d1_0 to d1_1,
 ///   kappa1 = kb . d2,  kappa2 = - kb . d1,  in the directors of the first frame turned by tau / 2
-/// (geometry/curvature.hpp), where those of the source are the mean of both frames', which twist would soften.
+/// (geometry/curvature.hpp). The source uses the mean of the directors of both frames, with which twist would reduce
+/// the bending stiffness.
 /// |kb| = 2 tan(phi / 2) for a turn by phi. kappa1 > 0 bends towards d1, kappa2 > 0 towards d2.
 /// Energy E = (K1 (f kappa1 - n1)^2 + K2 (f kappa2 - n2)^2 + Kt (f tau - nt)^2) / 2, f(|kappa|^2) of
 /// geometry/bend_measure.hpp, stiffnesses K = EI / V and GJ / V in N m, V the Voronoi length.
@@ -38,7 +39,7 @@ struct BendTwistDerivatives {
 template <class Scalar>
 struct BendTwistMoments {
   Scalar energy, by[3];
-  Scalar second[3][3];  ///< where asked for
+  Scalar second[3][3];  ///< if requested
 };
 
 template <bool second_too, class Scalar>

@@ -48,7 +48,7 @@ void finish_block(const MovingEdge<double>& edge, const DiscreteStep& step, int 
   if (own) add_spin_change(edge, middle, edge.torque(moment), block);
 }
 
-/// Rows of edge `r` by the vector and angle of edge `c`, twice: changes of the end are twice those of the middle.
+/// Adds the rows of edge `r` by the vector and angle of edge `c`, times two: the end moves twice as far as the middle.
 void add_edge_rows(Local& out, const EdgePlace& r, const EdgePlace& c, const EdgeBlock<double>& b) {
   constexpr double kTwice = 2.0;
   for (int s : {1, -1})
@@ -85,7 +85,7 @@ PlanarMovingEdge<double> planar_moving_edge(const DiscreteStep& step, int edge, 
           planar_edge(step.end.edge[at(edge)], sign)};
 }
 
-/// Its derivatives where asked for.
+/// Its derivatives, if requested.
 DiscreteMoment<double> moment_between(const BendMeasure& measure, const EdgeFrame<double>& a0,
                                       const EdgeFrame<double>& a1, const EdgeFrame<double>& b0,
                                       const EdgeFrame<double>& b1, const Vec3d& start, const Vec3d& end,
@@ -116,14 +116,14 @@ void planar_bend_local(const Model& model, const TurnCoefficients& elastic, cons
 
 PlanarHalfForces planar_attached_forces(const TurnCoefficients& elastic, const DiscreteStep& step, int index,
                                         const AttachedStep& attached) {
-  const int a = attached.first ? 0 : 1, b = 1 - a;  // slots of what is attached and of the edge
+  const int a = attached.first ? 0 : 1, b = 1 - a;  // slots of the attached part and of the edge
   const PlanarMovingEdge<double> edge = planar_moving_edge(step, index, 1.0);
   Vec2<double> t0[2], t1[2];
   t0[a] = planar_edge(attached.start).tangent, t1[a] = planar_edge(attached.end).tangent;
   t0[b] = edge.t0, t1[b] = edge.t1;
   const PlanarMoment<double> m = planar_moment(elastic.measure, t0[0], t1[0], t0[1], t1[1], attached.start_strain.x,
                                                attached.end_strain.x, elastic.natural.x, elastic.stiffness.x);
-  const double sign = attached.first ? -1.0 : 1.0;  // of the moment on the edge
+  const double sign = attached.first ? -1.0 : 1.0;  // sign of the moment on the edge
   const double by_turn[2] = {2.0 * sign * m.by_a, 2.0 * sign * m.by_b};
   const Vec2<double> column = edge.column(by_turn[b]);
   PlanarHalfForces f{sign * m.moment * edge.force, -sign * m.moment, {}, by_turn[a] * edge.force, -column, -by_turn[a]};

@@ -1,6 +1,6 @@
 #pragma once
-/// Discrete gradients of one stencil over a step, in its own unknowns (see elements.hpp): forces whose work is what the
-/// energy changes by. Derivatives are by the middle of the step, of whose change the end's is twice.
+/// Discrete gradients of one stencil over a step, in its own unknowns (see elements.hpp): forces whose work equals the
+/// change of the energy. Derivatives are by the middle of the step. The end moves twice as far as the middle.
 ///   stretching: EA (eps0 + eps1) / 2 (e0 + e1) / (|e0| + |e1|)   [Simo, Tarnow and Doblare 1995];
 ///   bending, twisting: moments between frames, see discrete_gradient.hpp. A frame's row is the moment on it.
 
@@ -9,11 +9,11 @@
 
 namespace withe {
 
-/// A step whose middle is evaluated; all are measured from the frames of the start.
+/// A step that is evaluated in the middle. Angles are measured from the frames of the start.
 struct DiscreteStep {
   const Configuration &start, &middle, &end;
   const VectorX& end_q;
-  const VectorX& change;  ///< of the unknowns, from the start to the end
+  const VectorX& change;  ///< change of the unknowns from the start to the end
   /// True if torques act on nodes through the transport of the directors. If false, forces do not change when
   /// the start and the end are exchanged.
   bool transported = true;
@@ -32,17 +32,18 @@ inline MeanStretch mean_stretch(const Model& model, const ElasticCoefficients& e
   return {axial_force(0.5 * sum, rest, EA, elastic.stretch_natural[edge]), EA / rest, 2.0 / sum};
 }
 
-/// Arm of a hinge: the torque on the hinge is m . arm for a moment m on the carried frame. Behind a frame that turns by
-/// the Cayley vector w the hinge turns by `angle` about `axis`, and what both make of the carried frame is a rotation
-/// with the Cayley vector w + angle arm.
+/// Arm of a hinge: the torque on the hinge is m . arm for a moment m on the carried frame. The frame turns by the
+/// Cayley vector w, and the hinge behind it by `angle` about `axis`. Together they rotate the carried frame by the
+/// Cayley vector w + angle arm.
 struct HingeArm {
   Vector3 arm;
-  Matrix3 by_frame;  ///< by w
+  Matrix3 by_frame;  ///< derivative by w
   Vector3 by_angle;
 };
 HingeArm hinge_arm(const Vector3& w, const Vector3& axis, double angle);
 
-/// `given_force`: axial, per edge, in place of that of the mean strain in the matrix, see add_stretch_hessian; or null.
+/// `given_force`: axial force per edge for the matrix, instead of that of the mean strain, see add_stretch_hessian; or
+/// null.
 void discrete_stretch_local(const Model& model, const ElasticCoefficients& elastic, const DiscreteStep& step, int edge,
                             bool with_matrix, const double* given_force, Local& out);
 void discrete_bend_local(const Model& model, const TurnCoefficients& elastic, const DiscreteStep& step, int stencil,
@@ -54,7 +55,7 @@ void discrete_half_local(const Model& model, const TurnCoefficients& elastic, co
 struct AttachedStep {
   EdgeFrame<double> start, end;
   Vec3d start_strain, end_strain;
-  bool first;  ///< whether the stencil goes from there to the edge
+  bool first;  ///< true if the stencil goes from the frame to the edge
 };
 
 /// Force of a half stencil with a prescribed frame, in the unknowns of its edge alone: tail, angle and head, or in a

@@ -1,12 +1,13 @@
 #pragma once
 /// Discrete gradients of bending and twisting. These are moments between two frames whose work over a step equals the
-/// change of the energy exactly. Together with the forces that an edge makes of them, they apply neither a net force
-/// nor a net moment to the stencil.
+/// change of the energy exactly. With the forces of the edges that transmit them, they apply neither a net force nor a
+/// net moment to the stencil.
 ///
-/// In a step a frame F turns from F0 to F1 by a rotation with the Cayley vector w, F1 - F0 = w x (F0 + F1) / 2. So a
-/// product of vectors of two frames changes exactly by a1 . b1 - a0 . b0 = (w_a - w_b) . (mean a x mean b). It is
-/// constant if both frames turn alike [Gonzalez 1996: discrete gradients in quadratic invariants]. The twist and the
-/// curvatures v in the directors of the first frame are quotients of such products: with x = t_a . t_b, X = 1 + x,
+/// In a step a frame F turns from F0 to F1 by a rotation with the Cayley vector w, F1 - F0 = w x (F0 + F1) / 2. A
+/// product of vectors of two frames therefore changes exactly by a1 . b1 - a0 . b0 = (w_a - w_b) . (mean a x mean b).
+/// It is constant if both frames turn by the same rotation [Gonzalez 1996: discrete gradients in quadratic invariants].
+/// The twist and the curvatures v in the directors of the first frame are quotients of such products: with x = t_a .
+/// t_b, X = 1 + x,
 ///   v_i = y_i / X,  y_i = 2 di_a . t_b,
 ///   X cos(tau) = c = d1_a . d1_b + d2_a . d2_b,  X sin(tau) = s = d2_a . d1_b - d1_a . d2_b,
 /// and change exactly (D for differences) by
@@ -45,7 +46,7 @@ inline TurnOverSine<double> turn_over_sine(double x, double sine, double cosine)
 template <class Scalar>
 struct DividedMoments {
   Scalar by[3];
-  Scalar second[3][3];  ///< not symmetric; where asked for
+  Scalar second[3][3];  ///< not symmetric; if requested
 };
 
 template <bool second_too, class Scalar>
@@ -70,7 +71,7 @@ DividedMoments<Scalar> divided_moments(const BendMeasure& measure, const Vec3<Sc
   for (int i = 0; i < 3; ++i) h.by[i] = moment[i] * f;
   for (int i = 0; i < 2; ++i) h.by[i] += pull * u[i];
   if constexpr (second_too) {
-    const Scalar falling = -measure.b * (lower * divided);  // of `divided`, by x1
+    const Scalar falling = -measure.b * (lower * divided);  // derivative of `divided` by x1
     Scalar by_moment[3];                                    // of `moment` by u_j: K / 2 (f1 delta_ij + f1' 2 u1_j u1_i)
     for (int j = 0; j < 3; ++j) {
       const Scalar by_x = j < 2 ? Scalar(2.0 * u1[j]) : Scalar{0.0};
@@ -102,8 +103,8 @@ struct FrameMoments {
   Scalar twist_by[3];
 };
 
-/// From moments that belong to the curvatures halfway, kappa, and tau, those at both ends of the step being `start` and
-/// `end`; `turn`: of the step's D tau.
+/// Converts moments that belong to the halfway curvatures kappa and to tau. `start` and `end`: these strains at both
+/// ends of the step. `turn`: finite turn of D tau.
 template <bool second_too, class Scalar>
 FrameMoments<Scalar> frame_moments(const HalfTwist<Scalar>& half0, const HalfTwist<Scalar>& half1,
                                    const TurnOverSine<Scalar>& turn, const Vec3<Scalar>& start, const Vec3<Scalar>& end,
@@ -122,7 +123,7 @@ FrameMoments<Scalar> frame_moments(const HalfTwist<Scalar>& half0, const HalfTwi
     const Scalar q_slope = 0.5 * S * (1.0 / (1.0 + C) + 1.0 / C) - turn.slope / turn.value;  // over q
     const Vec2<Scalar> across = half1.to_halfway({0.125 * moment.y, -0.125 * moment.x}),
                        back = half1.to_first({-0.125 * moment.y, 0.125 * moment.x});
-    // By kappa at the end and by tau, and then by what kappa follows from.
+    // Derivatives by kappa at the end and by tau, then by the variables that determine kappa.
     Vec2<Scalar> a_by[3], b_by[3];
     Scalar twist_by[3];
     for (int j = 0; j < 3; ++j) {
@@ -152,7 +153,7 @@ FrameMoments<Scalar> frame_moments(const HalfTwist<Scalar>& half0, const HalfTwi
 template <class Scalar>
 struct DiscreteMoment {
   Vec3<Scalar> moment;
-  Mat3<Scalar> by_a, by_b;  ///< where asked for
+  Mat3<Scalar> by_a, by_b;  ///< if requested
 };
 
 template <bool with_matrix, class Scalar>
@@ -202,7 +203,7 @@ void discrete_moment(const BendMeasure& measure, const EdgeFrame<Scalar>& a0, co
     add_identity(out.by_a, -0.5 * trace_a);
     add_identity(out.by_b, 0.5 * trace_b);
 
-    // The weights follow the strains and X at the end, and those the spin of a less that of b.
+    // The weights depend on the strains and X at the end. These depend on the spin of a minus the spin of b.
     const Vec3<Scalar> x = cross(a1.tangent, b1.tangent);
     const Vec3<Scalar> vx = cross(ta, tb), vc = cross(a[0], b[0]) + cross(a[1], b[1]),
                        vs = cross(a[1], b[0]) - cross(a[0], b[1]);
@@ -287,7 +288,7 @@ struct EdgeBlock {
   Scalar angle_angle;
 };
 
-/// From changes of the moment: `sign` is -1 for the frame that the opposite moment acts on.
+/// Contribution of changes of the moment. `sign` is -1 for the frame on which the opposite moment acts.
 template <class Scalar>
 EdgeBlock<Scalar> edge_block(const MovingEdge<Scalar>& edge, double sign, const EdgeColumns<Scalar>& c) {
   EdgeBlock<Scalar> out;
@@ -305,7 +306,7 @@ EdgeBlock<Scalar> edge_block(const MovingEdge<Scalar>& edge, double sign, const 
   return out;
 }
 
-/// From how the edge makes forces of a moment that stays.
+/// Contribution of the motion of the edge at constant moment.
 template <class Scalar>
 void add_edge_geometry(const MovingEdge<Scalar>& edge, const Vec3<Scalar>& m, EdgeBlock<Scalar>& out) {
   const Vec3<Scalar>&t0 = edge.t0, &t1 = edge.t1, &t = edge.t;
@@ -328,8 +329,8 @@ void add_edge_geometry(const MovingEdge<Scalar>& edge, const Vec3<Scalar>& m, Ed
   out.angle_e += (0.5 * i) * (m - dot(m, t) * t);
 }
 
-/// From torques on directors to those on angles, which leave the nodes what direct transport takes along: a force
-/// torque spin, without work in a step.
+/// Converts torques on directors into torques on angles. The direct transport of directors adds a force on the nodes,
+/// torque times spin, which does no work in a step.
 template <class Scalar>
 void add_transport(const EdgeFrame<Scalar>& middle, EdgeBlock<Scalar>& out) {
   add_outer(out.ee, Scalar(1.0), middle.spin, out.angle_e);

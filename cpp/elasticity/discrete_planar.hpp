@@ -44,7 +44,7 @@ PlanarMoment<Scalar> planar_moment(const BendMeasure& measure, const Vec2<Scalar
   const Scalar inverse = 2.0 / (2.0 + dot(a0, b0) + dot(a1, b1)), kappa = 0.5 * (kappa0 + kappa1);
   const Scalar along = dot(a, b), across = cross(a, b);
   const Scalar slope = -inverse * (2.0 * along + kappa * across);
-  // By a turn of a less that of b: kappa, and 1 + t_a . t_b.
+  // Derivatives of kappa and of 1 + t_a . t_b, by the turn of a minus the turn of b.
   const Scalar by_kappa = -(1.0 + 0.25 * (kappa1 * kappa1)), by_chi = cross(a1, b1);
   const Scalar strained =
       h.by_end * slope * by_kappa - h.value * inverse * (0.5 * (by_kappa * across + by_chi * slope));
@@ -61,7 +61,7 @@ struct PlanarMovingEdge {
   Scalar inverse_length1, inverse_length;
   Scalar inverse_mean;  ///< 2 / (l0 + l1)
   Scalar chi, stretch;
-  Vec2<Scalar> force;  ///< of a unit moment, on the edge's vector
+  Vec2<Scalar> force;  ///< force of a unit moment on the vector of the edge
 
   PlanarMovingEdge(const PlanarEdge<Scalar>& start, const PlanarEdge<Scalar>& middle, const PlanarEdge<Scalar>& end)
       : t0(start.tangent),

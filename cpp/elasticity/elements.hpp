@@ -31,7 +31,7 @@ struct ElasticCoefficients {
   VectorX joint_stiffness, joint_natural;  ///< per revolute joint [N m/rad], [rad]
 };
 
-/// Those of bending and twisting of one stencil.
+/// Coefficients of bending and twisting of one stencil.
 struct TurnCoefficients {
   BendMeasure measure;
   Vec3d stiffness, natural;
@@ -47,19 +47,19 @@ inline TurnCoefficients half_coefficients(const ElasticCoefficients& k, int i) {
           {k.half_natural(i, 0), k.half_natural(i, 1), k.half_natural(i, 2)}};
 }
 
-/// Elasticity alone; of that, the natural strains.
+/// `set_elastic` sets the coefficients of elasticity alone, `set_natural` only their natural strains.
 void set_elastic(const Parameters& parameters, ElasticCoefficients& out);
 void set_natural(const Parameters& parameters, ElasticCoefficients& out);
 /// Kelvin-Voigt viscosity alone over an interval h: the potential (eta / E) k (s - s0)^2 / (2 h) of the
 /// strain s has the form of an elastic one with natural strain s0.
 void set_viscous(const Model& model, const Parameters& parameters, const Configuration& start, double h,
                  ElasticCoefficients& out);
-/// The same where h is half a step whose middle is evaluated: s0 such that s - s0 is half of what the strain changes by
-/// from the start to the end, (s_end - s_start) / 2. In the middle of a chord strains are others than on the way, even
-/// where a rod only turns, and a rate taken from there would push without a cause and feed energy in.
+/// The same if h is half a step that is evaluated in the middle. The resulting s0 makes s - s0 half of the change of
+/// the strain in the step, (s_end - s_start) / 2. The strains at the midpoint of the chord differ from those on the
+/// path, even if a rod only rotates. A rate from these strains would cause a spurious force and add energy.
 void refer_viscous_to_ends(const Model& model, const Configuration& start, const Configuration& middle,
                            const Configuration& end, ElasticCoefficients& out);
-/// Sum of two quadratic energies in the strains, but for a constant.
+/// Sum of two quadratic energies in the strains, up to a constant.
 void add_coefficients(const ElasticCoefficients& other, ElasticCoefficients& sum);
 
 void stretch_local(const Model& model, const ElasticCoefficients& coefficients, const Configuration& c, int edge,
@@ -89,8 +89,8 @@ struct BendTwistEnergy {
 };
 BendTwistEnergy bend_energy_of(const ElasticCoefficients& coefficients, const Configuration& c, int stencil);
 BendTwistEnergy half_energy_of(const ElasticCoefficients& coefficients, const Configuration& c, int stencil);
-/// By how much the energy grows where strains stay and natural strains become those of the parameters [J]: per stencil
-/// k (n1 - n0) ((n0 + n1) / 2 - s), without the rounding of two energies.
+/// Growth of the energy if the strains remain and the natural strains become those of the parameters [J]. Per stencil
+/// it is k (n1 - n0) ((n0 + n1) / 2 - s), without the rounding errors of two energies.
 double natural_change_energy(const Model& model, const ElasticCoefficients& coefficients, const Parameters& now,
                              const Configuration& c);
 

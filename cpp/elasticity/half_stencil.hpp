@@ -16,9 +16,9 @@ namespace withe {
 template <class Scalar>
 struct AttachedEnd {
   int slot;              ///< 0 where the stencil goes from the frame to the edge, else 1
-  Vec3<Scalar> tangent;  ///< of the end
+  Vec3<Scalar> tangent;  ///< tangent of the end
   Vec3<Scalar> turn;     ///< Cayley vector w of the frame
-  Vec3<Scalar> axis;     ///< of the hinge; zero where there is none
+  Vec3<Scalar> axis;     ///< axis of the hinge; zero if there is none
 };
 
 /// J^T v.

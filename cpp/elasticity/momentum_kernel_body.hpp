@@ -24,7 +24,7 @@ MovingEdge<Pack> moving_edge(const EdgeFrame<Pack>& start, const EdgeFrame<Pack>
           middle.inverse_length, turn_of_directors(start, end)};
 }
 
-/// One row of an edge's block, of its force or of its torque: what it says of nodes and angles.
+/// One row of the block of an edge, of its force or of its torque: its entries for nodes and angles.
 void put_row(Pack (&row)[11], const Vec3<Pack> (&edge)[2], const Pack (&angle)[2]) {
   put(row, -edge[0]);
   put(row + 4, edge[0] - edge[1]);
@@ -46,7 +46,7 @@ struct MomentumFrames {
   MovingEdge<Pack> moving(int j) const { return moving_edge(start[j], middle[j], end[j]); }
 };
 
-/// The moment between the two frames of a stencil, and what its edges make of it.
+/// Moment between the two frames of a stencil, and the resulting forces on its edges.
 template <bool inner>
 struct MomentumForces {
   MomentumFrames<inner> frames;
@@ -72,7 +72,7 @@ MomentumForces<inner> momentum_forces(const StencilBatch& batch, const MomentumB
   return out;
 }
 
-/// Derivatives by the middle, whose changes are half of those of the end. `transported`: see DiscreteStep.
+/// Derivatives by the middle. The end moves twice as far as the middle. `transported`: see DiscreteStep.
 template <bool transported, bool inner>
 void momentum_matrix(const StencilBatch& batch, const MomentumForces<inner>& forces, const Lanes<inner>& lanes,
                      Pack (&H)[11][11 + kLanes]) {
@@ -95,7 +95,7 @@ void momentum_matrix(const StencilBatch& batch, const MomentumForces<inner>& for
       for (EdgeBlock<Pack>& b : block) add_transport(f.middle[i], b);
       add_spin_change(edge[i], f.middle[i], forces.d.gradient_angle[i], block[i]);
     }
-    // Changes of the end are twice those of the middle; the mixed method has axial forces of its own.
+    // The end moves twice as far as the middle. The mixed method has its own axial forces.
     const Pack transverse = lanes.owned[i] * (lanes.of_edge(batch.geometric, i) * edge[i].inverse_mean);
     Mat3<Pack> stretching{};
     add_stretch_hessian(forces.mean[i], f.end[i].tangent, lanes.owned[i] * lanes.of_edge(batch.modulus, i), transverse,

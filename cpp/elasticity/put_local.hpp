@@ -1,5 +1,6 @@
 #pragma once
-/// From what a stencil's edges, directors and frame feel to rows and columns of its unknowns (see elements.hpp).
+/// Converts forces on edges, directors and the frame of a stencil to rows and columns of its unknowns (see
+/// elements.hpp).
 
 #include "elasticity/bend_planar.hpp"
 #include "elasticity/elements.hpp"

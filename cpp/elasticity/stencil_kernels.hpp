@@ -15,7 +15,7 @@ namespace withe {
 
 struct StencilBatch {
   int count;
-  const int* stencil;           ///< which row of the tables below
+  const int* stencil;           ///< row in the tables below
   const int* first_unknown;     ///< of each
   const int* edges;             ///< two of each
   const double* owned;          ///< two of each: 1 where it brings the edge's stretching, else 0
@@ -39,8 +39,8 @@ struct StencilBatch {
   const double* edge_inertia;  ///< per edge, of theta [kg m^2]: of an explicit step in space, else null
 };
 
-/// Data of an energy-momentum step besides its middle, see discrete_elements.hpp. The batch's `force` is
-/// then that of the mean strain, `frames` and `strain` are in the middle.
+/// Data of an energy-momentum step besides its middle, see discrete_elements.hpp. `force` of the batch is then the
+/// force of the mean strain. `frames` and `strain` are in the middle.
 struct MomentumBatch {
   const double *start_frames, *end_frames;  ///< tables like `frames`
   const double *start_strain, *end_strain;  ///< tables like `strain`
@@ -60,7 +60,8 @@ struct StencilKernels {
   // For gradients, in space.
   /// How strains f (kappa1, kappa2, tau) change where unknowns change so; three columns, like `strain`.
   void (*strain_changes)(const StencilBatch&, const double* change, double* out);
-  /// Adds k g (g1 - g)^T to the matrix, g the gradients of strains and g1 those at the end: see add_rate_slopes.
+  /// Adds k g (g1 - g)^T to the matrix, where g are the gradients of strains and g1 those at the end: see
+  /// add_rate_slopes.
   void (*rate_slopes)(const StencilBatch&, const MomentumBatch&);
   /// Products of the discrete gradient without the transport of the directors: rows^T times its derivatives
   /// by K (mean strain - natural strain); three columns.

@@ -1,5 +1,6 @@
 #pragma once
-// Packs of stencils: what they read and where they add, for the kernels of stencil_kernels.hpp. Included by those only.
+// Packs of stencils: reading of their data and adding of their results. Only the kernels of stencil_kernels.hpp include
+// this file.
 
 #include "common/pack.hpp"
 #include "elasticity/bend_twist.hpp"
@@ -9,7 +10,7 @@
 namespace withe::WITHE_INSTRUCTION_SET {
 namespace {
 
-/// Numbers that travel together to and from memory. Neighbouring stencils overlap by whole blocks of four unknowns
+/// Numbers that are read and written together. Neighbouring stencils overlap by whole blocks of four unknowns
 /// (in a plane: two), so reads find what was just written.
 constexpr int kBlock = kLanes < 4 ? kLanes : 4;
 using Block = double __attribute__((vector_size(8 * kBlock)));

@@ -17,10 +17,10 @@ Scalar axial_force(const Scalar& length, const Scalar& rest_length, const std::t
 }
 
 /// Hessian with respect to the edge vector: (EA / L) t t^T + (n / l) (I - t t^T), from the `modulus` EA / L and the
-/// `transverse` stiffness n / l. The axial force n of the latter is given apart: with n = EA eps it is the exact
-/// Hessian, with n its own unknown that of the mixed Newton method [Magisano, Leonetti and Garcea 2017].
-/// An energy-momentum step has the force n m with m = (e0 + e1) / (l0 + l1). Its derivative by the mid-step vector
-/// takes m as `direction`, the tangent at the end as `tangent`, and 2 n / (l0 + l1) as `transverse`.
+/// `transverse` stiffness n / l. The axial force n is a separate argument. With n = EA eps the result is the exact
+/// Hessian. With n as an independent unknown it is the Hessian of the mixed Newton method [Magisano, Leonetti and
+/// Garcea 2017]. An energy-momentum step has the force n m with m = (e0 + e1) / (l0 + l1). Its derivative by the
+/// mid-step vector takes m as `direction`, the tangent at the end as `tangent`, and 2 n / (l0 + l1) as `transverse`.
 template <class Matrix, class Vector, class Scalar>
 void add_stretch_hessian(const Vector& direction, const Vector& tangent, const Scalar& modulus,
                          const Scalar& transverse, Matrix& out) {

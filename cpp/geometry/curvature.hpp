@@ -17,12 +17,13 @@ struct BendTwistStrain {
 
 /// Cosine and sine of half a twist, by which the directors halfway between two frames are turned from those of the
 /// first. The mean of both frames' directors is shorter by this cosine: in it a rod would bend with cos^2(tau / 2) of
-/// its stiffness. Whole turns count; without them curvatures would jump to the opposite as tau passes half a turn.
+/// its stiffness. Whole turns of tau matter: without them curvatures would change their sign abruptly when tau passes
+/// half a turn.
 template <class Scalar>
 struct HalfTwist {
   Scalar cosine, sine;
 
-  /// Components in (d1, d2) halfway of what has these in the first frame.
+  /// Converts components in (d1, d2) of the first frame into components in the halfway directors.
   Vec2<Scalar> to_halfway(const Vec2<Scalar>& a) const {
     return {cosine * a.x + sine * a.y, cosine * a.y - sine * a.x};
   }

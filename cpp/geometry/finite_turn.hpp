@@ -1,5 +1,5 @@
 #pragma once
-/// The angle of a step where its middle is that of a rotation.
+/// The angle of a step whose middle is the middle of a rotation.
 
 #include <cmath>
 

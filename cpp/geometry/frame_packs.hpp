@@ -1,5 +1,6 @@
 #pragma once
-// Frames and unknowns of packs of edges, for the kernels of frames, of stencils and of inertia. Included by those only.
+// Frames and unknowns of packs of edges, for the kernels of frames, of stencils and of inertia. Only these include this
+// file.
 
 #include "common/pack.hpp"
 #include "geometry/curvature.hpp"
@@ -35,7 +36,7 @@ inline void store_rows(double* table, int first, int live, const Vec3<Pack>& v) 
   store_threes(table + std::ptrdiff_t{3} * first, live, {v.x, v.y, v.z});
 }
 
-/// Three unknowns from each index on; read with the one before, as there may be none behind.
+/// Three unknowns from each index on. The one before is read with them, since there may be none after them.
 inline Vec3<Pack> three_unknowns(const double* q, const int (&index)[kLanes]) {
   const double* place[kLanes];
   for (int l = 0; l < kLanes; ++l) {

@@ -27,7 +27,7 @@ inline double signed_angle(const Vec3<double>& from, const Vec3<double>& to, con
 /// where s is the tangent from which the reference frame is transported directly: direct transport
 /// differs from infinitesimal transport by the solid angle of the triangle s, t, t + dt.
 /// The second derivative of psi is - (spin bow^T + bow spin^T) / 2, bow = ((2 + s . t) t + s) / (l (1 + s . t));
-/// its antisymmetric part cancels against that of infinitesimal transport.
+/// its antisymmetric part cancels with that of infinitesimal transport.
 template <class Scalar>
 struct EdgeFrame {
   Vec3<Scalar> tangent, d1, d2;

@@ -18,8 +18,8 @@ namespace withe {
 /// A piece of such a curve, at rest.
 struct SplinePiece {
   int node[3] = {-1, -1, -1};  ///< -1: beyond the end of the rod
-  double arc = 0;              ///< of the node in the middle [m]
-  double length[2] = {};       ///< of the edges before and after it [m]
+  double arc = 0;              ///< arc length at the middle node [m]
+  double length[2] = {};       ///< lengths of the edges before and after it [m]
 
   bool first() const { return node[0] < 0; }
   bool last() const { return node[2] < 0; }

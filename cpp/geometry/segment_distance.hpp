@@ -22,7 +22,7 @@ inline constexpr double kParallelWeight = 1e-3;
 struct ClosestPoints {
   double s = 0.5, t = 0.5;              ///< along a and b
   bool s_free = false, t_free = false;  ///< inside, not held at an end
-  Vec3<double> between{};               ///< from b's point to a's [m]
+  Vec3<double> between{};               ///< vector from the point of b to the point of a [m]
   double square = 0;                    ///< W [m^2]
 };
 
@@ -82,7 +82,7 @@ void end_weights(const Scalar& s, const Scalar& t, Scalar (&w)[4]) {
   w[3] = -t;
 }
 
-/// Inverse of the second derivative of W / 2 by s and t, where they are free; nothing for those that are held.
+/// Inverse of the second derivative of W / 2 by those of s and t that are free; zero for the others.
 inline void parameter_inverse(bool s_free, bool t_free, const Vec3<double>& u, const Vec3<double>& v, double A,
                               double B, double (&K)[2][2]) {
   const double uu = dot(u, u) + A, vv = dot(v, v) + B, uv = dot(u, v);
@@ -99,7 +99,8 @@ inline void parameter_inverse(bool s_free, bool t_free, const Vec3<double>& u, c
   }
 }
 
-/// Second derivative of W / 2 over (a0, a1, b0, b1), 12 x 12: w w^T (x) 1 minus what the free parameters give way.
+/// Second derivative of W / 2 over (a0, a1, b0, b1), 12 x 12: w w^T (x) 1 minus the contribution of the free parameters
+/// s and t.
 inline void half_square_hessian(const ClosestPoints& p, const Vec3<double>& u, const Vec3<double>& v, double A,
                                 double B, double (&H)[12][12]) {
   double w[4];
@@ -109,7 +110,7 @@ inline void half_square_hessian(const ClosestPoints& p, const Vec3<double>& u, c
   const double d[3] = {p.between.x, p.between.y, p.between.z};
   const double uc[3] = {u.x, u.y, u.z}, vc[3] = {v.x, v.y, v.z};
   const double ws[4] = {-1, 1, 0, 0}, wt[4] = {0, 0, 1, -1};
-  double P[2][12];  // how the derivative by s and by t changes with the end points
+  double P[2][12];  // derivatives of the derivatives by s and t, by the end points
   for (int i = 0; i < 12; ++i) {
     P[0][i] = ws[i / 3] * d[i % 3] + w[i / 3] * uc[i % 3];
     P[1][i] = wt[i / 3] * d[i % 3] - w[i / 3] * vc[i % 3];

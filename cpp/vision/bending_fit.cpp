@@ -23,7 +23,7 @@ void solve_band(std::vector<std::array<double, 3>>& band, MatrixX2& x) {
       double below = band[static_cast<std::size_t>(i - 1)][1];
       if (i >= 2) below -= l2 * band[static_cast<std::size_t>(i - 2)][0] * band[static_cast<std::size_t>(i - 2)][1];
       l1 = below / band[static_cast<std::size_t>(i - 1)][0];
-      band[static_cast<std::size_t>(i - 1)][1] = l1;  // from here on factors, no longer entries
+      band[static_cast<std::size_t>(i - 1)][1] = l1;  // now a factor, no longer an entry
     }
     if (i >= 1) d -= l1 * l1 * band[static_cast<std::size_t>(i - 1)][0];
     if (i >= 2) d -= l2 * l2 * band[static_cast<std::size_t>(i - 2)][0];

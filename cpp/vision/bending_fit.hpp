@@ -15,14 +15,14 @@ struct FitSample {
 };
 
 /// Points at equal stations 0, `spacing`, ... of the line that minimises
-///   sum of weight |x(station) - point|^2  +  stiffness_length^4 integral of |x''|^2,
-/// so a bump shorter than the stiffness length [px] is smoothed away, and where there are no samples the line bends as
-/// little as it can. A closed line returns to its first point after `length`; that point is not repeated.
+///   sum of weight |x(station) - point|^2  +  stiffness_length^4 integral of |x''|^2.
+/// Bumps shorter than the stiffness length [px] are smoothed away. Without samples nearby, the line has the least
+/// possible bending. A closed line returns to its first point after `length`; that point is not repeated.
 MatrixX2 fit_least_bending(const std::vector<FitSample>& samples, double length, double spacing,
                            double stiffness_length, bool closed);
 
-/// Points at equal distances of at most `spacing` along a polyline; `rows`, where not null, receives for every one
-/// its place in the original, in rows. A closed line is followed back to its first point, which is not repeated.
+/// Points at equal distances of at most `spacing` along a polyline; `rows`, if not null, receives for every point its
+/// place in the original line, in rows. A closed line is followed back to its first point, which is not repeated.
 MatrixX2 resample(const MatrixX2& line, double spacing, bool closed, std::vector<double>* rows = nullptr);
 
 }  // namespace withe

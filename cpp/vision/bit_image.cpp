@@ -112,7 +112,7 @@ BitImage dilate(const BitImage& image) {
   BitImage result(image.height(), image.width());
   for (int y = 0; y < image.height(); ++y) {
     const std::uint64_t* row = image.row(y);
-    // Every row reaches three; what has no pixels is passed over.
+    // Every row affects three rows. Empty words are skipped.
     for (int w = 0; w < image.words(); ++w) {
       const std::uint64_t any = row[w] | from_left(row, w) | from_right(row, w);
       if (any == 0) continue;

@@ -65,7 +65,7 @@ BitImage pack(const std::uint8_t* pixels, int height, int width, std::ptrdiff_t 
 /// To one byte a pixel, 0 or 1, rows one after the other.
 void unpack(const BitImage& image, std::uint8_t* pixels);
 
-/// Dilation and erosion by a square of 3 x 3 pixels; what lies outside the image does not count.
+/// Dilation and erosion by a square of 3 x 3 pixels. Pixels outside the image are ignored.
 BitImage dilate(const BitImage& image);
 BitImage erode(const BitImage& image);
 

@@ -11,9 +11,9 @@ namespace {
 
 constexpr double kForbidden = std::numeric_limits<double>::infinity();
 
-/// Two cables that touch side by side are rarer than two that cross: their energy counts this much more. Where the mask
-/// is hardly wider than one of them at their waist they would have to lie on each other and part again to the same
-/// side, which is rarer still.
+/// Two cables that touch side by side are rarer than two that cross. Their energy is therefore multiplied by this
+/// weight. If the mask at their waist is hardly wider than one cable, they would have to lie on each other and separate
+/// again to the same side. This is even rarer.
 double touching_weight(double widening) {
   constexpr double side_by_side = 1.6, on_each_other = 1.2, weight = 1.5, heaviest = 6;
   const double t = std::clamp((side_by_side - widening) / (side_by_side - on_each_other), 0.0, 1.0);
@@ -24,7 +24,7 @@ double signed_angle(const Vector2& from, const Vector2& to) {
   return std::atan2(from.x() * to.y() - from.y() * to.x(), from.dot(to));
 }
 
-/// Energy of a pair, or infinity where the turn is that of two tips that touch: over 90 degrees within a width.
+/// Energy of a pair. It is infinite if the turn exceeds 90 degrees within a width, as of two tips that touch.
 double pair_energy(const Branch& a, const Branch& b) {
   const Vector2 chord = b.point - a.point;
   const double width = a.half_width + b.half_width;
@@ -33,8 +33,8 @@ double pair_energy(const Branch& a, const Branch& b) {
   return bending_energy(a, b);
 }
 
-/// The best and the second best way to pair branches; one more stays single where their number is odd, others only
-/// at the price of a sharp turn.
+/// Finds the best and the second best way to pair branches. If their number is odd, one branch stays single. Further
+/// single branches cost as much energy as a sharp turn.
 class PairSearch {
  public:
   PairSearch(const std::vector<Branch>& branches, double waist)

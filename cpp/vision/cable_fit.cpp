@@ -7,7 +7,7 @@
 
 namespace withe {
 
-/// Seen from one branch to the other, the flank that the cable which crosses does not cover where the gap starts.
+/// Flank that the crossing cable does not cover at the start of the gap, seen from one branch to the other.
 CableOutline::Flank CableOutline::flank_that_shows(const Continuations& links, HalfEdge from, HalfEdge to) {
   const auto zone_of = [&](HalfEdge half) { return links.zone_of[static_cast<std::size_t>(half)]; };
   const int first = zone_of(from);
@@ -34,7 +34,7 @@ CableOutline::Flank CableOutline::flank_that_shows(const Continuations& links, H
   const double straight = (others[0] - start).norm() + (others[1] - end).norm();
   const double crosswise = (others[1] - start).norm() + (others[0] - end).norm();
   const Vector2& beside_start = straight < crosswise ? others[0] : others[1];
-  // At more than some 37 degrees the gap is short, and both flanks are hidden for most of it.
+  // At angles above about 37 degrees the gap is short, and both flanks are hidden for most of it.
   if (std::max(straight, crosswise) < 3 * std::min(straight, crosswise)) return Flank::unknown;
   return aside(beside_start) > 0 ? Flank::right : Flank::left;
 }
@@ -107,7 +107,7 @@ double CableOutline::length() const {
 }
 
 std::vector<double> CableOutline::stations(double& total) const {
-  // A chain of pixels is longer than the line it stands for, so steps are measured over five pixels.
+  // A chain of pixels is longer than the line that it represents. Steps are therefore measured over five pixels.
   const int n = static_cast<int>(points_.size());
   std::vector<double> result(points_.size(), 0.0);
   int run_start = 0;
@@ -139,7 +139,8 @@ struct Place {
   Flanks flanks;
 };
 
-/// Place where the visible flank changes: in the middle of where the mask is hardly wider than at its narrowest place.
+/// Place where the visible flank changes: the middle of the stretch in which the mask is hardly wider than its least
+/// width.
 std::size_t find_waist(const std::vector<Place>& places, double half_width) {
   const std::size_t size = places.size();
   if (size <= 8) return size / 2;
@@ -235,7 +236,7 @@ double CableOutline::median_half_width() const {
 std::vector<FitSample> CableOutline::point_samples(const std::vector<double>& station) const {
   std::vector<FitSample> samples;
   for (std::size_t i = 0; i < points_.size(); ++i) samples.push_back({points_[i].position, station[i], 1.0});
-  // One more sample keeps the line determined where there are fewer than two.
+  // If there is only one sample, a second one determines the line.
   if (samples.size() == 1) samples.push_back({samples[0].point + Vector2(1, 0), samples[0].station + 1, 1.0});
   return samples;
 }
@@ -296,7 +297,7 @@ void CableOutline::describe_rows(const std::vector<double>& places, const std::v
       stretches.push_back({gap, number, row, row});
     }
   }
-  // A stretch of a ring across its first row is one, and goes on beyond the last row.
+  // A stretch of a ring that contains its first row is one stretch, and continues beyond the last row.
   if (!cable.closed || stretches.size() < own + 2) return;
   const HiddenStretch first = stretches[own];
   HiddenStretch& last = stretches.back();
@@ -324,7 +325,8 @@ Cable CableOutline::fit(const BitImage& mask, const TraceOptions& options, int n
   }
   if (gaps) {
     total = lengthen_gaps(line, cable.closed, total, station);
-    // Flanks are looked for from the line without them; those of shallow crossings again from the line that they gave.
+    // Flanks are searched from the line that was fitted without them. Flanks of shallow crossings are searched again
+    // from the resulting line.
     const int rounds = shallow ? 3 : 2;
     for (int round = 0; round < rounds; ++round) {
       std::vector<FitSample> samples = point_samples(station);

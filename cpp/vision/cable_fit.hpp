@@ -1,5 +1,5 @@
 #pragma once
-/// One cable from its edges: the skeleton inside zones and gaps is dropped and the whole cable fitted again.
+/// One cable from its edges. The skeleton inside zones and gaps is dropped, and the whole cable is fitted again.
 
 #include <vector>
 
@@ -14,7 +14,7 @@ struct HiddenStretch {
   int zone = -1;
   int cable = -1;
   int first = 0;
-  int last = 0;  ///< of a ring beyond its last row, where it goes on over its first
+  int last = 0;  ///< may exceed the last row of a ring, if the stretch continues across its first
 };
 
 /// Data for the fit of a cable: points in order, with their half widths; a gap before a point is marked by its zone.
@@ -29,8 +29,9 @@ class CableOutline {
   bool empty() const { return points_.empty(); }
   bool closed() const { return closed_; }
 
-  /// The line of least bending; `stretches` receives where it passes through zones. Where one flank of the cable shows
-  /// inside a zone, as it does for long where two cables cross at a small angle, the line keeps its distance from it.
+  /// Fits the line of least bending. `stretches` receives the stretches inside zones. If one flank of the cable is
+  /// visible inside a zone, the line keeps its distance from this flank. This is often so if two cables cross at a
+  /// small angle.
   Cable fit(const BitImage& mask, const TraceOptions& options, int number, std::vector<HiddenStretch>& stretches) const;
 
  private:
@@ -40,7 +41,7 @@ class CableOutline {
     Vector2 position;
     double half_width;
     int zone_before;               ///< kNoGap, kBridge or the zone between the point before and this one
-    Flank shows = Flank::unknown;  ///< which flank shows where the gap before this point starts
+    Flank shows = Flank::unknown;  ///< visible flank at the start of the gap before this point
   };
   static constexpr int kNoGap = -2;
   static constexpr int kBridge = -1;
@@ -50,10 +51,10 @@ class CableOutline {
   std::vector<double> stations(double& total) const;
   double median_half_width() const;
   std::vector<FitSample> point_samples(const std::vector<double>& station) const;
-  /// The way through a gap is longer than its chord: measured on a first line, it moves the points behind it. Returns
-  /// the length of the whole.
+  /// The path through a gap is longer than its chord. Measures it on a first line, and moves the points behind it.
+  /// Returns the total length.
   double lengthen_gaps(const MatrixX2& line, bool closed, double total, std::vector<double>& station) const;
-  /// Widths of rows, by their places along the cable, and which of them are hidden.
+  /// Finds the widths of rows from their places along the cable, and the hidden rows.
   void describe_rows(const std::vector<double>& places, const std::vector<double>& station, int number, Cable& cable,
                      std::vector<HiddenStretch>& stretches) const;
   std::vector<FitSample> flank_samples(const BitImage& mask, const MatrixX2& line, double spacing,

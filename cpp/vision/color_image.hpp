@@ -18,7 +18,7 @@ struct ColorImage {
   std::ptrdiff_t stride = 0;  ///< bytes from one row to the next
 
   const std::uint8_t* at(int x, int y) const { return pixels + y * stride + 3 * x; }
-  /// Colour between pixels, bilinear; beyond the border that of the border.
+  /// Colour between pixels by bilinear interpolation. Outside the image it is the colour of the border.
   Eigen::Vector3f sample(const Vector2& point) const;
 };
 
@@ -35,9 +35,9 @@ std::array<int, 3> to_hsv(int red, int green, int blue);
 /// at a time.
 void hsv_mask(const ColorImage& image, const std::vector<HsvRange>& ranges, std::uint8_t* mask);
 
-/// One byte a pixel: 1 where the colour is far from the median colour of the image's border. The distance is the
-/// largest difference of a channel, its threshold that which separates two classes of its square roots best [Otsu
-/// 1979]; nothing is found where the classes differ by less than `contrast` levels.
+/// One byte per pixel: 1 if the colour is far from the median colour of the image border. The distance is the largest
+/// difference of a channel. Its threshold best separates two classes of the square roots of the distance [Otsu 1979].
+/// All pixels are 0 if the classes differ by less than `contrast` levels.
 void foreground_mask(const ColorImage& image, int contrast, std::uint8_t* mask);
 
 }  // namespace withe

@@ -89,7 +89,7 @@ Branch measure_branch(const SkeletonGraph& graph, const SkeletonEdge& edge, int 
   const int n = static_cast<int>(edge.points.size());
   const auto at = [&](int i) { return edge.points[static_cast<std::size_t>(end == 0 ? i : n - 1 - i)].position(); };
   const int last = n - 1 - skip_other;
-  // On thin cables the pixels' noise wants more of them.
+  // On thin cables more pixels are needed because of their noise.
   const double reach = std::max(2 * tangent_length * branch.half_width, 30.0);
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Matrix<double, 3, 2> right = Eigen::Matrix<double, 3, 2>::Zero();
@@ -117,7 +117,7 @@ Branch measure_branch(const SkeletonGraph& graph, const SkeletonEdge& edge, int 
     const Eigen::Matrix<double, 3, 2> c = normal.ldlt().solve(right);
     branch.point = c.row(0).transpose();
     branch.tangent = -c.row(1).transpose();
-    // Along the way into the zone the first derivative turns its sign, the second does not.
+    // In the direction into the zone the first derivative changes its sign, the second does not.
     const Vector2 second = 2 * c.row(2).transpose();
     const double speed = branch.tangent.norm();
     if (speed > 0) {
@@ -129,7 +129,8 @@ Branch measure_branch(const SkeletonGraph& graph, const SkeletonEdge& edge, int 
   return branch;
 }
 
-/// True if a link splits at both ends like a fork with a narrow angle: two cables that lie on each other for a while.
+/// True if a link splits at both ends like a fork with a narrow angle: two cables that lie on each other over some
+/// length.
 bool is_forked(std::size_t link, const SkeletonGraph& graph, Union& sets, const std::vector<std::vector<int>>& leaving,
                const std::vector<Branch>& branches) {
   const SkeletonEdge& edge = graph.edges[link];
@@ -151,7 +152,7 @@ bool is_forked(std::size_t link, const SkeletonGraph& graph, Union& sets, const 
   return true;
 }
 
-/// Joins nodes to zones and says which edges are inside.
+/// Joins nodes to zones and finds the edges inside.
 class ZoneFinder {
  public:
   ZoneFinder(const SkeletonGraph& graph, const ZoneOptions& options, Continuations& result)
@@ -179,7 +180,7 @@ class ZoneFinder {
     for (std::size_t e = 0; e < graph_.edges.size(); ++e) {
       const SkeletonEdge& edge = graph_.edges[e];
       if (edge.removed || !is_junction(graph_, edge.nodes[0]) || !is_junction(graph_, edge.nodes[1])) continue;
-      // Between two crossings the mask is wider than the cable: the narrowest place tells its width.
+      // Between two crossings the mask may be wider than the cable. The narrowest place gives its width.
       const double width = 2 * inner_half_width(edge);
       if (known_links[e] || edge.length < options_.short_link * width)
         take_in(e);
@@ -195,7 +196,7 @@ class ZoneFinder {
     result_.inside[link] = 1;
   }
 
-  /// Longer links are inside too where two cables run on each other.
+  /// Longer links are also inside if two cables lie on each other there.
   void merge_links(const std::vector<std::size_t>& long_links) {
     std::vector<std::size_t> merged;
     for (const std::size_t e : long_links) {
@@ -210,7 +211,7 @@ class ZoneFinder {
     for (const std::size_t e : merged) take_in(e);
   }
 
-  /// Half edges that leave the sets of nodes at both ends of a link; none where both are one.
+  /// Half edges that leave the sets of nodes at both ends of a link; none if both are one set.
   std::array<std::vector<HalfEdge>, 2> ends_at(std::size_t link) {
     std::array<std::vector<HalfEdge>, 2> ends;
     const std::array<int, 2>& nodes = graph_.edges[link].nodes;
@@ -242,7 +243,8 @@ class ZoneFinder {
            (widening > 0.85 && is_forked(link, graph_, sets_, leaving_, result_.branches));
   }
 
-  /// A hole in a zone has two sides: what runs beside a link is inside as well. A cable's loop is no straight way.
+  /// A hole in a zone has two sides: an edge beside a link is inside too. The loop of a cable is excluded, since it is
+  /// not straight.
   void take_in_ways_around_holes() {
     for (std::size_t e = 0; e < graph_.edges.size(); ++e) {
       const SkeletonEdge& edge = graph_.edges[e];
@@ -316,7 +318,7 @@ void match_zone(const Zone& zone, const ZoneOptions& options, Continuations& res
     result.partner[static_cast<std::size_t>(first)] = second;
     result.partner[static_cast<std::size_t>(second)] = first;
   }
-  // Also where only what is assumed about cables that touch decides.
+  // The result is also doubtful if only the assumption about touching cables decides.
   const auto close = [&](double best, double second) {
     return std::isfinite(second) && second - best < options.similar_energies * second;
   };
@@ -327,7 +329,7 @@ void match_zone(const Zone& zone, const ZoneOptions& options, Continuations& res
 }
 
 /// Two ends on opposite flanks of a cable, in line with each other, are one cable that crosses it: the edge between
-/// their zones becomes a link. Says whether there was one more.
+/// their zones becomes a link. Returns true if another one was found.
 bool find_split_crossings(const SkeletonGraph& graph, const ZoneOptions& options, const Continuations& links,
                           std::vector<char>& known_links) {
   const auto singles = [&](int zone) {

@@ -1,6 +1,6 @@
 #pragma once
-/// Crossing zones, where cables meet: zones of the skeleton that say nothing about single cables, and the pairs of
-/// branches that continue each other through them with the least bending energy.
+/// Crossing zones, in which cables meet. There the skeleton does not represent single cables. Pairs of branches
+/// continue each other through a zone with the least bending energy.
 
 #include <array>
 #include <vector>
@@ -16,11 +16,11 @@ inline int edge_of(HalfEdge half) { return half / 2; }
 inline int end_of(HalfEdge half) { return half % 2; }
 inline HalfEdge opposite(HalfEdge half) { return half ^ 1; }
 
-/// An end of an edge as it looks from the place that it leads into.
+/// An end of an edge, seen from the node to which it leads.
 struct Branch {
-  Vector2 point = Vector2::Zero();    ///< last place that the skeleton is trusted at
+  Vector2 point = Vector2::Zero();    ///< last place at which the skeleton is reliable
   Vector2 tangent = Vector2::Zero();  ///< unit vector into the zone, or out of the cable's tip
-  double curvature = 0;               ///< to the left of the tangent [1/px]
+  double curvature = 0;               ///< positive to the left of the tangent [1/px]
   double half_width = 0;              ///< [px]
   int skip = 0;                       ///< pixels between the point and the end of the edge
 };
@@ -32,13 +32,13 @@ struct Zone {
   double waist = 0;  ///< half width of the mask at the narrowest place of its skeleton [px]
 };
 
-/// A link of the skeleton that two cables go through side by side, and the two branches at either end of it.
+/// A link of the skeleton in which two cables lie side by side, and the two branches at each of its ends.
 struct SideBySide {
   int link = -1;
   std::array<std::array<HalfEdge, 2>, 2> branches{};
 };
 
-/// Why a result may be another one.
+/// Reason why a result is uncertain.
 enum class Doubt { similar_energies, parallel_strands };
 
 struct DoubtfulZone {
@@ -48,9 +48,9 @@ struct DoubtfulZone {
 
 struct ZoneOptions {
   double short_link = 2;          ///< links up to this long join zones [widths]
-  double merged_link = 12;        ///< also links up to this long, where the mask is wider than the cables [widths]
-  double merged_widening = 1.1;   ///< by this factor
-  double tangent_length = 4;      ///< length that tangents are fitted over [widths]
+  double merged_link = 12;        ///< also links up to this long, if the mask is wider than the cables [widths]
+  double merged_widening = 1.1;   ///< width of the mask in such links, relative to the cables
+  double tangent_length = 4;      ///< length over which tangents are fitted [widths]
   double similar_energies = 0.2;  ///< two matchings closer than this are ambiguous, relative
 };
 
@@ -62,14 +62,14 @@ struct Continuations {
   std::vector<HalfEdge> partner;  ///< by half-edge; -1 at an end of a cable
   std::vector<char> inside;       ///< by edge: part of a zone
   std::vector<SideBySide> side_by_side;
-  std::vector<std::vector<Vector2>> ways;  ///< by half-edge: places on the way to its partner, where they are known
+  std::vector<std::vector<Vector2>> ways;  ///< by half-edge: known places on the way to its partner
   std::vector<DoubtfulZone> doubts;
 };
 
 /// Point and direction of both ends of every edge.
 std::vector<Branch> measure_branches(const SkeletonGraph& graph, const ZoneOptions& options);
 
-/// The picture, if there is one, tells strands that lie side by side from each other.
+/// The picture, if there is one, is used to distinguish strands that lie side by side.
 Continuations find_continuations(const SkeletonGraph& graph, const ZoneOptions& options,
                                  const ColorImage* image = nullptr);
 

@@ -15,7 +15,7 @@ std::vector<Crossing> find_crossings(const std::vector<Cable>& cables, const std
 struct RayHit {
   CableRow through;
   double distance = 0;
-  double sine = 1;  ///< of the angle between ray and cable
+  double sine = 1;  ///< sine of the angle between ray and cable
 };
 RayHit cast_ray(const std::vector<Cable>& cables, const std::vector<HiddenStretch>& stretches, int zone,
                 const Vector2& from, const Vector2& direction, double longest);

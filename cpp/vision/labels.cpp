@@ -39,7 +39,7 @@ class Painter {
     });
   }
 
-  /// Pixels of the mask that nothing reached take the label of their neighbours, ring by ring.
+  /// Gives the remaining pixels of the mask the label of their neighbours, ring by ring.
   void fill_rest() {
     const int width = mask_.width();
     std::vector<int> ring;
@@ -131,7 +131,7 @@ class Painter {
 
   const BitImage& mask_;
   std::int32_t* labels_;
-  std::unique_ptr<float[]> nearest_;  // only read where there is a label: pages without mask are never touched
+  std::unique_ptr<float[]> nearest_;  // only read at pixels with a label: memory pages without mask are never used
   std::vector<int> unlabelled_;
 };
 

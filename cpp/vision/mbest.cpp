@@ -38,7 +38,7 @@ double curvature(const Vector2& from, const Vector2& over, const Vector2& to) {
   return denominator > 1e-9 ? std::abs(2 * cross) / denominator : 1e9;
 }
 
-/// Clusters nodes and matches Y-shaped ones; says for every edge whether it lies inside an intersection.
+/// Clusters nodes and matches Y-shaped ones. `inside`: for every edge, true if it lies inside an intersection.
 std::vector<Intersection> match_intersections(const SkeletonGraph& graph, double reach, std::vector<char>& inside) {
   std::vector<int> junctions;
   for (std::size_t n = 0; n < graph.nodes.size(); ++n) {
@@ -111,7 +111,7 @@ std::vector<Intersection> match_intersections(const SkeletonGraph& graph, double
   return result;
 }
 
-/// The pairs of the first four ends with the least sum of curvatures; of three ends one pair.
+/// The pairs of the first four ends with the least sum of curvatures; for three ends, one pair.
 void pair_ends(const std::vector<Vector2>& points, const Intersection& intersection, std::vector<HalfEdge>& partner) {
   const std::size_t n = intersection.ends.size();
   std::vector<std::size_t> order(n);
@@ -147,7 +147,7 @@ void pair_ends(const std::vector<Vector2>& points, const Intersection& intersect
   }
 }
 
-/// Ends of edges that meet in intersections, paired where the bend is least.
+/// Ends of edges that meet in intersections, in pairs with the least bending.
 struct Meeting {
   std::vector<Intersection> intersections;
   std::vector<int> intersection_of;  ///< per half edge, or -1
@@ -166,7 +166,7 @@ Meeting meet(const SkeletonGraph& graph, double widest, Continuations& links) {
       meeting.intersection_of[static_cast<std::size_t>(half)] = static_cast<int>(i);
       const SkeletonEdge& edge = graph.edges[static_cast<std::size_t>(edge_of(half))];
       const int n = static_cast<int>(edge.points.size());
-      // New ends where the line has left the widened part of the mask.
+      // The new ends are outside the widened part of the mask.
       const int trim = std::clamp(static_cast<int>(widest), 0, std::max(n / 2 - 1, 0));
       meeting.trimmed[static_cast<std::size_t>(half)] = trim;
       points.push_back(n == 0
@@ -178,7 +178,7 @@ Meeting meet(const SkeletonGraph& graph, double widest, Continuations& links) {
   return meeting;
 }
 
-/// The rows of one cable, as they come.
+/// The rows of one cable, in their order.
 class Rows {
  public:
   bool empty() const { return rows_.empty(); }
@@ -189,7 +189,7 @@ class Rows {
     cable_.hidden.push_back(hidden ? 1 : 0);
   }
 
-  /// A straight way, hidden, a row each pixel, as wide as what is before it; without its end.
+  /// Adds a straight hidden path with one row per pixel, as wide as the row before it. Its end point is excluded.
   void lead_to(const Vector2& to) {
     const Vector2 from = rows_.back();
     const double width = cable_.widths.back();
@@ -197,7 +197,7 @@ class Rows {
     for (int k = 1; k < steps; ++k) add(from + static_cast<double>(k) / steps * (to - from), width, true);
   }
 
-  /// Over the middle of an intersection.
+  /// Adds a path across the middle of an intersection.
   void lead_over(const Vector2& center) {
     lead_to(center);
     add(center, cable_.widths.back(), true);
@@ -236,7 +236,7 @@ Rows rows_of(const SkeletonGraph& graph, const Meeting& meeting, const CablePath
   return rows;
 }
 
-/// Two strands that run over the same middle cross.
+/// Finds crossings: two strands across the same middle cross.
 void find_crossings(const std::vector<Intersection>& intersections, Tracing& tracing) {
   for (const Intersection& intersection : intersections) {
     std::vector<CableRow> visits;

@@ -11,8 +11,8 @@ namespace withe {
 
 namespace {
 
-/// The up to eight neighbours of a skeleton pixel, as numbers of the index; those side by side come first, so that
-/// a walk does not cut a corner.
+/// The up to eight neighbours of a skeleton pixel, as indices. Neighbours that share a side come first, so that a walk
+/// does not cut a corner.
 struct NeighbourList {
   std::array<int, 8> of;
   int count = 0;

@@ -30,7 +30,7 @@ struct SkeletonEdge {
 struct SkeletonNode {
   Vector2 position = Vector2::Zero();
   double half_width = 0;
-  std::vector<int> edges;  ///< an edge that starts and ends here stands twice
+  std::vector<int> edges;  ///< an edge that starts and ends here is listed twice
 };
 
 struct SkeletonGraph {

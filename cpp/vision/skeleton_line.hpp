@@ -7,7 +7,7 @@
 
 namespace withe {
 
-/// Positions and directions along an edge, by number of pixel; numbers beyond its ends are those of the ends. The edge
+/// Positions and directions along an edge, by index of the pixel. Indices beyond its ends refer to the ends. The edge
 /// must outlive the line.
 class SkeletonLine {
  public:

@@ -62,7 +62,7 @@ int find_border(const Lanes& lanes, int first, int last) {
       best = k;
     }
   }
-  // The flanks and the border itself are mixed with what lies beside them.
+  // Colours at the flanks and at the border itself are mixed with the colours beside them.
   if (best < 0 || hue_difference(mean(lanes, first + 1, best - 1), mean(lanes, best + 1, last - 1)) < clear) return -1;
   return best;
 }

@@ -1,5 +1,5 @@
 #pragma once
-/// Colours across a wide line: those of several cables, or of one.
+/// Colours across a wide line, which may be one cable or several.
 
 #include <optional>
 #include <vector>
@@ -14,7 +14,7 @@ namespace withe {
 std::vector<double> hue_borders(const ColorImage& image, const SkeletonLine& line, const WidthRun& run);
 
 /// Share of the brightness across a run that does not fit `count` equal strands, from 0 for strands that look alike to
-/// about 1 for a single round cable. Empty where the brightness is too flat to tell.
+/// about 1 for a single round cable. Empty if the brightness varies too little to decide.
 std::optional<double> shading_misfit(const ColorImage& image, const SkeletonLine& line, const WidthRun& run, int count);
 
 }  // namespace withe

@@ -20,9 +20,9 @@ struct Narrowing {
   double width = 0;
 };
 
-/// None where two runs do not follow each other closely, or the second one is not much narrower.
+/// None if two runs do not follow each other closely, or if the second is not much narrower.
 std::optional<Narrowing> narrowing(const SkeletonLine& line, const WidthRun& wide, const WidthRun& narrow) {
-  constexpr double thinnest = 0.3, widest = 0.7;  // so is the other strand; a ragged border is a fifth of a width
+  constexpr double thinnest = 0.3, widest = 0.7;  // width of the other strand; a ragged border is 0.2
   if (narrow.width < thinnest * wide.width || narrow.width > widest * wide.width) return std::nullopt;
   const bool behind = narrow.first > wide.last;
   const auto inset = [](const WidthRun& run) { return std::min(static_cast<int>(0.5 * run.width), run.length() / 3); };
@@ -30,7 +30,7 @@ std::optional<Narrowing> narrowing(const SkeletonLine& line, const WidthRun& wid
   const int to = behind ? narrow.first + inset(narrow) : narrow.last - inset(narrow);
   const Vector2 way = line.position(to) - line.position(from);
   if (way.norm() > 4 * wide.width) return std::nullopt;
-  // Along an arc the tangents at both ends leave the chord by as much, to either side.
+  // On an arc the tangents at both ends have opposite equal angles with the chord.
   const double aside = 0.5 * (cross(line.tangent(from), way) + cross(line.tangent(to), way));
   const double of_strand = 0.5 * (wide.width - narrow.width);
   if (std::abs(aside) < 0.5 * of_strand) return Narrowing{Narrowing::Side::middle, narrow.width};
@@ -49,7 +49,7 @@ class Borders {
     }
     fractions_.insert(std::upper_bound(fractions_.begin(), fractions_.end(), fraction), fraction);
   }
-  /// Splits what is still two, three, ... times as wide as a single cable.
+  /// Splits the remaining parts that are two, three, ... times as wide as a single cable.
   void split_multiples(double single) {
     const std::vector<double> before = fractions_;
     double left = 0;
@@ -95,8 +95,8 @@ class SeamCutter {
     Borders borders(run.width);
     constexpr double enough_beside = 1.5, enough = 3, alike = 0.1;
     if (run.length() < enough_beside * run.width || run.width < 4) return {};
-    bool sleeve = false;                              // what thickens a cable to both sides
-    for (const std::size_t other : {r - 1, r + 1}) {  // r - 1 wraps: no such run
+    bool sleeve = false;                              // a sleeve thickens a cable on both sides
+    for (const std::size_t other : {r - 1, r + 1}) {  // r - 1 may wrap around: no such run
       if (other >= runs_.size() || runs_[other].edge != run.edge) continue;
       const auto beyond = narrowing(line, run, runs_[other]);
       if (!beyond) continue;
@@ -160,7 +160,8 @@ class SeamCutter {
     return {};
   }
 
-  /// The border between two strands along a run, as far beyond its ends as the strands lie side by side.
+  /// The border between two strands along a run. It extends beyond the ends of the run as far as the strands lie side
+  /// by side.
   std::vector<Vector2> seam(const SkeletonLine& line, const WidthRun& run, double fraction) {
     std::vector<Vector2> raw;
     for (int i = run.first; i <= run.last; i += 2) {
@@ -189,13 +190,14 @@ class SeamCutter {
     return points;
   }
 
-  /// Adds the way straight on, to where the seam leaves the mask; none where it does not, as in a crossing.
+  /// Extends the seam in a straight line to the border of the mask. Adds nothing if the seam does not leave the mask,
+  /// as in a crossing.
   void extend(std::vector<Vector2>& points, double width) {
     const int n = static_cast<int>(points.size());
     const Vector2 end = points.back();
     const Vector2 direction = (end - points[at(std::max(0, n - 1 - 6))]).normalized();
     const Vector2 normal(-direction.y(), direction.x());
-    constexpr double beside = 1.6;  // of the flank on which the other strand has ended [px]
+    constexpr double beside = 1.6;  // distance from the flank on which the other strand has ended [px]
     const double ahead = reach_border(mask_, end, direction, 3 * width);
     for (double s = 0; s < ahead; s += 0.5) {
       const Vector2 point = end + s * direction;
@@ -209,7 +211,7 @@ class SeamCutter {
     if (ahead < 3 * width - 0.5) points.push_back(end + (ahead + 1) * direction);
   }
 
-  /// Removes a line of pixels that no two pixels at its sides touch across.
+  /// Removes a line of pixels, wide enough that pixels on its two sides do not touch.
   static void cut_along(const std::vector<Vector2>& points, BitImage& mask) {
     constexpr double half_width = 0.75;
     for (std::size_t i = 1; i < points.size(); ++i) {
@@ -231,7 +233,7 @@ class SeamCutter {
   const ColorImage* image_;
   const BitImage& mask_;
   std::vector<WidthRun> runs_;
-  std::vector<Branch> branches_;  // measured when a fork asks for them
+  std::vector<Branch> branches_;  // measured when a fork needs them
 };
 
 }  // namespace

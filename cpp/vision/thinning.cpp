@@ -12,7 +12,7 @@ namespace {
 constexpr int zhang_suen(int code) {
   const auto bit = [code](int k) { return (code >> (k % 8)) & 1; };
   int neighbours = 0;
-  int starts = 0;  // from background to object, going round
+  int starts = 0;  // changes from background to object around the pixel
   for (int k = 0; k < 8; ++k) {
     neighbours += bit(k);
     starts += !bit(k) && bit(k + 1);
@@ -82,8 +82,7 @@ Neighbours neighbours_of(const std::uint64_t* word, std::ptrdiff_t stride) {
   return {left(up), up[0], right(up), right(word), right(down), down[0], left(down), left(word)};
 }
 
-/// Words that may change in each of the two passes: those near which something changed since they were last looked at
-/// in that pass.
+/// Words that may change in each of the two passes: those with changes nearby since that pass last examined them.
 class Agenda {
  public:
   Agenda(BitImage& image)
@@ -97,7 +96,7 @@ class Agenda {
     }
   }
 
-  /// Removes at once what pass 1 or 2 removes; says whether that was anything.
+  /// Removes all pixels of pass 1 or 2 at once. Returns true if there were any.
   template <int Pass>
   bool run() {
     active_.clear();

@@ -15,8 +15,8 @@ namespace withe {
 
 namespace {
 
-/// Frays and pinholes go, unless the lines are so thin that much of them would go too. A clean border settles at once,
-/// bays of a ragged one get shallower by a pixel a round.
+/// Removes frays and pinholes, unless the lines are so thin that much of them would be removed too. A smooth border
+/// converges at once. Bays of a ragged border become shallower by one pixel per round.
 BitImage smooth(const BitImage& mask) {
   BitImage result = majority(mask);
   const std::size_t count = result.count();
@@ -31,7 +31,7 @@ BitImage smooth(const BitImage& mask) {
   return result;
 }
 
-/// True if there is a square of four pixels: lines a single pixel wide are no cables.
+/// True if there is a square of four pixels: lines with a width of one pixel are not cables.
 bool has_width(const BitImage& mask) {
   for (int y = 1; y < mask.height(); ++y) {
     const std::uint64_t* above = mask.row(y - 1);
@@ -45,7 +45,7 @@ bool has_width(const BitImage& mask) {
   return false;
 }
 
-/// The half width that half of the skeleton's length exceeds.
+/// The half width that is exceeded along half of the length of the skeleton.
 double typical_half_width(const SkeletonGraph& graph) {
   std::vector<std::pair<double, double>> entries;
   double total = 0;
@@ -111,7 +111,7 @@ struct Found {
   const Continuations& links;
 };
 
-/// Outlines of cables, as they are fitted.
+/// Outlines of cables during the fits.
 struct Outlines {
   std::vector<CableOutline> cables;
   std::vector<HiddenStretch> stretches;
@@ -184,7 +184,7 @@ void join_flanks(const Found& found, Outlines& outlines, Tracing& tracing) {
     const Cable& cable = tracing.cables[static_cast<std::size_t>(end.cable)];
     const int row = end.at_end ? static_cast<int>(cable.centreline.rows()) - 1 : 0;
     const Vector2 point = cable.centreline.row(row).transpose();
-    // The other cable may have been fitted again as well, so its row is looked up anew.
+    // The other cable may have been fitted again too, so its row is determined again.
     const Cable& other = tracing.cables[static_cast<std::size_t>(through.cable)];
     Eigen::Index nearest = through.row;
     (other.centreline.rowwise() - point.transpose()).rowwise().squaredNorm().minCoeff(&nearest);

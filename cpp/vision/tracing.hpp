@@ -16,7 +16,7 @@ namespace withe {
 struct Cable {
   MatrixX2 centreline;         ///< x, y [px]
   std::vector<double> widths;  ///< by row [px]
-  std::vector<char> hidden;    ///< by row: in a crossing or a gap, where the skeleton says nothing
+  std::vector<char> hidden;    ///< by row: true in a crossing or a gap, without information from the skeleton
   bool closed = false;         ///< the first row is not repeated
 };
 
@@ -31,7 +31,7 @@ struct Crossing {
   Vector2 point = Vector2::Zero();
   CableRow over;
   CableRow under;
-  double confidence = 0;  ///< that `over` is over, 0 for unknown to 1
+  double confidence = 0;  ///< confidence that `over` is over, from 0 (unknown) to 1
 };
 
 /// The end of one cable on the flank of another.
@@ -65,10 +65,10 @@ class Stopwatch {
 struct TraceOptions {
   double spur_ratio = 1.5;      ///< ends of the skeleton shorter than this are frays [local half widths]
   double shortest_cable = 2;    ///< shorter lines are specks [widths of the cables in the image]
-  double shortest_line = 16;    ///< nor is a line that is shorter than a gap that would be bridged [px]
+  double shortest_line = 16;    ///< lines shorter than this are also specks: gaps of this length are bridged [px]
   double longest_gap = 16;      ///< [px]
-  double gap_angle = 25;        ///< of each end to the bridge [degrees]
-  double spacing = 1.8;         ///< of rows, at most [px]
+  double gap_angle = 25;        ///< greatest angle of each end to the bridge [degrees]
+  double spacing = 1.8;         ///< greatest spacing of rows [px]
   double stiffness_length = 1;  ///< bumps shorter than this are smoothed away [half widths]
   ZoneOptions zones;
 };
@@ -81,7 +81,7 @@ struct Tracing {
   std::vector<Timing> timings;
 };
 
-/// Finds every cable in a mask. The picture, if there is one, tells strands that lie side by side from each other.
+/// Finds every cable in a mask. The picture, if there is one, is used to distinguish strands that lie side by side.
 Tracing trace_lines(const BitImage& mask, const TraceOptions& options, const ColorImage* image = nullptr);
 
 }  // namespace withe

@@ -11,7 +11,7 @@ struct WidthRun {
   int edge = -1;
   int first = 0;  ///< pixel of the edge
   int last = 0;
-  double width = 0;  ///< of the mask, from flank to flank [px]
+  double width = 0;  ///< width of the mask, from flank to flank [px]
   int length() const { return last - first + 1; }
 };
 
