@@ -1,16 +1,16 @@
 #pragma once
 /// Contact energies E(D) of two surfaces whose centrelines are D apart, for unit stiffness.
 ///
-/// C is the sum of the radii, delta the distance tolerance: E is zero from C + delta on.
+/// C is the sum of the radii, delta the distance tolerance. E is zero from C + delta on.
 ///   imcv2:   (C - D)^2 up to C - delta, then softplus(C - D)^2, softplus(x) = log(1 + e^(K x)) / K, K = 15 / delta
 ///            [Choi, dissertation, (5.2), with the range of its first line ending at C - delta]
 ///   barrier: -(D - C - delta)^2 ln((D - C) / delta), infinite at D = C [Li et al. 2020; Choi, dissertation, (5.1),
 ///            whose barrier as printed stands at D = 0]
-///   imcv1:   (h / K) log(1 + e^(K (C - D))), h = C / 2, whose force goes up to k h and no further; from it, so that it
-///            begins at C + delta without a step, its tangent there [Choi, dissertation, (4.16), h^2 E with K1 = K h:
-///            its K1 = 50 is delta = 0.3 h]
-///   spillmann_teschner: (C - D)^2 where D < C, with no tolerance, and as stiff as it takes a force to lead out of a
-///            depth within one step [Spillmann and Teschner 2008; Choi, dissertation, 4.7, there explicit]
+///   imcv1:   (h / K) log(1 + e^(K (C - D))), h = C / 2, whose force is at most k h; minus its tangent at C + delta, so
+///            that it begins there without a step [Choi, dissertation, (4.16), h^2 E with K1 = K h: its K1 = 50 is
+///            delta = 0.3 h]
+///   spillmann_teschner: (C - D)^2 where D < C, without tolerance. The force is so stiff that it removes an overlap
+///            within one step [Spillmann and Teschner 2008; Choi, dissertation, 4.7, there explicit]
 /// E has the unit m^2, so its stiffness is in N/m.
 
 #include <cmath>

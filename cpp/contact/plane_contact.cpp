@@ -92,15 +92,15 @@ void set_plane_pressing(const ContactProblem& problem, const Touching& t, const 
   }
 }
 
-/// An edge of a piece, and how it turns.
+/// An edge of a piece, and its rotation.
 struct PlaneEdge {
   Point now, start;    ///< [m]
   double inverse;      ///< inverse of its squared length
   double turn;         ///< phi
   double lever;        ///< r m_b [m]
-  double lever_slope;  ///< its derivative by s [m]
+  double lever_slope;  ///< derivative of `lever` by s [m]
 
-  /// Force of an edge's own moment on its head, and, turned round, to its tail [1/m].
+  /// Force of a unit moment on the edge at its head; the opposite acts at its tail [1/m].
   Point arm() const { return inverse * turned(now); }
 };
 
@@ -152,7 +152,7 @@ class PlaneSlip {
   bool sticking() const { return sticking_; }
   double stick() const { return stick_; }
 
-  /// Its derivative. `s`: that of the place where it touches.
+  /// Derivative of the slip. `s`: derivative of the place where the piece touches.
   void slope(const PieceRow& s, PieceRow& out) const {
     spread(
         weight_, [](const PlaneEdge& e) { return (e.lever * e.inverse) * (turned(e.start) - (2.0 * e.turn) * e.now); },
@@ -160,7 +160,7 @@ class PlaneSlip {
     for (int k = 0; k < kPlaneUnknowns; ++k) out[k] += by_s_ * s[k];
   }
 
-  /// Adds what it does to the nodes, and the derivative of that when asked for.
+  /// Adds its forces on the nodes and, if requested, their derivative.
   void add(const Touching& t, const HeightSlopes& d, const Vec3d* predicted, bool with_hessian, PlaneLocal& out) const {
     PieceRow ways;
     spread(weight_, [](const PlaneEdge& e) { return e.lever * e.arm(); }, ways);
@@ -233,7 +233,7 @@ class PlaneSlip {
 
   Axes axes_;
   double weight_[3], weight_slope_[3];
-  PlaneEdge edge_[2];  ///< nothing where there is none
+  PlaneEdge edge_[2];  ///< zero if there is no edge
   double slip_, by_s_, limit_, force_, stick_;
   bool sticking_;
   ForceLaw law_;

@@ -58,10 +58,10 @@ void add_curve_start(const ContactProblem& problem, const Touching& t, bool geom
                       along, derivative);
 }
 
-/// Pressing of a smooth curve, along the gradient of D at the end of the step. Where the force is that of the whole
+/// Pressing of a smooth curve, along the gradient of D at the end of the step. If the force is constant in the whole
 /// step and the matrix need not be symmetric, it acts along the gradients at the start and the end. With their shares b
-/// and 1 - b the force does the work f (D1 - D0). Where a ring rolls, the points that touch at the end came down onto
-/// the surface within the step. The force of these points alone would slow the ring.
+/// and 1 - b the force does the work f (D1 - D0). If a ring rolls, the points that touch at the end have reached the
+/// surface during the step. The force of these points alone would slow the ring.
 void add_curve_pressing(const ContactProblem& problem, const Touching& t, bool with_hessian, bool geometric,
                         ContactLocal& out) {
   const CurvePiece& piece = t.pair.piece;
@@ -82,7 +82,8 @@ void add_curve_pressing(const ContactProblem& problem, const Touching& t, bool w
 }
 
 /// If `ContactProblem::turns`, the force f (see pressing_law.hpp) pushes at the points of mean_points.hpp,
-/// between those closest at the start and at the end: pressing turns and brakes nothing, and gains no energy.
+/// between the closest points at the start and at the end. Pressing then neither turns nor brakes a rod, and adds no
+/// energy.
 template <class Scalar>
 void set_mean_pressing(const ContactProblem& problem, const Touching& t, Scalar (&out)[12]) {
   Vec3d start[4], end[4];

@@ -14,18 +14,18 @@ namespace withe {
 ///   m = (1 - b) g1 + b g0,   b = 1/2 + e d / (d^2 + a^2),   e = D1 - D0 - (p0 + p1) / 2,   d = p0 - p1.
 ///
 /// Here p = g . (x1 - x0), and b is limited to 0 to 1. Up to the effect of a, m . (x1 - x0) = D1 - D0 holds. If d
-/// vanishes, any share satisfies this equation. The small number a is a fraction of what nodes add to p0. Without it, b
-/// would jump from one end to the other, and so would the forces, at contacts that are about to lift off.
+/// vanishes, any share satisfies this equation. The small number a is a fraction of the contributions of nodes to p0.
+/// Without it, b would jump from one end to the other, and so would the forces, at contacts that are about to lift off.
 struct StartShare {
   double value;
-  double by_excess, by_apart;  ///< its derivatives by e and d; 0 where it is at an end
-  double by_part[3];           ///< by what each node adds to p0, through a
+  double by_excess, by_apart;  ///< its derivatives by e and d; 0 if the share is 0 or 1
+  double by_part[3];           ///< derivatives by the contribution of each node to p0, through a
 };
 
 /// `way`: x1 - x0, of three nodes; `nearer`: D1 - D0.
 template <int N>
 StartShare start_share(const double (&first)[N], const double (&last)[N], const double (&way)[N], double nearer) {
-  constexpr double kSmoothing = 1e-4;  // a, over what nodes add to p0
+  constexpr double kSmoothing = 1e-4;  // a, relative to the contributions of nodes to p0
   constexpr int kAxes = N / 3;
   double part[3] = {}, p1 = 0.0;
   for (int i = 0; i < N; ++i) {
@@ -44,7 +44,7 @@ StartShare start_share(const double (&first)[N], const double (&last)[N], const 
   return out;
 }
 
-/// From g1 to m, and from the derivative of g1 to that of m; `derivative` is nothing where none is asked for.
+/// Converts g1 into m, and the derivative of g1 into that of m. `derivative`: null if none is needed.
 template <int N>
 void add_start_direction(const double (&first)[N], const double (&way)[N], double nearer, bool geometric,
                          double (&along)[N], double (*derivative)[N]) {
@@ -63,8 +63,8 @@ void add_start_direction(const double (&first)[N], const double (&way)[N], doubl
   for (int i = 0; i < N; ++i) along[i] += b * turned[i];
 }
 
-/// Adds minus the forces of a contact, and their derivative when asked for: that with how pressing turns, or, without
-/// `geometric`, the part that resists where surfaces near.
+/// Adds minus the forces of a contact and, if requested, their derivative. Without `geometric` the derivative omits the
+/// rotation of the direction of pressing, and has only the part that resists the approach of surfaces.
 void add_pressing(const ContactProblem& problem, const Touching& t, bool with_hessian, bool geometric,
                   ContactLocal& out);
 

@@ -319,8 +319,8 @@ void Surfaces::add_pieces(const ContactPair& prototype, const Obstacle& obstacle
     const int next = behind ? edge + 1 : edge - 1;
     if (next >= first && next < end) return next;
     if (closed) return behind ? first : end - 1;
-    // A rod that goes on from this one, if it may meet the obstacle; the piece between has the friction of the one
-    // before.
+    // The rod that continues this one, if it may touch the obstacle. The piece between both has the friction of the rod
+    // before it.
     const int in_row = next_in_row(model_, edge, behind);
     return in_row >= 0 && may_meet(model_.edge_rod[at(in_row)], prototype.key.b) ? in_row : -1;
   };

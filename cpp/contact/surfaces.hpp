@@ -10,40 +10,40 @@
 
 namespace withe {
 
-/// Depth in each other of surfaces that carry the greatest force of their rod, over the smaller radius: contact is so
-/// stiff that a hundredth of a radius bears it.
+/// Overlap of surfaces under the greatest force of their rod, relative to the smaller radius. The contact stiffness is
+/// chosen for this overlap.
 inline constexpr double kDepth = 0.01;
-/// Depth up to which a step, an equilibrium or a drawing is accepted, over the smaller radius. Contacts
-/// stiffen from half of that on.
+/// Greatest overlap at which a step, an equilibrium or a drawing is accepted, relative to the smaller radius. Contacts
+/// stiffen from half of this overlap on.
 inline constexpr double kMaxDepth = 4.0 * kDepth;
 
-/// Distance of centrelines after an iteration, over that before or over the sum of their radii: above 0, so that
-/// nothing passes through anything.
+/// Least distance of centrelines after an iteration, relative to the distance before it or to the sum of their radii.
+/// It is above 0, so that no rod passes through another.
 inline constexpr double kMinDistance = 0.5;
-/// Distance of surfaces beyond their reach, over the sum of their radii, up to which a pair is part of the matrix's
-/// pattern. Farther pairs need no exact distance.
+/// Greatest distance of surfaces beyond their reach at which a pair is part of the pattern of the matrix, relative to
+/// the sum of their radii. Farther pairs need no exact distance.
 inline constexpr double kMaxPatternDistance = 0.5;
 
 /// Unknowns of a contact: a0, a1, b0, b1 (3 each), angle of a, angle of b; of a piece of a curve: its nodes (3 each),
-/// three that are none, the angles of its edges.
+/// three unused ones, the angles of its edges.
 inline constexpr int kContactUnknowns = 14;
 /// Unknowns of a piece of a planar curve: its nodes (2 each).
 inline constexpr int kPlaneUnknowns = 6;
 
-/// Two surfaces that may touch, and all that does not change while they do.
+/// Two surfaces that may touch, and their data that do not change during contact.
 struct ContactPair {
-  ContactKey key;    ///< of a piece of a curve: the edge before its node, or behind the first, and which end of it
-  CurvePiece piece;  ///< of a's curve beside an obstacle that is larger than an edge
+  ContactKey key;    ///< for a piece of a curve: the edge before its node (at the first node: after it), and its end
+  CurvePiece piece;  ///< of the curve of a, beside an obstacle larger than an edge
   int rod_a = 0, rod_b = -1;          ///< -1: an obstacle
   double radius_a = 0, radius_b = 0;  ///< [m]
   double tolerance = 0;               ///< delta [m]
-  double weight_a = 0, weight_b = 0;  ///< of closest_points [m^2]
-  double share = 1;                   ///< of a contact's stiffness
-  double friction = 0;                ///< [-]; the greatest one, where it is not the same in all directions
-  double forward = 1, backward = 1;   ///< that of a rod a that slides towards its end, and its start, over it
-  double across = 1;                  ///< that of one that slides across itself, over it
-  double rolling = 0;                 ///< coefficient of rolling friction, over a's radius [-]
-  double stiffness = 0;               ///< of its own [N/m]; 0: none
+  double weight_a = 0, weight_b = 0;  ///< for closest_points [m^2]
+  double share = 1;                   ///< share of the stiffness of a contact
+  double friction = 0;                ///< [-]; greatest coefficient of all directions
+  double forward = 1, backward = 1;   ///< if rod a slides towards its end or start, over `friction`
+  double across = 1;                  ///< if it slides across its axis, over `friction`
+  double rolling = 0;                 ///< coefficient of rolling friction, over the radius of a [-]
+  double stiffness = 0;               ///< given for this pair [N/m]; 0: none
   double restitution = 1;             ///< [-]
 
   double radii() const { return radius_a + radius_b; }
@@ -64,13 +64,14 @@ struct ContactPair {
   }
 };
 
-/// Whose coefficients a contact has: a row of `Parameters::pair_friction`, else one of `obstacle_friction`, else those
-/// of the scene; -1: none.
+/// Source of the friction coefficients of a contact: a row of `Parameters::pair_friction`, else a row of
+/// `obstacle_friction`, else the scene; -1: none.
 struct FrictionOwner {
   Eigen::Index pair = -1, obstacle = -1;
 };
 
-/// The order in which contacts are found: those with obstacles, one obstacle after the other, then those of edges.
+/// The order in which contacts are found: first contacts with obstacles, one obstacle after the other, then contacts of
+/// edges.
 bool comes_before(const ContactKey& a, const ContactKey& b);
 
 class Surfaces {
@@ -78,12 +79,12 @@ class Surfaces {
   explicit Surfaces(const Model& model);
 
   const Model& model() const { return model_; }
-  /// As they are drawn.
+  /// Obstacles at their drawn positions.
   const std::vector<Obstacle>& obstacles() const { return obstacles_; }
   /// Pairs with obstacles, one after the other: every edge, or piece of a curve, that has a surface, with every
   /// obstacle that is not ignored.
   const std::vector<ContactPair>& obstacle_pairs() const { return obstacle_pairs_; }
-  /// That of a key.
+  /// The pair of a key.
   const ContactPair& obstacle_pair(const ContactKey& key) const;
   /// Edges that may touch other edges.
   const std::vector<int>& edges() const { return edges_; }
@@ -95,16 +96,16 @@ class Surfaces {
   double greatest_reach() const { return greatest_reach_; }
   /// Coefficients of contact and friction.
   const SurfaceParameters& parameters() const { return parameters_; }
-  /// Takes over parameters that are not those there are; whether there were any.
+  /// Sets the parameters. Returns true if any of them differs from before.
   bool set_parameters(const SurfaceParameters& parameters);
-  /// Gives a pair what its bodies have, and where their friction varies that of its place.
+  /// Sets the coefficients of a pair from its two bodies, with the friction at its place if the friction varies.
   void set_parameters(ContactPair& pair) const;
-  /// Stiffness that is given to what a rod has with another, or an obstacle as -1 - index [N/m]; 0: none is.
+  /// Given stiffness of contacts between a rod and `other`, a rod or (as -1 - index) an obstacle [N/m]; 0: none.
   double given_stiffness(int rod, int other) const;
   FrictionOwner friction_owner(const ContactPair& pair) const;
-  /// True if friction is there at all.
+  /// True if any surface has friction.
   bool frictional() const { return frictional_; }
-  /// Unknowns of two surfaces, -1 where there is none; angles where there is friction.
+  /// Unknowns of two surfaces; -1: none. Angles are included only with friction.
   void unknowns(const ContactPair& pair, int (&dofs)[kContactUnknowns]) const;
   void unknowns(const ContactKey& key, int (&dofs)[kContactUnknowns]) const;
   /// Unknowns of a piece of a planar curve, two per node; existing ones come first.
@@ -119,13 +120,13 @@ class Surfaces {
   void add_pieces(const ContactPair& prototype, const Obstacle& obstacle, int rod);
   /// True if an obstacle is large enough to be touched by a curve.
   bool smooth(const Obstacle& obstacle, int edge) const;
-  /// Coefficients of two bodies wherever they touch; and the place of their pair among those given, or -1.
+  /// Friction coefficients of two bodies at any place, and the index of their pair among the given pairs, or -1.
   struct BodyFriction {
     Eigen::RowVector3d coefficients;
     int given;
   };
   BodyFriction friction_of(int rod, int other) const;
-  /// Place of what touches in `ContactPairDescription::shares`.
+  /// Index of the touching node or edge in `ContactPairDescription::shares`.
   Eigen::Index place_along(const ContactPair& pair) const;
   /// True if two bodies may touch.
   bool may_meet(int first, int second) const;

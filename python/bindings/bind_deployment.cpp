@@ -1,4 +1,5 @@
-/// Rods in space that hang from a gripper, for withe.deployment. Arrays are checked there; here only what would crash.
+/// Rods in space that hang from a gripper, for withe.deployment. Arrays are checked there. This file checks only errors
+/// that would crash.
 
 #include <pybind11/numpy.h>
 

@@ -1,4 +1,5 @@
-/// Sheets that hang from a jaw, for withe.folding. Arrays are checked there; here only what would crash.
+/// Sheets that hang from a jaw, for withe.folding. Arrays are checked there. This file checks only errors that would
+/// crash.
 
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>

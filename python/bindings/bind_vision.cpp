@@ -1,4 +1,5 @@
-/// Tracing of cables in images, for withe.perception. Arrays are checked there; here only what would crash.
+/// Tracing of cables in images, for withe.perception. Arrays are checked there. This file checks only errors that would
+/// crash.
 
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>

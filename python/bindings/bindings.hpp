@@ -1,5 +1,5 @@
 #pragma once
-/// One function per room: registers its types with the module. Words stand for enums on the Python side.
+/// One function per room, which registers its types with the module. In Python, words represent enums.
 
 #include <pybind11/pybind11.h>
 

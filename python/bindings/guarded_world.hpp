@@ -28,16 +28,16 @@ class GuardedWorld {
     refuse(stepping_ && !in_own_callback());
     return world_;
   }
-  /// For everything else: between steps only.
+  /// For all other uses, which are allowed only between steps.
   World& changing() {
     refuse(stepping_);
     return world_;
   }
   /// Runs `advance(world)` without the GIL. `callback(force_time, end_time)`, or None, is called before
-  /// every inner step, and `forces(time, positions, velocities, derivatives)`, or None, for its custom forces: they,
-  /// moments, derivatives by positions and by velocities, or None for each. Signals are looked at
-  /// every 50 ms between inner steps, where their handlers may read the world, and every 100 ms within a step that
-  /// takes so long, where they may not.
+  /// every inner step, and `forces(time, positions, velocities, derivatives)`, or None, for its custom forces. It
+  /// returns forces, moments, derivatives by positions and by velocities, or None for each. Signals are checked every
+  /// 50 ms between inner steps, where their handlers may read the world. Within a long step they are checked every 100
+  /// ms, where handlers may not read it.
   template <class Advance>
   auto run(Advance advance, const py::object& callback, const py::object& forces) {
     refuse(stepping_);
@@ -67,7 +67,7 @@ class GuardedWorld {
     return advance(world_);
   }
 
-  /// While this lasts, a batch steps the world, as `run` would, but for signals.
+  /// While this object exists, a batch steps the world like `run`, but without checking signals.
   class InBatch;
 
  private:
