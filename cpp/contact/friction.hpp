@@ -164,11 +164,11 @@ FrictionForce<Scalar> friction_force(const FrictionSetting& f, const Vec3<Scalar
 struct ForceLaw {
   double factor = 0, by_square = 0, by_pressing = 0;  ///< g, g', g_N
 
-  /// F / g of a derivative; `predicted`, where known, times `limit` is F.
+  /// F / g for a derivative. If `predicted` is known, F is `limit` times `predicted`.
   Vec3d dual_slip(const Vec3d& slip, const Vec3d* predicted, double limit) const {
     return predicted != nullptr && factor > 0.0 ? (limit / factor) * *predicted : slip;
   }
-  /// F over its limit after a step that changes S: as the linear equations have it, but 1 at most.
+  /// F relative to its limit after a step that changes S, according to the linear equations. Its length is at most 1.
   Vec3d predict(const Vec3d& slip, const Vec3d& change, const Vec3d* predicted, double limit) const {
     const Vec3d force =
         factor * (slip + change) + (2.0 * by_square * dot(slip, change)) * dual_slip(slip, predicted, limit);

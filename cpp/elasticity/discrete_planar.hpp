@@ -29,8 +29,8 @@ DividedMoment<Scalar> divided_moment(const BendMeasure& measure, const Scalar& s
   return {moment * slope, by_moment * slope + moment * by_slope};
 }
 
-/// The moment m about the plane's normal with m (w_a - w_b) = E1 - E0, and its derivatives by the turns of both
-/// directions at the end: `discrete_moment` for kappa = 2 (t_a x t_b) / (1 + t_a . t_b).
+/// Moment m about the normal of the plane with m (w_a - w_b) = E1 - E0, and its derivatives by the turns of both
+/// directions at the end. It is `discrete_moment` for kappa = 2 (t_a x t_b) / (1 + t_a . t_b).
 template <class Scalar>
 struct PlanarMoment {
   Scalar moment, by_a, by_b;

@@ -9,15 +9,15 @@
 namespace withe {
 namespace {
 
-// Points on the way from the first factor to the last one, at least.
+// Least number of points from the first factor to the last one.
 constexpr double kMinPoints = 20.0;
 // Iterations of a point after which the next arc may be twice as long.
 constexpr int kMaxEasyIterations = 5;
-// Arc over the longest that turns allow; the path has ended where no longer arc leads to a point.
+// Shortest arc, relative to the longest that turns allow. The path ends if shorter arcs would be needed.
 constexpr double kMinArc = 1e-5;
 // Arcs tried to find where a value changes its sign between two points.
 constexpr int kMaxTries = 30;
-// Error of a factor found so, over the way of factors.
+// Error of a factor that is found in this way, relative to the range of factors.
 constexpr double kMaxFactorError = 1e-9;
 
 class ArcLength {

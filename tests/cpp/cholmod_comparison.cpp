@@ -1,4 +1,5 @@
-// Built with WITHE_WITH_CHOLMOD only. Oracle: CHOLMOD and UMFPACK on the pattern of an open rod, half bandwidth 10.
+// Built only with the option WITHE_WITH_CHOLMOD. References: CHOLMOD and UMFPACK on the pattern of an open rod, with
+// half bandwidth 10.
 
 #include <cholmod.h>
 #include <gtest/gtest.h>

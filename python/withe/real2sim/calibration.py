@@ -31,9 +31,9 @@ BoolArray = npt.NDArray[np.bool_]
 Free = Literal["roll", "scale", "arcs", "tilt"]
 
 _FREE = ("roll", "scale", "arcs", "tilt")
-_PIXELS = 1e-6  # norm of residuals that is as good as none
+_PIXELS = 1e-6  # norm of residuals that counts as zero
 _ITERATIONS = 50
-_RESOLVED = 1e-3  # [px]: no detector of tags tells less
+_RESOLVED = 1e-3  # [px]; better than the resolution of any detector of tags
 _SIDE = "side of the plane on which the camera is"
 
 
