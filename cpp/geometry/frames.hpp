@@ -54,8 +54,8 @@ EdgeFrame<Scalar> edge_frame(const Vec3<Scalar>& e, const Scalar& length, const 
   return f;
 }
 
-/// Frame of an edge that is traversed in the direction of its rod (sign > 0) or against it. Against it, the angle of the
-/// edge and the spin of its directors change their signs.
+/// Frame of an edge that is traversed in the direction of its rod (sign > 0) or against it. Against it, the angle of
+/// the edge and the spin of its directors have the opposite sign.
 template <class Scalar>
 EdgeFrame<Scalar> oriented(const EdgeFrame<Scalar>& f, int sign) {
   if (sign > 0) return f;

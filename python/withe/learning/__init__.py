@@ -48,7 +48,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """`Environment` and `VectorEnvironment`, subclasses of Gymnasium's, made when they are first asked for."""
+    """Return `Environment` and `VectorEnvironment`, subclasses of Gymnasium's, which are created on first use."""
     if name in ("Environment", "VectorEnvironment"):
         return environment_class(name)
     raise AttributeError(f"module 'withe.learning' has no attribute {name!r}")

@@ -29,12 +29,12 @@ _NODES, _LENGTH, _RADIUS = 21, 1.0, 0.05  # [-], [m], [m]
 _MODULUS, _DENSITY, _DRAG = 1e7, 1000.0, 10.0  # [Pa], [kg/m^3], [Pa s]
 _SEGMENTS = (3, 4, 4, 4, 4)  # inner nodes of each
 _SEGMENT_OF, _SHARES = np.repeat(np.arange(5), _SEGMENTS), 1.0 / np.array(_SEGMENTS)
-_MOST_BEND, _MOST_TWIST = 2.0, 0.5 * np.pi  # of a segment in sum [-], [rad]
+_MOST_BEND, _MOST_TWIST = 2.0, 0.5 * np.pi  # greatest totals of a segment [-], [rad]
 _SEEN = slice(2, None, 2)  # nodes whose positions and velocities are observed
-_LOW, _HIGH = np.array([-0.6, -0.6, 0.3]), np.array([0.6, 0.6, 0.9])  # where targets are [m]
-_NEAR, _CLOSE = 0.1, 0.05  # of the tip to its target [m]
-_BOUNDS, _BONUSES = np.array([_CLOSE, _NEAR]), np.array([2.0, 0.5, 0.0])  # of distances [m], of rewards between them
-_TWIST_STEP = 0.05  # of an action [rad]
+_LOW, _HIGH = np.array([-0.6, -0.6, 0.3]), np.array([0.6, 0.6, 0.9])  # box of targets [m]
+_NEAR, _CLOSE = 0.1, 0.05  # distances of the tip from its target [m]
+_BOUNDS, _BONUSES = np.array([_CLOSE, _NEAR]), np.array([2.0, 0.5, 0.0])  # distances [m], and rewards between them
+_TWIST_STEP = 0.05  # greatest change per action [rad]
 
 
 class Arm(Task):
@@ -92,7 +92,7 @@ class Arm(Task):
             integrator="energy_momentum",
             time_step=self.time_step,
             planar=self.planar,
-            # A step tolerance of 0.1 mm: 1 % of what the steps' length costs, for a fifth of the work less.
+            # A step tolerance of 0.1 mm causes 1 % of the error of the time step, and saves a fifth of the work.
             solver=Solver(step_tolerance=1e-4, force_tolerance=1e-3),
         )
         built._session.longest_meant = self.longest_meant
@@ -298,7 +298,7 @@ class Obstacles2D(_Obstructed):
     axes = slice(None, None, 2)  # x and z
     components = 1
     planar = True
-    time_step = longest_meant = 1.0 / 36.0  # of 1/30 s, which impacts cut, the tip is 13 mm off
+    time_step = longest_meant = 1.0 / 36.0  # with 1/30 s, which impacts cut, the tip is wrong by 13 mm
     places = ((0.2, 0.12), (0.6, 0.12), (0.4, 0.0), (0.4, 0.37), (0.4, 0.57), (0.4, 0.77))  # x, z [m]
 
     def add_obstacles(self, scene: Scene, generator: np.random.Generator) -> None:
@@ -320,7 +320,7 @@ class Obstacles3D(_Obstructed):
 
     redraw = True
     aimed_at = (0.8, 0.0, 0.35)
-    low, high = np.array([0.3, -0.6, -0.1]), np.array([0.6, 0.6, 0.8])  # where the capsules are [m]
+    low, high = np.array([0.3, -0.6, -0.1]), np.array([0.6, 0.6, 0.8])  # box of the capsules [m]
     count, radius, length, apart = 8, 0.03, 1.0, 0.015  # [-], [m]
 
     def prepare(self, robots: Batch) -> None:

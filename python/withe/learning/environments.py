@@ -44,21 +44,21 @@ def _screen(render_mode: str | None, episodes: Episodes) -> Screen | None:
 
 
 class _Environment:
-    """One robot that does a task, as a Gymnasium environment.
+    """One robot that performs a task, as a Gymnasium environment.
 
     Parameters
     ----------
     task : Task
-        The environment works on a deep copy of its own.
+        Task, of which the environment uses a deep copy.
     render_mode : {"rgb_array", "human"}, optional
-        Pictures from `render`, shape (480, 640, 3), uint8; or a window.
+        With "rgb_array", `render` returns pictures of shape (480, 640, 3), uint8. With "human" it shows a window.
 
     Raises
     ------
     ValueError
-        Not a task, one whose control step is no whole number of time steps, or an unknown render mode. From `step`, an
-        action of another shape, not finite, or outside of -1..1. From all, a task whose methods return other shapes
-        than they say, or observations or rewards that are not finite.
+        Not a task, a task whose control step is not a whole number of time steps, or an unknown render mode. In `step`:
+        an action of wrong shape, not finite, or outside of -1..1. In any method: a task whose methods return wrong
+        shapes, or observations or rewards that are not finite.
     ImportError
         Gymnasium is not installed.
 
@@ -122,7 +122,7 @@ class _Environment:
         return self._screen.picture()
 
     def close(self) -> None:
-        """Take down the window; what follows is refused."""
+        """Close the window. Later calls of other methods are refused."""
         if self._screen is not None:
             self._screen.close()
         self._closed = True
@@ -140,29 +140,31 @@ class _Environment:
 
 
 class _VectorEnvironment:
-    """Many robots that do a task, each in an episode of its own, stepped in one call: a Gymnasium vector environment.
+    """Many robots that perform a task, each in its own episode, as a Gymnasium vector environment.
 
-    The episodes of robot i are those of `Environment` with the seed of i, for any number of workers.
+    One call steps all robots. The episodes of robot i equal those of `Environment` with the seed of i, for any number
+    of workers.
 
     Parameters
     ----------
     task : Task
-        The environment works on a deep copy of its own.
+        Task, of which the environment uses a deep copy.
     num_envs : int
+        Number of robots.
     workers : int, optional
-        Number of threads; by default one a processor.
+        Number of threads. By default one per processor.
     render_mode : {"rgb_array", "human"}, optional
         Pictures of the first robot.
     autoreset : {"next_step", "same_step", "disabled"} or gymnasium.vector.AutoresetMode
-        As Gymnasium has it: when the next episode of a robot begins. With "disabled" by
-        ``reset(options={"reset_mask": mask})``.
+        Time at which the next episode of a robot begins, as in Gymnasium. With "disabled" it begins when
+        ``reset(options={"reset_mask": mask})`` is called.
     max_episode_steps : int, optional
-        Actions after which an episode is truncated, where that is fewer than the task's `steps`.
+        Number of actions after which an episode is truncated, if it is below `steps` of the task.
 
     Raises
     ------
     ValueError
-        See `Environment`; or workers below 1, a mask of another length.
+        As in `Environment`; also workers below 1, or a mask of wrong length.
     ImportError
         Gymnasium is not installed.
 
@@ -221,9 +223,9 @@ class _VectorEnvironment:
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """Begin episodes of all robots, or of those of ``options["reset_mask"]``, shape (n,), bool.
+        """Begin episodes of all robots, or of the robots in ``options["reset_mask"]``, shape (n,), bool.
 
-        Seeds are one for each robot, or the first of a row of numbers.
+        Seeds are one number per robot, or one number: then robot i has the seed ``seed + i``.
         """
         self._check(False)
         chosen = self._all
@@ -243,7 +245,7 @@ class _VectorEnvironment:
         return self._episodes.observe(), {}
 
     def _seeds(self, seed: Any) -> list[int | None]:
-        """One for each robot, None where its numbers go on."""
+        """Return one seed per robot; None for a robot whose random numbers continue."""
         if seed is None:
             return [None] * self.num_envs
         if isinstance(seed, str) or (not isinstance(seed, Sequence) and np.ndim(seed) == 0):
@@ -293,7 +295,7 @@ class _VectorEnvironment:
         return (self._screen.picture(),)
 
     def close_extras(self, **options: Any) -> None:
-        """Take down the window."""
+        """Close the window."""
         if self._screen is not None:
             self._screen.close()
 
@@ -353,7 +355,7 @@ def vector_maker(task: Callable[..., Task]) -> Callable[..., Any]:
 
 
 def _refuse(task: Callable[..., Task], others: dict[str, Any], environment: str, known: str) -> None:
-    """Say of options that there are none of these names, and how a task of other numbers is made."""
+    """Refuse options with unknown names. The message says how to change the numbers of a task."""
     for name in others:
         raise TypeError(
             f"withe/{task.__name__}-v0 has no option {name!r}; its options are {known}. To change the task, derive "

@@ -24,7 +24,7 @@ IntArray = npt.NDArray[np.intc]
 Number = TypeVar("Number", np.float32, np.float64, np.bool_)
 BoolArray = npt.NDArray[np.bool_]
 
-_ROUNDING = 1e-6  # of numbers about 1 in a few operations of single precision
+_ROUNDING = 1e-6  # rounding error of numbers about 1 after a few operations in single precision
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ class Episodes:
         if most is not None:
             self.steps = min(self.steps, validation.integer(most, "max_episode_steps", 1, 2**31 - 1))
         task.prepare(self.robots)
-        self._seen: tuple[int, ...] | None = None  # shape of what is seen, once it is known
+        self._seen: tuple[int, ...] | None = None  # shape of observations, once it is known
 
     def __len__(self) -> int:
         return len(self.robots)
@@ -142,7 +142,7 @@ class Episodes:
         ValueError
             The task returns rewards or ends of another shape than (n,), or rewards that are not finite.
         """
-        if chosen.size > 0:  # a task need not know what none does
+        if chosen.size > 0:  # a task is not called for an empty choice
             with each_cause_once(self._causes):
                 self.task.act(self.robots, actions, chosen)
                 self.robots.step(self._count, chosen)
@@ -192,7 +192,7 @@ class Episodes:
             ) from error
 
     def _check(self, found: npt.NDArray[Any], method: str, shape: tuple[int, ...]) -> None:
-        """Refuse what a method of the task returned, of another shape or not finite."""
+        """Refuse results of a method of the task that have a wrong shape or are not finite."""
         if found.shape != shape:
             raise ValueError(f"{self._name(method)} must return shape {shape}, got {found.shape}")
         finite = np.isfinite(found)

@@ -61,7 +61,7 @@ def rollout(
 
     Returns
     -------
-    Tensor of shape (frames, nodes, 3), or a tuple of them where `of` is a list
+    Tensor of shape (frames, nodes, 3), or a tuple of tensors if `of` is a list
         Positions [m] or velocities [m/s] of every node at every frame.
 
     Raises
@@ -168,7 +168,7 @@ def _name(unknown: Unknown) -> str:
 
 @cache
 def _function() -> Any:
-    """The function that torch is told of; made when torch is there."""
+    """Return the function that is registered with torch. It is created when torch is imported."""
     torch = require("torch", "learn")
 
     class Solved(torch.autograd.Function):  # type: ignore[misc,name-defined]
@@ -187,7 +187,7 @@ def _function() -> Any:
         @torch.autograd.function.once_differentiable  # type: ignore[untyped-decorator]
         def backward(ctx: Any, *by: Any) -> Any:
             arrays = [grad.detach().cpu().numpy() for grad in by]
-            if ctx.normal is not None:  # nothing moves along it
+            if ctx.normal is not None:  # nodes do not move along it
                 arrays = [array - np.multiply.outer(array @ ctx.normal, ctx.normal) for array in arrays]
             asked = [i for i, needed in enumerate(ctx.needs_input_grad[3:]) if needed]
             found = ctx.pull_back(arrays, [ctx.wrt[i] for i in asked])

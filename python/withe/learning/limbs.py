@@ -64,7 +64,7 @@ class Crawl(_Limbs):
     parts = (slice(0, 4), slice(6, 10))
     ways = ((0, 0), (0, 1), (1, 1))
     most = 12.0
-    length, radius, nodes = 0.16, 5e-3, 17  # of a leg [m], [m]
+    length, radius, nodes = 0.16, 5e-3, 17  # for a leg [m], [m], [-]
     rise, fall = np.radians(35.0), np.radians(-80.0)  # slope at the body and at the foot
     friction = 0.8
 
@@ -140,7 +140,7 @@ class Wrap(_Limbs):
     parts = (slice(0, 10), slice(10, 19))
     ways = ((0, 0), (0, 1), (1, 0), (1, 1))
     most = 25.0
-    length, radius, nodes, side = 0.3, 5e-3, 21, 0.09  # of a limb [m], [m], [-]; of the pentagon of their tops [m]
+    length, radius, nodes, side = 0.3, 5e-3, 21, 0.09  # for a limb [m], [m], [-]; for the pentagon of their tops [m]
     ball, depth, spread = 0.04, -0.2, 0.02  # radius of the ball, its height, how far aside it may be [m]
 
     def build(self, generator: np.random.Generator) -> Simulation:

@@ -256,12 +256,12 @@ class _Problem:
             return sum(float(self.loss(layers, part)) * len(part) for part in parts) / len(self.held)
 
     def use_all(self) -> None:
-        """Train on what is held out, too."""
+        """Continue the training with the held-out data too."""
         self.used = require("torch", "learn").cat([self.used, self.held])
 
 
 def _spread(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Standard deviation of each column; 1 of those that do not vary."""
+    """Return the standard deviation of each column; 1 for columns that do not vary."""
     spread = values.std(axis=0)
     return np.where(spread > 1e-12 * np.abs(values).max(axis=0), spread, 1.0)
 
@@ -297,7 +297,7 @@ def _descend(
 
 
 def _batches(learned: _Problem, size: int) -> Any:
-    """Rows of the data in an order that is drawn anew, batch by batch."""
+    """Yield batches of rows of the data, in a new random order."""
     torch = require("torch", "learn")
     return learned.used[torch.randperm(len(learned.used))].split(size)
 

@@ -101,22 +101,22 @@ class Network:
         return np.array(self._tensors["domain"].double().numpy())
 
     def __call__(self, x: Any) -> Any:
-        """Ask.
+        """Evaluate the network.
 
         Parameters
         ----------
         x : array_like or Tensor of shape (..., inputs)
-            Computed in the precision that it comes in, single or double; scaled, and scaled back, in double.
+            Inputs. The network is evaluated in the precision of `x`, single or double. Scaling is in double precision.
 
         Returns
         -------
         ndarray or Tensor of shape (..., outputs)
-            What `x` is; a tensor has gradients.
+            Outputs, of the same type as `x`. A tensor has gradients.
 
         Raises
         ------
         ValueError
-            Another shape, not numbers, or, of arrays, not finite.
+            A wrong shape, not numbers, or an array with values that are not finite.
 
         Examples
         --------
@@ -225,7 +225,7 @@ class Network:
             content = torch.load(path, map_location="cpu", weights_only=True)
         except OSError:
             raise
-        except Exception as error:  # of many kinds, by what the bytes happen to say
+        except Exception as error:  # the type of the error depends on the content of the file
             raise ValueError(f"{path} is not a network of withe: torch cannot read it") from error
         if not isinstance(content, dict) or content.get("format") != _FORMAT:
             raise ValueError(f"{path} is not a network of withe")

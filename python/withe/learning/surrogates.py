@@ -54,7 +54,7 @@ class Surrogate:
 
     FORMS: ClassVar[Mapping[str, Form]] = {}
     SHIPPED: ClassVar[Path]
-    LEARNED: ClassVar[str] = ""  # what, in a word
+    LEARNED: ClassVar[str] = ""  # word for the learned quantity
 
     def __init__(self, network: Network) -> None:
         names = (network.inputs, network.outputs)
@@ -82,7 +82,7 @@ class Surrogate:
         return self.network.save(path)
 
     def __reduce__(self) -> tuple[type[Self], tuple[Network]]:
-        """By its network alone: what numbers mean is told by functions, which no file can hold."""
+        """Pickle only the network. The functions that interpret its numbers cannot be stored in a file."""
         return type(self), (self.network,)
 
     def __repr__(self) -> str:

@@ -96,10 +96,10 @@ class Task(ABC):
         return np.zeros(len(robots), bool)
 
     def prepare(self, robots: Batch) -> None:  # noqa: B027
-        """Allocate data of each robot. Called once; nothing by default."""
+        """Allocate data of each robot. Called once. By default it does nothing."""
 
     def begin(self, robots: Batch, chosen: IntArray, generators: list[np.random.Generator]) -> None:  # noqa: B027
-        """Begin an episode of the chosen robots, each with its random generator; nothing by default."""
+        """Begin an episode of the chosen robots, each with its random generator. By default it does nothing."""
 
     def draw(self, axes: Any, robots: Batch) -> None:  # noqa: B027
-        """Add to a picture of the first robot, on 3D axes of matplotlib; nothing by default."""
+        """Add to a picture of the first robot, on 3D axes of matplotlib. By default it does nothing."""

@@ -94,7 +94,7 @@ def train_policy(
         "learning_starts": min(5000, total // 10),
         "learning_rate": 1e-3,
         "buffer_size": max(number, min(total, 1_000_000)),
-        "ent_coef": "auto_0.02",  # of 1, as it is by default, policies learn to be random first
+        "ent_coef": "auto_0.02",  # with the default of 1, policies first learn to be random
         "device": "cpu",
     }
     given |= options
@@ -109,7 +109,7 @@ def train_policy(
 
 @contextmanager
 def _own_generators(seed: int) -> Iterator[None]:
-    """Lend Stable-Baselines3 one thread of torch and the generators that it seeds, and give back what they were."""
+    """Limit torch to one thread for Stable-Baselines3. Restore threads and random generators afterwards."""
     numpy, python = np.random.get_state(), random.getstate()  # noqa: NPY002 (that is the one it draws from)
     try:
         with own_torch(1, seed):  # small networks lose by more threads
@@ -120,7 +120,7 @@ def _own_generators(seed: int) -> Iterator[None]:
 
 
 def _learn(policy: Any, total: int, callback: Callable[[Any], None] | None, normalize: bool, progress: bool) -> None:
-    """For so many control steps, or until Ctrl-C."""
+    """Train for a number of control steps, or until Ctrl-C."""
     base = require("stable_baselines3.common.callbacks", "learn").BaseCallback
 
     class Report(base):  # type: ignore[misc,valid-type]

@@ -171,9 +171,9 @@ def _problem(
 
 
 def _better(found: list[Calibration]) -> Calibration:
-    """The camera with the smaller residuals, of those that are held upright; the first where that says nothing.
+    """Return the camera with the smaller residuals among upright cameras, or the first one if they are equal.
 
-    As with other unknowns, the side is not told where tags move by less than the misfit when it changes.
+    As with other unknowns, the side is unobservable if a change of side moves tags by less than the misfit.
     """
     upright = [camera for camera in found if np.cos(camera.roll) > 0.0] or found
     if len(upright) == 1:
@@ -188,7 +188,7 @@ def _better(found: list[Calibration]) -> Calibration:
 
 
 class _Restricted:
-    """The same problem with some coordinates as they are at the start."""
+    """The same problem, in which some coordinates keep their initial values."""
 
     def __init__(self, problem: CameraProblem, free: BoolArray, start: FloatArray) -> None:
         self._problem, self._free, self._start = problem, free, start
@@ -248,7 +248,7 @@ def _solve(problem: CameraProblem, frames: list[int], free: BoolArray, bar: Prog
 
 
 def _calibration(problem: CameraProblem, found: dict[int, FloatArray], free: BoolArray) -> Calibration:
-    """The camera; its focal length is that of one a metre away, as the picture of a plane tells no other."""
+    """Return the camera, with the focal length for a distance of one metre, which a picture of a plane does not show."""
     last = next(reversed(found.values()))
     view = problem.view(last)
     forwards = np.cross(*view.axes)

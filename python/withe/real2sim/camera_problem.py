@@ -124,7 +124,7 @@ class CameraProblem:
 
 
 def _level_axes(simulation: Simulation, places: Places) -> FloatArray:
-    """Right and down in the world, against gravity, or along the first rod where there is none in the plane."""
+    """Return right and down in the world, from gravity, or from the first rod if gravity has no part in the plane."""
     normal = np.asarray(simulation.plan.plane_normal)
     weight = simulation.get("gravity")
     up = -(weight - normal * (normal @ weight))

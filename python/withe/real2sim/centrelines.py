@@ -95,7 +95,7 @@ class Centrelines(ShortRepr, Target):
         return points.size - len(points) + (2 if self.ends and len(points) else 0)
 
     def across(self, normal: FloatArray) -> FloatArray:
-        """Return the normal at each point; nothing in pixels."""
+        """Return the normal at each point, or None in pixels."""
         return across_of_points(self.samples, normal, self.camera is None)
 
     def bind(self, simulation: Simulation) -> Residual:
@@ -258,13 +258,13 @@ def rest_shape(
 
 
 def _refined(simulation: Simulation, target: Centrelines, rod: Rod | str, found: Fit, progress: bool) -> Fit:
-    """The fit with as many functions as the centreline tells, from that with linear ones on."""
+    """Return the fit with as many functions as the centreline determines, beginning with linear functions."""
     voronoi = rod_part(simulation, rod).voronoi
     least = _RESOLVED * _extent(target) if target.sigma is None else target.sigma
     told, count, worse = target.told(0), 2, 0
     functions: list[Any] = []
     per_function = len(found.names) // count
-    # A curl of several turns is told by neither 2 nor 4 functions: two steps without gain end the search.
+    # Neither 2 nor 4 functions describe a curl of several turns. Therefore only two steps without gain end the search.
     while worse < 2 and _square(found, target) > told * least**2:
         count *= 2
         if count > len(voronoi) or per_function * count >= told:
@@ -297,7 +297,7 @@ def _functions(voronoi: FloatArray, count: int) -> FloatArray:
 
 
 def _square(found: Fit, target: Centrelines) -> float:
-    """Sum of the squares of what a fit leaves [m^2 or px^2]."""
+    """Return the sum of the squared residuals of a fit [m^2 or px^2]."""
     return float(np.nansum(found.residuals[0] ** 2)) * (target.sigma or 1.0) ** 2
 
 

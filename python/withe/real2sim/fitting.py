@@ -124,7 +124,7 @@ def fit(
         raise ValueError(f"targets must show something in some frame, got nothing in all {listed[0].frames}")
     if conditions is not None:
         with suppress(ConvergenceError):
-            conditions(simulation.copy(), good[0])  # where it raises ValueError, not each frame is to blame
+            conditions(simulation.copy(), good[0])  # if it raises ValueError, the cause is not a single frame
     limit = (50 if method == "gauss_newton" else 1000) if max_iterations is None else max_iterations
     limit = validation.integer(limit, "max_iterations", 1, 2**31 - 1)
     goal = validation.positive(
@@ -154,7 +154,7 @@ def _without(coordinates: FloatArray) -> FrameSolution:
 def _frame_by_frame(
     stills: Stills, frames: list[int], start: FloatArray, method: str, goal: float, limit: int, bar: Progress
 ) -> tuple[dict[int, FrameSolution], dict[int, int]]:
-    """Every frame by itself, beginning with what the one before it found."""
+    """Fit every frame separately. Each fit begins with the result of the frame before it."""
     solutions: dict[int, FrameSolution] = {}
     solves = {}
     guess, nearby = start, None

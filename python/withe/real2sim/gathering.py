@@ -18,11 +18,11 @@ __all__ = ["gather", "persistence"]
 FloatArray = npt.NDArray[np.float64]
 
 _MISFIT = 3.0  # times sigma: residuals beyond it, root of the mean square, are too great for it ...
-_BESIDE = 10.0  # times sigma, and what is left within the plane of a scene: targets do not belong to it
+_BESIDE = 10.0  # times sigma and the residuals in the plane of a scene: greatest distance of targets from the plane
 _CHANCE = 1e-6  # ... if normal errors are as great with a probability below this
 _PERSISTENT = 5.0  # standard deviations of a correlation, beyond which residuals of successive frames are not noise
 _OF_SCALE = 0.01  # possible error over the scale of an unknown, from which on a reason names its cause
-_RESOLVED = 1e-6  # of the extent of all tags: what fits resolve, and usual errors are at least
+_RESOLVED = 1e-6  # relative to the extent of all tags: resolution of fits, and least usual error
 
 
 def gather(
@@ -147,7 +147,7 @@ def persistence(rows: FloatArray) -> float:
 
 
 def _systematic(told: _Told) -> float:
-    """Variance of the mean of correlated residuals beyond that of independent ones, times their number.
+    """Return the ratio of the variance of the mean of correlated residuals to that of independent residuals.
 
     Kish's design effect, 1 + (n - 1) rho, with the mean square of the residuals [Kish: Survey sampling, 1965, 5.4].
     """
@@ -195,7 +195,7 @@ def _misfits(stills: Coordinates, targets: list[Target], told: dict[int, _Told])
 
 
 def _off_plane(targets: list[Target], told: dict[int, _Told]) -> dict[int, str]:
-    """Frames whose targets lie beside the plane of the scene by much more than what a fit leaves within it."""
+    """Return frames whose targets are much farther from the plane of the scene than the residuals in the plane."""
     known = all(target.sigma is not None for target in targets)
     found = {}
     for frame, each in told.items():
@@ -302,7 +302,7 @@ def _weights(names: list[str], direction: FloatArray) -> dict[str, float]:
 def _outliers(
     stills: Coordinates, targets: list[Target], residuals: FloatArray, solutions: dict[int, FrameSolution]
 ) -> tuple[tuple[Outlier, ...], tuple[tuple[int, int], ...]]:
-    """Tags that jump, where tags are all there is, and those of which nothing tells whether they do."""
+    """Return tags that jump, and tags whose jumps cannot be detected, if all targets are tags."""
     if len(targets) != 1 or not isinstance(targets[0], Tags):
         return (), ()
     if len(residuals) != targets[0].frames:  # a motion, all of it one fit

@@ -30,10 +30,10 @@ __all__ = [
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 
-_RANK = 1e-9  # singular values below it, relative to the greatest, belong to directions that nothing tells
+_RANK = 1e-9  # relative to the greatest: smaller singular values belong to unobservable directions
 _SMALL = 1e-5  # a step that would lessen the residual by less than this share of it is the last
 _TRIALS = 8
-_TRIALS_OF_INEXACT = 2  # with derivatives that are updated or of another frame; then they are asked for anew
+_TRIALS_OF_INEXACT = 2  # trials with derivatives that are updated or of another frame, before new ones are computed
 _WORTH = 0.01
 _SMALL_OF_SECANTS = 1e-2  # share of the residual of each observed number below which a step with secants is the last
 # Distances from lines of noisy points have kinks: a step is the last if it reduces the square of the residual by less
@@ -72,7 +72,7 @@ class Weakness:
     """A direction of scaled coordinates that the targets determine badly or not at all."""
 
     direction: FloatArray
-    effect: float  # of a change by one scale, root of the mean square over the residuals
+    effect: float  # root mean square change of the residuals by one scale
     frames: list[int] = field(default_factory=list)
 
 
@@ -96,7 +96,7 @@ class Secants:
 
     def __init__(self) -> None:
         self.updated = False
-        self._gain = np.inf  # of the last step
+        self._gain = np.inf  # gain of the last step
         self._last: tuple[FloatArray, FloatArray, FloatArray] | None = None  # coordinates, residual, derivatives
 
     def jacobian(
@@ -265,7 +265,7 @@ def all_frames(
     local = problem.per_frame
     points = {frame: start[frame].copy() for frame in frames}
     solutions = _linearised(problem, points, progress)
-    frames = list(solutions)  # those that have an equilibrium to begin with
+    frames = list(solutions)  # frames that have an initial equilibrium
     if not frames:
         return {}
     for iteration in range(1, max_iterations + 1):
@@ -311,7 +311,7 @@ def _total(solutions: dict[int, FrameSolution]) -> float:
 
 
 class _Frame:
-    """Derivatives of a frame, those by its own coordinates by their singular values.
+    """Derivatives of a frame. Derivatives by its own coordinates are stored by their singular values.
 
     Of the least |J_shared x + J_own y + r|^2 + damping |y|^2 over y is left (J_shared x + r)^T W (J_shared x + r),
     W = I - U (S^2 / (S^2 + damping)) U^T with J_own = U S V^T.
@@ -346,7 +346,7 @@ def _stacked(frames: Iterable[_Frame], damping: float) -> tuple[FloatArray, Floa
 
 
 def _joint_step(solutions: dict[int, FrameSolution], local: BoolArray, radius: float) -> dict[int, FloatArray]:
-    """Steps of all frames together, with so much of Levenberg's damping that no coordinate goes beyond a radius."""
+    """Return steps of all frames together, with enough Levenberg damping that no coordinate exceeds a radius."""
     greatest = max(float(np.sum(solution.jacobian**2)) for solution in solutions.values())
     frames = {number: _Frame(solution, local) for number, solution in solutions.items()}
     damping = 0.0
@@ -358,7 +358,7 @@ def _joint_step(solutions: dict[int, FrameSolution], local: BoolArray, radius: f
 
 
 def _damped_step(frames: dict[int, _Frame], local: BoolArray, damping: float) -> dict[int, FloatArray]:
-    """Least of sum |J s + r|^2 + damping |s|^2, s the steps: what frames share, and then what each needs besides."""
+    """Minimise sum |J s + r|^2 + damping |s|^2 over the steps s: first shared ones, then those of each frame."""
     matrix, right = _stacked(frames.values(), damping)
     free = matrix.shape[1]
     if damping > 0.0:

@@ -32,12 +32,12 @@ __all__ = ["fit_motion"]
 
 FloatArray = npt.NDArray[np.float64]
 
-_DIFFERENCE = 1e-4  # of the scale of an unknown
+_DIFFERENCE = 1e-4  # step of differences, relative to the scale of an unknown
 _RUNS = 8  # iterations that a progress bar counts on
-_MANY_STEPS = 100_000  # of a run
-_MANY_SWINGS = 10.0  # between frames: what rings is seen several times a swing
-_ORDERS = {"backward_euler": 1, "fourth_order": 4}  # of integrators in the time step; of others 2
-_CHANGE = 1e-9  # of the sum of squares: an iteration of L-BFGS that changes it by less is the last
+_MANY_STEPS = 100_000  # greatest number of steps of a run
+_MANY_SWINGS = 10.0  # greatest number of oscillations between frames
+_ORDERS = {"backward_euler": 1, "fourth_order": 4}  # orders of integrators in the time step; others have order 2
+_CHANGE = 1e-9  # relative to the sum of squares: least change in an iteration of L-BFGS
 
 
 @keyword_hints

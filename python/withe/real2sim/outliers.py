@@ -16,10 +16,10 @@ FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 
 _AROUND = 6  # frames, nearest to one, with which a tag is compared
-_ALIGNMENTS = 2  # of frames with each other; further ones change little
-_FEWEST = 4  # of them; one may have an outlier itself
+_ALIGNMENTS = 2  # number of alignments of frames with each other; further ones change little
+_FEWEST = 4  # least number of frames; one of them may have an outlier
 _JUMP = 4.0  # times the usual error; of normal ones, 7 sigma in pixels and 9 in space
-_LEVERAGE = 0.1  # share of a jump that shows: below it, hardly anything else tells where the tag should be
+_LEVERAGE = 0.1  # least visible share of a jump: below it, the other data hardly determine the tag
 
 
 def find_outliers(
@@ -105,10 +105,10 @@ def _lines(values: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _aligned(residuals: FloatArray, expected: FloatArray, own: dict[int, FloatArray]) -> FloatArray:
-    """Residuals with the unknowns of each frame changed so that they come as near as can be to what is expected.
+    """Return residuals after the change of the unknowns of each frame that is closest to expected residuals.
 
-    What a model leaves in every frame shifts all residuals of a frame in which a tag is missing, as the unknowns then
-    make up for less. Without that shift, frames in which other tags were seen compare with each other.
+    A model has residuals in every frame. If a tag is missing, the unknowns compensate less of them, and all residuals
+    of the frame shift. This function removes the shift, so that frames with different visible tags are comparable.
     """
     aligned = residuals.copy()
     for frame, jacobian in own.items():
@@ -128,9 +128,9 @@ def _others(seen: npt.NDArray[np.int64], count: int) -> npt.NDArray[np.int64]:
 
 
 class _LeftOut(NamedTuple):
-    """Error of each tag if it is left out of the fit, the decrease of the sum of squares, and the jump of the tag.
+    """Return the error of each tag if the fit omits it, the decrease of the sum of squares, and the jump of the tag.
 
-    Errors and decreases are NaN for tags that nothing can check.
+    Errors and decreases are NaN for tags that no other data can check.
     """
 
     errors: FloatArray

@@ -35,7 +35,7 @@ class Line:
 
     rods: list[RodPart]
     offsets: list[float]  # length at which each rod begins [m]
-    rows: npt.NDArray[np.int64]  # of its nodes in the positions of the scene
+    rows: npt.NDArray[np.int64]  # rows of its nodes in the positions of the scene
     ends: FloatArray  # length along it at every node [m]
 
 

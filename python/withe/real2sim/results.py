@@ -16,7 +16,7 @@ from withe.simulation.simulation import Simulation
 __all__ = ["Fit", "Outlier", "Unobservable"]
 
 FloatArray = npt.NDArray[np.float64]
-_ROWS_SHOWN = 8  # of each kind, in print
+_ROWS_SHOWN = 8  # number of printed rows of each kind
 
 
 @dataclass(frozen=True)

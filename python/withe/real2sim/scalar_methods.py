@@ -18,8 +18,8 @@ Slope = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
 """Derivatives of half the sum of squared residuals by coordinates, from coordinates, state, and residuals without
 gaps."""
 
-_FIRST_STEP = 0.1  # of Algorithm 6
-_INCREMENT = 1e-3  # its epsilon, which is not printed [rad]; 1e-6 to 1e-2 all do
+_FIRST_STEP = 0.1  # first step of Algorithm 6
+_INCREMENT = 1e-3  # its epsilon, which is not published [rad]; values from 1e-6 to 1e-2 work
 
 
 class Counted(Problem, Protocol):
@@ -88,7 +88,7 @@ def descend(stills: Stills, frame: int, start: FloatArray, tolerance: float, max
 def _closed(
     problem: Counted, frame: int, coordinates: FloatArray, iterations: int, converged: bool, reason: str
 ) -> FrameSolution:
-    """The end of a search. What is solved for the covariance alone does not count."""
+    """Result of a search. Solutions that only the covariance needs are not counted."""
     solves = problem.solves
     found = problem.residual(coordinates, frame)
     if found is None:

@@ -27,9 +27,9 @@ class _NaturalStrain(Unknown):
     Parameters
     ----------
     directions : ndarray of shape (n, components)
-        Components of the strain that are unknown, each with functions of its own.
+        Unknown components of the strain. Each has its own functions.
     axes : list of str
-        What tells them apart in names.
+        Text that distinguishes them in names.
     """
 
     per_frame = True
@@ -118,7 +118,7 @@ class DrawnShape(Unknown):
         self.scales = 1.0 / np.abs(self._fields).max(axis=0)
         self._first = simulation.get(part.name, "natural_curvature")
         bends = np.diff(self._fields, axis=0) / part.voronoi[:, None]
-        self._by_turns = bends[:, None, :] * self._components[:, None]  # of natural curvature
+        self._by_turns = bends[:, None, :] * self._components[:, None]  # by natural curvature
         self._held = _supports_of(simulation, part)
         self._poses = [_pose(simulation, support) for support in self._held]
 
@@ -244,7 +244,7 @@ class Pose(Unknown):
 
 
 def _turn_of(part: RodPart, support: SupportPart) -> FloatArray:
-    """Share of each edge's turn in that of what a support holds, shape (edges,); see `drawing.drawn_frame`."""
+    """Return weights of edges in the rotation of a supported frame, shape (edges,); see `drawing.drawn_frame`."""
     edges, node = len(part.lengths), support.node[1]
     shares = np.zeros(edges)
     if support.kind == "pin":
@@ -290,7 +290,7 @@ def _pose(simulation: Simulation, support: SupportPart) -> tuple[FloatArray, Flo
 
 
 def _basis(part: RodPart, basis: Any) -> tuple[FloatArray, list[str]]:
-    """Functions along a rod at its stencils, shape (stencils, n), and what tells their coordinates apart."""
+    """Return functions along a rod at its stencils, shape (stencils, n), and texts that distinguish them."""
     stencils = len(part.voronoi)
     if stencils == 0:
         raise ValueError(f"{part.owner} has no stencil that could bend: a rod needs at least three nodes")

@@ -18,7 +18,7 @@ __all__ = ["Conditions", "Equilibria", "Stills"]
 FloatArray = npt.NDArray[np.float64]
 Conditions = Callable[[Simulation, int], object]
 
-_DIFFERENCE = 1e-4  # of the scale of an unknown: truncation 1e-8 of it squared, rounding about as much
+_DIFFERENCE = 1e-4  # step relative to the scale of an unknown; truncation and rounding errors are about 1e-8
 
 
 class Equilibria(Coordinates):

@@ -158,7 +158,7 @@ class Curvatures(ShortRepr, Target):
         return int(np.isfinite(np.asarray(self.values)[frame]).sum())
 
     def across(self, normal: FloatArray) -> FloatArray:
-        """Return nothing: rotations are about one axis."""
+        """Return None, since rotations are about one axis."""
         return np.zeros((len(self.groups), 0))
 
     def bind(self, simulation: Simulation) -> Residual:
@@ -179,18 +179,18 @@ class _CurvatureResidual(Residual):
         first = np.eye(3)[np.abs(axis).argmin()]
         first = np.cross(first, axis)
         self._plane = np.stack([first / np.linalg.norm(first), np.cross(axis, first) / np.linalg.norm(first)])
-        self._chords = np.diff(places.weights()[0], axis=0)  # of tags, from nodes
-        self._bends = np.diff(np.eye(len(target.places) - 1), axis=0)  # of chords against each other
+        self._chords = np.diff(places.weights()[0], axis=0)  # chords of tags, from nodes
+        self._bends = np.diff(np.eye(len(target.places) - 1), axis=0)  # differences of neighbouring chords
         self._means = np.zeros((len(target.groups), len(target.places) - 2))
         for row, group in enumerate(target.groups):
             self._means[row, np.array(group) - 1] = 1.0 / len(group)
         self._measured = b"", np.zeros((0, 2)), np.zeros(0)
 
     def _measure(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Chords in the plane, and tangents of half of the turns between them.
+        """Return chords in the plane, and tangents of half of the turns between them.
 
-        Those of the last positions are kept: a frame begins where the one before it ended, and values and derivatives
-        are of the same ones.
+        The results for the last positions are stored: a frame begins with the last positions of the previous frame, and
+        values and derivatives use the same positions.
         """
         which = positions.tobytes()
         if which != self._measured[0]:
@@ -255,7 +255,7 @@ class Tags(ShortRepr, Target):
         return int(np.isfinite(np.asarray(self.points)[frame]).sum())
 
     def across(self, normal: FloatArray) -> FloatArray:
-        """Return the normal at each tag; nothing in pixels."""
+        """Return the normal at each tag, or None in pixels."""
         return across_of_points(len(self.places), normal, self.camera is None)
 
     def without(self, outliers: Sequence[tuple[int, int]]) -> Tags:

@@ -57,11 +57,11 @@ class Unknown(ABC):
     @property
     @abstractmethod
     def words(self) -> list[Any]:
-        """Return the parameters of gradients that determine those by the coordinates."""
+        """Return the parameters whose gradients determine the gradients by the coordinates."""
 
     @abstractmethod
     def chain(self, coordinates: FloatArray, found: list[list[Any]]) -> FloatArray:
-        """Derivatives of m scalars by the coordinates, shape (m, n), from those by the words, m each."""
+        """Return derivatives of m scalars by the coordinates, shape (m, n), from m derivatives by each word."""
 
     def value(self, coordinates: FloatArray) -> FloatArray:
         """Return the value of coordinates, of shape (..., n), in SI units."""
@@ -122,7 +122,7 @@ class Coordinates:
                 made |= arrays
 
     def in_plane(self, by_positions: FloatArray) -> FloatArray:
-        """Derivatives by positions, shape (..., 3), without those along the normal of a planar scene."""
+        """Return derivatives by positions, shape (..., 3), without the parts along the normal of a planar scene."""
         normal = self.simulation._session.world.plane_normal
         if normal is None:
             return by_positions
@@ -247,7 +247,7 @@ class Delay(Unknown):
 
     @property
     def words(self) -> list[Any]:
-        """Return nothing: the delay is not a parameter of the engine."""
+        """Return no parameters, since the delay is not a parameter of the engine."""
         return []
 
     def chain(self, coordinates: FloatArray, found: list[list[Any]]) -> FloatArray:

@@ -132,7 +132,7 @@ def reader_of(session: Session, target: Target, word: str, shape: Shape | None =
         The word has no gradient.
     """
     if isinstance(target, RodPart):
-        return rods.rod_reader(session, target, word)  # which knows "points" too, and refuses with all its words
+        return rods.rod_reader(session, target, word)  # it also knows "points", and lists all words
     known = word_of(target, word)
     if known is None or not known.has_gradient:
         name = owner_of(target) if target is None else repr(target.name)
@@ -141,7 +141,7 @@ def reader_of(session: Session, target: Target, word: str, shape: Shape | None =
 
 
 def nothing_to_set(part: Part) -> str:
-    """Return a hint on how to drive a part that has nothing to set."""
+    """Return a hint how to drive a part without parameters."""
     if isinstance(part, JoinPart):
         first, second = part.node_names
         return (

@@ -32,7 +32,7 @@ FloatArray = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class CallGradient:
-    """Derivatives of a scalar of a run by what one call set while it ran.
+    """Derivatives of a scalar of a run by the values of one call during the run.
 
     Attributes
     ----------
@@ -44,10 +44,10 @@ class CallGradient:
     over : float [s]
         Duration of the ramp to the value; 0 without a ramp.
     gradients : dict
-        For each word: the derivative of L by the value of the call, while it acted, shaped like this value. A
-        discrete_curvature is under natural_curvature, by the curvature [1/m] of every stencil. A rotation is by a
-        rotation vector, (3,) [1/rad], that turns the target. Words without a gradient are missing (functions of time,
-        paths, tangents and rolls, a friction of 0).
+        For each word: the derivative of L by the value of the call, in the shape of this value. It includes only the
+        time in which the value acted. For discrete_curvature the key is natural_curvature, and the derivative is by the
+        curvature [1/m] of every stencil. For a rotation it is by a rotation vector, (3,) [1/rad], that turns the
+        target. Words without a gradient are missing (functions of time, paths, tangents and rolls, a friction of 0).
     """
 
     time: float
@@ -79,7 +79,7 @@ class _Call:
     part: Part | BodyPair | None
     values: Mapping[str, Any]
     over: float
-    session: Session  # as it was left
+    session: Session  # as it was at the end
 
 
 class RunJournal:
@@ -100,14 +100,14 @@ class RunJournal:
 
 
 _Key = tuple[str, str]  # name of a part ("": the scene), and word
-_Weights = dict[int, float]  # of calls in a value that acts; _START: that of the start
+_Weights = dict[int, float]  # weights of calls in an acting value; _START: weight of the start
 _START = -1
 _BEFORE = -2  # a call before the run
 
 
 @dataclass
 class _Ramp:
-    """A value on its way: evenly from what it was to that of a call."""
+    """Ramp of a value at a constant rate from its previous value to that of a call."""
 
     start: _Weights
     call: int
@@ -122,7 +122,7 @@ class _Ramp:
 
 
 def _ramps_on_their_way(session: Session) -> dict[_Key, _Ramp]:
-    """Natural shapes that go, as a run starts, to what was set before it."""
+    """Return natural shapes that ramp at the start of a run to values that were set before it."""
     out, now = {}, session.world.time
     for rod in session.directory.rods:
         for word in NATURAL_WORDS:
@@ -144,7 +144,7 @@ class _Epoch:
     session: Session
     live: dict[_Key, int] = field(default_factory=dict)
     ramps: dict[_Key, _Ramp] = field(default_factory=dict)
-    made_of: dict[_Key, set[str]] = field(default_factory=dict)  # arrays of rods that were made anew
+    made_of: dict[_Key, set[str]] = field(default_factory=dict)  # arrays of rods that were created again
     ways: dict[_Key, Way] = field(default_factory=dict)
 
     def follow(self, index: int, call: _Call) -> _Epoch:
@@ -182,7 +182,7 @@ class _Epoch:
         return 0.0 if key in self.live else self.weights(key, time).get(_START, 0.0)
 
     def arrays(self, rod: RodPart, word: str, *, initial: bool) -> set[str]:
-        """Those of a rod that depend on a word as it was set, or as it was at the start of the run."""
+        """Return the arrays of a rod that depend on a word as it was set, or as it was at the start of the run."""
         return {
             array
             for array in ACTING_WORDS
@@ -302,10 +302,10 @@ class Ledger:
         return out
 
     def _of_start(self, epoch: _Epoch, unknown: Any, reader: Reader, time: float, found: Any) -> Any:
-        """By what the run began with, as far as that acts."""
+        """Return the derivatives by an initial value of the run, as far as it acts."""
         if isinstance(unknown, str):
             return reader(OfRun(found)) * (0.0 if ("", unknown) in epoch.live else 1.0)
-        if isinstance(unknown, Remaining):  # asked for by what lets no call into its runs
+        if isinstance(unknown, Remaining):  # requested by a function whose runs have no calls
             return reader(OfRun(found))
         part, word = part_of(self._session, unknown[0]), unknown[1]
         key = (part.name, word)
@@ -379,7 +379,7 @@ def _by_drag(epoch: _Epoch, part: DragPart, found: Any, *, initial: bool) -> flo
 
 
 def _of_shape(full: Any, shape: tuple[int, ...]) -> Any:
-    """Derivatives by what was spread over more: sums over the axes along which it was."""
+    """Return the derivatives by a value that was broadcast: sums over the axes of the broadcast."""
     array = np.asarray(full)
     padded = (1,) * (array.ndim - len(shape)) + shape
     axes = tuple(i for i, size in enumerate(padded) if size == 1 and array.shape[i] != 1)

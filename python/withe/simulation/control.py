@@ -20,7 +20,7 @@ __all__ = ["Control"]
 
 @keyword_hints
 class Control:
-    """Methods of `Simulation` that actuate and set; what they do is done by functions of the session."""
+    """Methods of `Simulation` that actuate and set parameters. They call functions of the session."""
 
     _session: Session
 

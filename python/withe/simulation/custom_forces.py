@@ -16,8 +16,8 @@ __all__ = ["CustomForces"]
 FloatArray = npt.NDArray[np.float64]
 Answer = tuple[FloatArray, FloatArray | None, Any, Any]  # forces, moments, by positions, by velocities
 
-_LITTLE = float(np.finfo(float).eps) ** (1.0 / 3.0)  # of a central difference, whose error is its square
-_WRONG = 1e-4  # of the greatest entry
+_LITTLE = float(np.finfo(float).eps) ** (1.0 / 3.0)  # relative step of a central difference; its error is the square
+_WRONG = 1e-4  # relative to the greatest entry
 
 
 class CustomForces:
@@ -107,7 +107,7 @@ class CustomForces:
         return np.stack([forces, moments])
 
     def _check(self, value: FloatArray, part: CustomForcePart, time: float) -> FloatArray:
-        """Refuse what leaves the plane of the scene."""
+        """Refuse forces and moments that leave the plane of the scene."""
         what = f"custom force {part.name!r} at t = {time:g}"
         self._check_forces(value[0], what)
         if part.moments:
@@ -163,7 +163,7 @@ def _sum(matrices: list[Any]) -> Any:
 
 
 def _matrix(value: Any, part: CustomForcePart, size: int) -> Any:
-    """A derivative as a SciPy matrix of `size` rows, or twice as many with those of moments."""
+    """Return a derivative as a SciPy matrix of `size` rows, or of twice as many with the rows of moments."""
     from scipy import sparse
 
     what = f"jacobian of custom force {part.name!r}"

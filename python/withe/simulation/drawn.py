@@ -17,7 +17,7 @@ __all__ = ["DrawnNodes", "Moment", "points_reader"]
 
 FloatArray = npt.NDArray[np.float64]
 
-_STEP = 1e-3  # of the shortest edge, of differences that leave its fourth power
+_STEP = 1e-3  # step of differences, relative to the shortest edge; their error is its fourth power
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +81,7 @@ def points_reader(session: Session, part: RodPart) -> Callable[[_core.Equilibriu
 
 
 class DrawnNodes:
-    """Derivatives by drawn nodes, from those by rest lengths, natural shape and directions of edges.
+    """Return derivatives by drawn nodes, from derivatives by rest lengths, natural shape and directions of edges.
 
     The drawn nodes determine these quantities by geometry alone, so finite differences give the chain rule. Rods that
     are joined to the rod share nodes with it, and are drawn again together with it.
@@ -180,7 +180,7 @@ class _Shape:
 
 
 def _turns(part: RodPart, other: RodPart) -> FloatArray:
-    """Return the rotation of the frame of each edge, as rotation vectors but for the third power of the turn."""
+    """Return the rotation of the frame of each edge, as rotation vectors up to the third power of the rotation."""
     out = np.zeros_like(part.tangents)
     for rod, new in (
         (part.directors, other.directors),
@@ -219,7 +219,7 @@ def _refuse(part: RodPart, why: str) -> None:
 
 
 def _check_run(session: Session, asked: RodPart, part: RodPart, begin: Moment) -> None:
-    """Refuses runs that do not begin where rods were drawn, and what moves only runs."""
+    """Refuse runs that do not begin at the drawn positions, and motions that exist only in runs."""
     if session.directory.all(FluidPart):
         _refuse(asked, "in a fluid, whose resistance depends on the whole length of a rod")
     near = 1e-9 * part.lengths.min()
@@ -230,7 +230,7 @@ def _check_run(session: Session, asked: RodPart, part: RodPart, begin: Moment) -
 
 
 def _check(session: Session, asked: RodPart, part: RodPart, begin: Moment) -> None:
-    """Refuses what depends on drawn nodes by more than the engine has derivatives of."""
+    """Refuse parts that depend on drawn nodes through quantities without derivatives in the engine."""
 
     def refuse(why: str) -> None:
         _refuse(asked, why)

@@ -88,7 +88,7 @@ def check_jacobian(session: Session, force: CustomForce | str | None) -> None:
 
 
 def _check_in_plane(session: Session, value: FloatArray, what: str, along_normal: bool = False) -> None:
-    """Refuse what a function gave that leaves the plane of a simulation built with planar=True."""
+    """Refuse values of a function that leave the plane of a simulation built with planar=True."""
     if not session.options.planar:
         return
     normal = np.array(session.world.plan.plane_normal)

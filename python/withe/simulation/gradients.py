@@ -81,12 +81,12 @@ def equilibrium_gradients(session: Session, by_positions: FloatArray, wrt: Seque
 
 
 def _gradients(session: Session, by: list[_core.ReadoutAdjoint], wrt: Sequence[Unknown]) -> list[list[Any]]:
-    """For each of `wrt` what the derivatives of every scalar say of it.
+    """Return the derivatives of every scalar by each of `wrt`.
 
     Raises
     ------
     ValueError
-        An unknown that drives a motion that costs nothing, such as how a rod spins that is free to.
+        An unknown that drives a neutral motion, such as the spin of a rod that can spin freely.
     """
     readers = unknown_readers(session, wrt)
     scalars, works = session.world.equilibrium_gradients(by)
@@ -167,7 +167,7 @@ def _forward_jacobian(session: Session, rows: npt.NDArray[np.int64], wrt: Sequen
             shapes.append(found[2])
         moved = session.world.equilibrium_responses(np.concatenate(changes).T, np.concatenate(helds).T)
     except ValueError:
-        return None  # the adjoint method says why, or knows more
+        return None  # the adjoint method gives the reason, or has derivatives
     by_rows = np.asarray(moved).reshape(-1, 3, moved.shape[1])[rows]
     ends = np.cumsum([len(each) for each in changes])
     parts = np.split(by_rows, ends[:-1], axis=2)
@@ -177,7 +177,7 @@ def _forward_jacobian(session: Session, rows: npt.NDArray[np.int64], wrt: Sequen
 def _directions(
     copy: Session, unknown: Unknown, start: FloatArray, most: int
 ) -> tuple[FloatArray, FloatArray, tuple[int, ...]] | None:
-    """Changes of the residual and of what supports hold by each number of an unknown, (n, unknowns), and its shape.
+    """Return changes of the residual and of supported unknowns by each number of an unknown, and its shape.
 
     None where there are `most` numbers or more, or the residual is not linear in them.
     """

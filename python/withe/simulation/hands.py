@@ -82,7 +82,7 @@ class Passage(NamedTuple):
     at : float [m]
         Undeformed arc length of the rod at the ring.
     pull : float [N]
-        Force of friction or a drive along the rod, positive backwards. 0 if nothing holds the rod along itself.
+        Force of friction or a drive along the rod, positive backwards. 0 if no force acts along the rod.
     press : float [N]
         Transverse force on the rod.
     feed_rate : float or None [m/s]
@@ -133,7 +133,7 @@ class RunningHand(Hand):
         over: float = 0.0,
         path: PathLike | None = None,
     ) -> None:
-        """Move the hand. See `Simulation.move`; the rotation is that of the hand's axes in the world."""
+        """Move the hand. See `Simulation.move`; `rotation` has the axes of the hand in the world."""
         move_support(self.session, self, position, rotation, tangent, roll, over, path)
 
     def wrench(self, about: npt.ArrayLike | None = None) -> Reaction:

@@ -19,7 +19,7 @@ __all__ = ["find_balance"]
 FloatArray = npt.NDArray[np.float64]
 
 _MOST_ITERATIONS = 20
-_RIDGE = 1e-6  # of the trace: what moves nodes by no more than a thousandth of what strains do is left to least energy
+_RIDGE = 1e-6  # relative to the trace: energy decides motions of nodes below 0.001 of those of strains
 _PROBE = 1e-4  # strain by which the residual is probed
 
 

@@ -30,15 +30,15 @@ Stability = Literal["stable", "diverges", "flutters"]
 Inverse = Callable[[FloatArray], FloatArray]
 
 _BLOCK = 8
-_FULL = 8  # share of all modes, one in so many, from which on matrices are full
-_LOOK = 16  # slow modes of what hangs together among which stability is looked for
-_NEUTRAL = 1e-4  # of a shift, what a square near it is known to
-_TOLERATED = 0.1  # of a shift, what may be neutral by what is out of balance
-_KNOWN = 1e-7  # of a shift, what a square is known to
-_PAIR = 1e-6  # of a square, what its imaginary part is known to
-_ROUNDING = 64.0 * np.finfo(float).eps  # of the parts of a stiffness, as in the engine's `curvature_along`
-_RESIDUAL = 1e-9  # of an eigenvalue of the inverse
-_LOST = 0.01  # of its square, a direction that one orthonormalisation has left of what it was
+_FULL = 8  # matrices are dense if more than one in this many modes is needed
+_LOOK = 16  # number of slow modes of connected parts that are searched for instability
+_NEUTRAL = 1e-4  # relative to a shift: accuracy of a square near it
+_TOLERATED = 0.1  # relative to a shift: greatest square that is neutral because of the imbalance
+_KNOWN = 1e-7  # relative to a shift: accuracy of a square
+_PAIR = 1e-6  # relative to a square: accuracy of its imaginary part
+_ROUNDING = 64.0 * np.finfo(float).eps  # relative to the parts of a stiffness, as in the engine's `curvature_along`
+_RESIDUAL = 1e-9  # relative to an eigenvalue of the inverse
+_LOST = 0.01  # share of the squared length that must remain of a direction after one orthonormalisation
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -138,7 +138,7 @@ class Linearisation:
         return max((part._fastest() for part in parts), key=lambda found: found[0])[1]
 
     def _fastest(self) -> tuple[float, Stability]:
-        """Greatest rate of growth [1/s], and what it is."""
+        """Return the greatest rate of growth [1/s], and a description of it."""
         squares, shapes = self._solve(min(_LOOK, self._mass.shape[0]))
         rates = np.sqrt(-squares.astype(complex))
         neutral = self._neutral(shapes, self._shift) + _KNOWN * self._shift
@@ -192,7 +192,7 @@ class Linearisation:
             raise ValueError(f"count must be between 1 and {size}, got {count}")
         shift = self._shift
         inverse = self._inverse(shift)
-        # Nearest to -shift are those of the lowest real part, but for pairs that lie off the axis.
+        # The eigenvalues nearest to -shift have the lowest real part, except pairs off the real axis.
         found = count if self._symmetric else min(2 * count + _BLOCK, size)
         if found > size // _FULL:
             squares, shapes = self._full(inverse, shift)
@@ -203,19 +203,19 @@ class Linearisation:
         chosen = np.argsort(squares.real, kind="stable")[:count]
         squares, shapes = squares[chosen], shapes[:, chosen]
         if self._symmetric:
-            # By how much moves what has hardly any mass, orthogonal shapes have few digits, and what they push has all.
+            # Motions of nodes with almost no mass have few digits in orthogonal shapes. The inverse restores them.
             shapes = inverse(self._mass @ shapes) * (squares + shift)
             squares = self._rayleigh(shapes)
             order = np.argsort(squares, kind="stable")
             return squares[order], shapes[:, order]
-        # Two equal ones may come out as a pair by rounding: two real shapes span what theirs do.
+        # Rounding may turn two equal eigenvalues into a complex pair. Two real shapes span the same space.
         real = np.abs(squares.imag) <= _PAIR * np.abs(squares)
         shapes = np.where(real, np.where(squares.imag < 0.0, shapes.imag, shapes.real), shapes)
         squares = np.where(real, squares.real, squares)
         return (squares.real, shapes.real) if real.all() else (squares, shapes)
 
     def _rayleigh(self, shapes: FloatArray) -> FloatArray:
-        """Squares of frequencies from energies, which have the digits that an inverse has not got."""
+        """Return squares of frequencies from energies, which are more accurate than from the inverse."""
         strains = self._gradients @ shapes
         twice = (shapes * (self._geometric @ shapes)).sum(axis=0) + self._stiffnesses @ strains**2
         return np.asarray(twice / (shapes * (self._mass @ shapes)).sum(axis=0))
@@ -223,7 +223,7 @@ class Linearisation:
     def _with_fast_growth(
         self, squares: npt.NDArray[Any], shapes: npt.NDArray[Any], shift: float, count: int
     ) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
-        """Also what diverges by more than -shift, which is nearest to a shift beyond it."""
+        """Find also motions that diverge by more than -shift: they are nearest to a shift beyond it."""
         beyond = shift
         while not self._positive(beyond):
             beyond *= 4.0
@@ -258,9 +258,9 @@ class Linearisation:
 
     @cached_property
     def _shift(self) -> float:
-        """Squared frequency near that of the slowest motion that is not neutral, and above any diverging motion.
+        """Return a squared frequency near that of the slowest motion that is not neutral, and above any diverging one.
 
-        Some powers of ten are near enough. Neutral motions are then large in the inverse, and the others keep their
+        It may be wrong by some powers of ten. Neutral motions are then large in the inverse, and the others keep their
         digits.
         """
         nodes = max(2, self._displacement.shape[0] // 3)
@@ -330,7 +330,7 @@ class Linearisation:
         Ends when `count` have converged, after some rounds, or where the space is whole.
         """
         size = self._mass.shape[0]
-        # As many at once as are asked for: of equal ones, a narrower block sees no more than it is wide.
+        # The block is as wide as the requested number: a narrower block finds only part of equal eigenvalues.
         start = np.random.default_rng(0).standard_normal((size, min(max(_BLOCK, count + 1), size)))
         block, _ = self._orthonormal(inverse(self._mass @ start))
         basis, images = block, self._mass @ block
@@ -367,7 +367,7 @@ class Linearisation:
             images = np.hstack((images, self._mass @ block))
 
     def _orthonormal(self, block: FloatArray, scale: float | None = None) -> tuple[FloatArray, FloatArray]:
-        """Q and R with block = Q R and Q^T M Q = 1, less what is rounding."""
+        """Return Q and R with block = Q R and Q^T M Q = 1, without columns that are only rounding errors."""
         squares, axes = np.linalg.eigh(block.T @ (self._mass @ block))
         least = 1e-24 * squares.max() if scale is None else max(1e-24 * scale**2, 1e-24 * squares.max())
         kept = squares > least
@@ -381,7 +381,7 @@ class Linearisation:
         return first @ (turned / again), (again[:, None] * turned.T) @ (roots[:, None] * axes.T)
 
     def _full(self, inverse: Inverse, shift: float) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
-        """All of them: slow ones from the inverse, whose greatest eigenvalues they are, fast ones from the matrix."""
+        """Return all modes: slow ones from the inverse, of which they are the greatest, and fast ones from the matrix."""
         from scipy.linalg import eig, eigh
 
         mass = self.mass

@@ -42,7 +42,7 @@ class Run(Generic[S]):
         self.duration = validation.positive(duration, "duration")
         step = stepping.session.options.time_step
         steps = self.duration / step
-        # Shorter than what rounding leaves of the time or of a step: 1 / duration need not be a number.
+        # Shorter than the rounding error of the time or of a step: 1 / duration may not be a finite number.
         if steps < 2.0**-53 or stepping.time + self.duration == stepping.time:
             raise ValueError(f"duration must be long enough for the time_step, {step:g} s, got {self.duration:g} s")
         if steps > 2.0**53:
@@ -95,7 +95,7 @@ class Run(Generic[S]):
                     after = self.duration
                 self._advance(done, after)
                 if not self._ended:
-                    # Time steps add up to the frame's time but for rounding; a frame says the time itself.
+                    # Time steps add up to the time of the frame, up to rounding. A frame has the exact time.
                     stepping.frame_time = stepping.session.world.time, self._start + after
                 self._capture()
                 done = after

@@ -112,7 +112,7 @@ def _whole_shape(session: Session, word: str) -> tuple[int, ...]:
 
 
 def _rows(session: Session, target: Any, word: str) -> npt.NDArray[np.int64]:
-    """Rows of a part among those of the whole scene."""
+    """Return the rows of a part in the arrays of the whole scene."""
     if word in _OF_SUPPORTS:
         return np.array([find_support(session, target)[0]])
     part = session.directory.rod(_as_rod(target))

@@ -34,7 +34,7 @@ Pose = tuple[FloatArray | None, FloatArray | None]
 Path = Callable[[float], Any]
 PoseWord = Literal["position", "rotation"]
 POSE_WORDS: tuple[PoseWord, ...] = ("position", "rotation")
-PathTable = dict[tuple[str, PoseWord], Path]  # by the name of what is moved, and what is moved of it
+PathTable = dict[tuple[str, PoseWord], Path]  # by the name of the moved part, and the moved pose word
 PathLike = Path | npt.ArrayLike | tuple[Path, Path]
 
 
@@ -128,7 +128,7 @@ class Waypoints:
     rotations: FloatArray
 
     def __call__(self, time: float) -> Any:
-        """Position, and rotation where there are any, at a time."""
+        """Return the position, and the rotation if there are rotations, at a time."""
         after = int(np.clip(np.searchsorted(self.times, time, side="right"), 1, len(self.times) - 1))
         begin, end = self.times[after - 1 : after + 1]
         share = min(max((time - float(begin)) / float(end - begin), 0.0), 1.0)

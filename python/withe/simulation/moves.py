@@ -13,7 +13,7 @@ from withe.common.drawing import rotation_about
 __all__ = ["Way"]
 
 FloatArray = npt.NDArray[np.float64]
-_Weights = dict[int, FloatArray]  # of calls: (3, 3), from a change of what they gave to that of where the support is
+_Weights = dict[int, FloatArray]  # per call, (3, 3): derivative of the pose by the value of the call
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,7 +26,7 @@ __all__ = ["Placement"]
 
 @keyword_hints
 class Placement:
-    """Methods of `Simulation` that hold, move and place; what they do is done by functions of the session."""
+    """Methods of `Simulation` that hold, move and place parts. They call functions of the session."""
 
     _session: Session
 

@@ -31,7 +31,7 @@ def check_scene(stepping: Stepping) -> None:
 
 
 def _check_density(session: Session, rod: RodPart, gravity: float) -> None:
-    """Without gravity a density stands for the masses that a model is to have, if any."""
+    """Warn of implausible densities. Without gravity any density is plausible, since a model may choose its masses."""
     density = session.settings.rods[rod.index].density
     if density is None or gravity == 0.0:
         return
@@ -45,7 +45,7 @@ def _check_density(session: Session, rod: RodPart, gravity: float) -> None:
 
 
 def _check_modulus(session: Session, rod: RodPart, gravity: float) -> None:
-    """A rod that is as soft may yet be short enough to bear its weight, rho g L < E, as scaled models are."""
+    """Warn of a very soft rod, unless it is short enough to bear its weight, rho g L < E, as in scaled models."""
     numbers = session.settings.rods[rod.index]
     if numbers.youngs_modulus is None or numbers.density is None:
         return

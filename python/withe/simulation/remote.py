@@ -15,7 +15,7 @@ __all__ = ["run_on"]
 
 
 def _run(simulation: Simulation, duration: float, options: dict[str, Any]) -> tuple[Record, Snapshot]:
-    """On a worker: what was recorded, and the state that it ended in."""
+    """Run on a worker. Return the recorded data and the final state."""
     record = simulation.run(duration, progress=False, **options)
     return record, simulation.snapshot()
 

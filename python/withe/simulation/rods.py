@@ -144,7 +144,7 @@ def sum_of_slopes(
 
 
 def _slopes(parameters: RodParameters, word: str) -> dict[str, FloatArray]:
-    """Derivatives of what the engine works with by a word, edge by edge; see `RodParameters`."""
+    """Return derivatives of the parameters of the engine by a word, for each edge; see `RodParameters`."""
     p = parameters
     if word == "line_density":
         return {word: np.ones_like(p.line_density), "rotary_inertia": p.rotary_inertia / p.line_density}
@@ -171,7 +171,7 @@ def _slopes(parameters: RodParameters, word: str) -> dict[str, FloatArray]:
 
 
 def _radius_slopes(session: Session, part: RodPart, parameters: RodParameters) -> dict[str, FloatArray]:
-    """Derivatives of what the engine works with by the radius of each edge.
+    """Return derivatives of the parameters of the engine by the radius of each edge.
 
     A = pi r^2, I = pi r^4 / 4, J = 2 I. Stiffness and line density that were given directly do not depend on it; rotary
     inertia does.

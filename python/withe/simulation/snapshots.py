@@ -37,7 +37,7 @@ class Snapshot:
     these functions.
     """
 
-    _scene: Directory | None = None  # in which it was taken, where that is known: simulations of it can go back to it
+    _scene: Directory | None = None  # scene of the snapshot, if known: simulations of this scene can restore it
 
     def __init__(
         self,
@@ -173,14 +173,14 @@ class Snapshot:
             name, kind = str(entry["name"]), validation.choice(entry["kind"], "kind", SUPPORT_KINDS)
             free = validation.number_array(arrays[f"support_{number}_free"], "free", (3, 3))
             index = validation.integer(entry["index"], "index", 0, 10_000_000)
-            # Which node that is, the simulation that restores it knows by the name.
+            # The restoring simulation finds the node by the name.
             grasp = _read(entry) if kind == "hand" else None
             supports[name] = index, SupportPart(name, kind, (-1, -1), str(entry["node"]), free, grasp)  # type: ignore[arg-type]
             for half in POSE_WORDS:
                 if (way := _read_path(arrays, f"support_{number}_{half}_")) is not None:
                     paths[name, half] = way
         loads: dict[str, LoadPart] = {}
-        for number, entry in enumerate(header.get("loads", [])):  # which files had none of at first
+        for number, entry in enumerate(header.get("loads", [])):  # absent in the first files
             name, kind = str(entry["name"]), validation.choice(entry["kind"], "kind", LOAD_KINDS)
             rod, node = (validation.integer(index, "node", 0, 10_000_000) for index in entry["node"])
             axis = arrays.get(f"load_{number}_axis")
@@ -253,7 +253,7 @@ def adopt(session: Session, settings: Settings) -> None:
 
 
 def _matched(snapshot: Snapshot, mine: Settings, directory: Directory, scene: Directory) -> Settings:
-    """Settings of a snapshot, made whole with what only the simulation that restores it knows.
+    """Return the settings of a snapshot, completed by the simulation that restores it.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""One time step as a map between states that are vectors: what LQR, MPC and Kalman filters ask for."""
+"""One time step as a map between state vectors, as needed for LQR, MPC and Kalman filters."""
 
 from __future__ import annotations
 

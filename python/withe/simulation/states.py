@@ -127,7 +127,7 @@ def _tangents(points: FloatArray, part: RodPart) -> FloatArray:
 
 
 def _first_directors(directors: npt.ArrayLike, tangents: FloatArray, part: RodPart) -> FloatArray:
-    """First directors, normal to the tangents to the last digit; refuses what is not so to 1e-6."""
+    """Return first directors, made exactly normal to the tangents. Refuse deviations above 1e-6."""
     edges = len(tangents)
     given = validation.number_array(directors, f"directors of {part.owner}", (edges, 3, 3), (edges, 3))
     if given.ndim == 3:
@@ -161,9 +161,9 @@ def _carried(director: FloatArray, start: FloatArray, end: FloatArray, axis: Flo
 def _laid(
     start: FloatArray, tangents: FloatArray, turns: FloatArray, part: RodPart, *, must_close: bool
 ) -> tuple[FloatArray, FloatArray]:
-    """First directors from that of the first edge on, turned by `turns` [rad] at each stencil, and these turns.
+    """Return first directors, turned by `turns` [rad] at each stencil from the first edge on, and these turns.
 
-    What a closed rod cannot have of them is spread evenly, or refused.
+    In a closed rod, turns that do not close are corrected evenly, or refused.
     """
     directors = np.empty_like(tangents)
     directors[0] = start

@@ -46,7 +46,7 @@ class Stepping:
     recorder : Recorder or None
         Of the last run.
     frame_time : (float, float) or None
-        Time of the engine at the last frame of a run, and the time of that frame: steps add up to it but for rounding.
+        Time of the engine at the last frame of a run, and the time of that frame: steps add up to it, up to rounding.
     """
 
     def __init__(self, session: Session) -> None:
@@ -56,7 +56,7 @@ class Stepping:
         self._running = False
 
     def copy(self) -> Stepping:
-        """That of a copied session, in no run."""
+        """Return the stepping of a copied session, outside of any run."""
         other = Stepping(self.session.copy())
         other.frame_time = self.frame_time
         return other
@@ -168,7 +168,7 @@ class Stepping:
             self._running = False
 
     def refuse_in_run(self, what: str) -> None:
-        """Refuse what would change the time or the state behind the back of a run, whose record were wrong then."""
+        """Refuse changes of the time or the state during a run, which would make its record wrong."""
         if self._running:
             raise RuntimeError(
                 f"{what} cannot be called while the simulation runs. before_step may read, set values and hold "
@@ -219,5 +219,5 @@ def pass_on(sessions: Sequence[Session], found: _core.Warnings) -> None:
 
 
 def report_left(what: str) -> None:
-    """Say that a ring was left, which one, and what came of it."""
+    """Warn that a rod has left a ring, with the name of the ring and the consequence."""
     warn(f"the end of a rod has left {what}", RingLeftWarning)

@@ -46,7 +46,7 @@ def release(session: Session, support: Handle | str) -> None:
 
 
 def forget(session: Session, part: SupportPart) -> None:
-    """Drop what is known of a support that the engine has released."""
+    """Delete the data of a support that the engine has released."""
     del session.settings.supports[part.name]
     session.settings.ramps.pop(("move", part.name), None)
     for word in POSE_WORDS:
@@ -118,7 +118,7 @@ def move_support(
         given["rotation"] = angle * axis
     counted = np.zeros(3)
     if turn is not None and turn.times.max() <= session.world.time:
-        # The engine leads what is to be there at once evenly through the next time step, however that is cut.
+        # The engine moves an immediate target at a constant rate over the next time step, even if that step is cut.
         matrix, rolled = turn(session.world.time), float(turn.rolls[1] - turn.rolls[0])
         if abs(rolled) > np.pi:
             counted = rolled * turn.drawn[0]
@@ -142,7 +142,7 @@ def _turn(
     roll: float | None,
     over: float,
 ) -> Turn:
-    """The way of a support from where it is to a tangent and a roll; one that is not given goes on as it does."""
+    """Return the path of a support from its present pose to a tangent and a roll. One that is not given continues."""
     rod = session.directory.rod(session.directory.layout.rods[part.node[0]].name)
     if part.grasp is not None:
         drawn = np.eye(3)[2], np.eye(3)[0]
@@ -195,7 +195,7 @@ def _beside(known: float, roll: float) -> float:
 
 
 def _check_turns(session: Session, way: float, over: float, owner: str) -> None:
-    """Rotations at the ends of a step do not tell full turns between them; equilibria at once count them."""
+    """Refuse full turns within one step, which its two end rotations do not show. Equilibria count them."""
     step = float(session.options.time_step)
     if over == 0.0 and session.options.integrator == "static":
         return

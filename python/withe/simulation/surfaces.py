@@ -48,7 +48,7 @@ Touching = RodPart | ObstaclePart
 
 
 def set_scene(session: Session, part: None, values: dict[str, Any]) -> None:
-    """Change gravity, what all rods have with each other, and the slip tolerance and stiffness of all contact."""
+    """Change gravity, the coefficients between all rods, and the slip tolerance and stiffness of all contacts."""
     gravity = validation.vector(values["gravity"], "gravity") if "gravity" in values else None
     if values.keys() - {"gravity"}:
         _set_contact(session, values)
@@ -175,7 +175,7 @@ def set_pair(session: Session, pair: BodyPair, values: dict[str, Any]) -> None:
 
 
 def pair_value(session: Session, pair: BodyPair, word: str) -> Any:
-    """Return a parameter of two bodies: their own, or else that of the obstacle or the scene."""
+    """Return a parameter of two bodies: the one of their pair, or else that of the obstacle or the scene."""
     names = pair_of(session.directory, pair.first.name, pair.second.name)
     parts = [touching(session.directory, name) for name in names]
     first, second = (body_of(session.directory, part) for part in parts)
@@ -210,7 +210,7 @@ def _check_pair(first: Touching, second: Touching, contact: _core.ContactDescrip
 
 
 def _note_field(session: Session, names: tuple[str, ...], given: Coefficients) -> None:
-    """Remember what was set, of an obstacle or of a rod and one, if it is a field; the engine keeps other friction."""
+    """Store fields of friction, of an obstacle or of a rod and an obstacle. The engine stores all other friction."""
     if given.field is None:
         session.settings.frictions.pop(names, None)
     else:

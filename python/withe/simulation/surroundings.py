@@ -66,7 +66,7 @@ def drag_reader(session: Session, part: DragPart, word: str) -> Reader:
 
 
 def dragged_rods(session: Session, part: DragPart) -> list[RodPart]:
-    """Those on which a drag acts."""
+    """Return the rods on which a drag acts."""
     return [rod for rod in session.directory.all(RodPart) if part.rods is None or rod.index in part.rods]
 
 

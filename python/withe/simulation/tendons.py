@@ -1,4 +1,4 @@
-"""Tendons while a simulation runs: what is read."""
+"""Read-outs of tendons."""
 
 from __future__ import annotations
 

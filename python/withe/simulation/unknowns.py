@@ -33,12 +33,12 @@ Unknown = tuple[Handle | str | tuple[Body, Body], str] | str
 
 
 Array = tuple[str, str]
-"""Name of a rod, and of what the engine works with of it."""
+"""Name of a rod, and of one of its parameters in the engine."""
 
 
 @dataclass(frozen=True)
 class Remaining:
-    """A word of a rod or a drag as far as other words leave what it sets: it acts through some arrays alone."""
+    """A word of a rod or a drag that acts only through some arrays, because other words have set the others."""
 
     unknown: Unknown
     arrays: frozenset[Array]
@@ -48,13 +48,13 @@ INITIAL_WORDS = ("initial_positions", "initial_velocities")
 
 
 def unknown_readers(session: Session, wrt: Sequence[Unknown]) -> list[Reader]:
-    """For each of `wrt` what reads its derivative, shaped like `get`, from what the engine finds."""
+    """Return readers for `wrt`, which take derivatives, in the shape of `get`, from results of the engine."""
     check_list(wrt)
     return [unknown_reader(session, unknown) for unknown in wrt]
 
 
 def check_list(wrt: Sequence[Unknown], *, may_be_empty: bool = False) -> None:
-    """Refuse what is no list, or empty."""
+    """Refuse an empty list, or an object that is not a list."""
     if isinstance(wrt, str) or not isinstance(wrt, Sequence) or not (wrt or may_be_empty):
         raise ValueError('wrt must be a list of parameters, such as [(arm, "youngs_modulus"), "gravity"]')
 
