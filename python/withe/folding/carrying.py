@@ -15,12 +15,12 @@ from withe.simulation.simulation import Simulation
 
 __all__ = ["FRAMES", "Watch", "carried"]
 
-FRAMES = 0.05  # between those of a record [s]
-_SETTLING = 0.5  # after the last motion [s]
-_SNAP = 10.0  # times as fast as the jaw has lately been is no folding any more,
-_FAST = 0.2  # where it is faster than this [m/s]
-_LONGEST = 600.0  # [s], or twice what is expected
-_SLIPS = 1e-3  # in the jaw, from which on it is said [m]
+FRAMES = 0.05  # time between frames of a record [s]
+_SETTLING = 0.5  # time after the last motion [s]
+_SNAP = 10.0  # a sheet snaps if it is this many times as fast as the recent jaw,
+_FAST = 0.2  # and faster than this [m/s]
+_LONGEST = 600.0  # [s], or twice the expected duration, if that is longer
+_SLIPS = 1e-3  # least slip in the jaw that causes a warning [m]
 
 
 class Watch:

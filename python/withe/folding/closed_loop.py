@@ -22,7 +22,7 @@ from withe.perception.camera import Camera
 __all__ = ["fold"]
 
 FloatArray = npt.NDArray[np.float64]
-_NEAR = 0.01  # of where the lifted edge appears, an edge on the table cannot be told from it [m]
+_NEAR = 0.01  # least visible distance between the lifted edge and an edge on the table [m]
 
 
 @overload

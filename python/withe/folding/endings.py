@@ -20,7 +20,7 @@ __all__ = ["plan"]
 
 Ending = Literal["auto", "slow", "plunge"]
 _BEARABLE = 1e-3  # slide [m]
-_UNSEEN = 0.5  # from the target, in which a lifted edge hides what it comes down on [Lgb]
+_UNSEEN = 0.5  # distance from the target within which the lifted edge hides the sheet below [Lgb]
 
 
 @keyword_hints
@@ -135,7 +135,9 @@ def plan(
     if method == "slip":
         said = _slides(slow)
         if slow.slip_ratio.max() > paper.friction:
-            needed = np.ceil(1e3 * least_friction(slow)) / 1e3  # as said it is enough
+            needed = (
+                np.ceil(1e3 * least_friction(slow)) / 1e3
+            )  # rounded up, so that the number in the message is enough
             said = (
                 f"the sheet slides: the fold needs a friction coefficient of {needed:.3f}, and the paper has "
                 f"{paper.friction:g}"

@@ -24,12 +24,12 @@ from withe.folding.widths import EVEN, Width
 __all__ = ["Holding", "Lattice", "Way", "forces_at", "goals", "make_lattice", "smoothed", "way_to"]
 
 FloatArray = npt.NDArray[np.float64]
-_SLOPE = 0.2  # at which an edge comes down
+_SLOPE = 0.2  # slope of the path of an edge that comes down
 _STEEPEST = 5.5  # [rad] of an edge; at 4.7 it points straight down, at 6.3 it would lie under the sheet
 _TURN = 0.5  # [Lgb/rad] lengths that angles count as
 _SHORTEST = 0.05  # [Lgb]
 _NEAR = 1.2  # cells
-_THIN = 0.2  # of a cell
+_THIN = 0.2  # relative to a cell
 _BEST = 3  # goals that are looked at more closely
 
 
@@ -204,9 +204,9 @@ def _next_to_goals(lattice: Lattice, holding: Holding, x: float) -> FloatArray:
 
 
 def _on_goal(places: FloatArray, holding: Holding, x: float, pulls: bool) -> FloatArray:
-    """Newton's method from many places, by differences, steps as short as can be; what does not get there is left out.
+    """Return results of Newton's method from many places, with differences and the shortest steps.
 
-    Without `pulls` H is kept.
+    Places that do not converge are omitted. Without `pulls` H does not change.
     """
     free = [0, 1, 2] if pulls else [0, 2]
     moves = np.concatenate([np.zeros((1, 3)), 1e-6 * np.eye(3)[free]])
@@ -230,13 +230,13 @@ def _on_goal(places: FloatArray, holding: Holding, x: float, pulls: bool) -> Flo
 
 
 def _thinned(places: FloatArray, lattice: Lattice) -> FloatArray:
-    """The first of those that are nearly the same."""
+    """Return the places, with only the first of nearly equal ones."""
     cells = np.round(places / (_THIN * _cell(lattice)))
     return np.asarray(places[np.sort(np.unique(cells, axis=0, return_index=True)[1])])
 
 
 def _least(places: FloatArray, lattice: Lattice, holding: Holding, x: float) -> FloatArray:
-    """Places, and from the best of them on along their curves those of less and less ratio, as long as these bear."""
+    """Return the places, and from the best ones on places of smaller and smaller ratio whose sheets are bearable."""
 
     def ratios(tried: FloatArray) -> FloatArray:
         sheet = at_forces(forces_at(tried))

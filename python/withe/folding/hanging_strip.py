@@ -17,11 +17,11 @@ from withe.folding.strip_pictures import strip_ends
 __all__ = ["Measured", "droop", "measure"]
 
 _SIDE = (math.log(1e-20), math.log(0.5 * math.pi - 1e-5))  # angles between tip and plumb line [rad], their logarithms
-_STEP = 1e-3  # of differences of these
-_CHANGE = 1e-5  # of differences of Lgb, lengths and curls
-_MOST_STEPS = 30  # to the angle of a tip
-_LONGEST_REACH = 10.0  # [m] of a strip of paper
-_READ = 0.3  # standard deviation of what is read off a picture [px]
+_STEP = 1e-3  # step of differences of these
+_CHANGE = 1e-5  # relative step of differences of Lgb, lengths and curls
+_MOST_STEPS = 30  # greatest number of steps to the angle of a tip
+_LONGEST_REACH = 10.0  # [m], for a strip of paper
+_READ = 0.3  # standard deviation of readings from a picture [px]
 FloatArray = npt.NDArray[np.float64]
 _TELLING = (1.5, 3.0)  # lengths of strips [Lgb] whose droop depends steeply on Lgb
 
@@ -194,7 +194,7 @@ def _checked_drop(drop: object, length: float, name: str) -> float:
 
 
 def _uncurled(flat: Measured, read: FloatArray, error: float) -> Measured:
-    """Lgb, length and curl of a strip from readings of both of its sides; `flat` is what it would be without curl.
+    """Lgb, length and curl of a strip from readings of both of its sides; `flat` is the same strip without curl.
 
     Readings are its length and both drops, or reach and drop of one side and of the other.
     """
@@ -202,7 +202,7 @@ def _uncurled(flat: Measured, read: FloatArray, error: float) -> Measured:
 
     size = flat.gravito_bending_length
     scales = np.array([size, size, 1.0 / size])
-    angles = np.full((2, 1), 0.5)  # of the tips, found last
+    angles = np.full((2, 1), 0.5)  # angles of the tips, from the last solution
 
     def misfits(unknowns: FloatArray) -> FloatArray:
         """Misfits of columns of unknowns."""
@@ -252,8 +252,8 @@ def _curled(strip: FloatArray, curl: FloatArray, near: FloatArray) -> tuple[Floa
 def _hung(strip: FloatArray, curl: FloatArray, angle: FloatArray) -> FloatArray:
     """Angles at the clamp, drops and reaches [Lgb] of strips that bend down by themselves by `curl` [1/Lgb].
 
-    As `_hanging`, but phi'(0) = curl: nothing turns the tip. Lengths [Lgb] of shape (n,), curls and angles of tips of
-    shape (sides, n); what is found of shape (3, sides, n).
+    Like `_hanging`, but with phi'(0) = curl: the tip has no moment. Lengths [Lgb] have the shape (n,). Curls and angles
+    of tips have the shape (sides, n), and the result (3, sides, n).
     """
     from scipy.integrate import solve_ivp
 
@@ -282,9 +282,9 @@ def _ratio(angle: float) -> float:
 
 
 def _measured(angle: float, over: float, drop: float, error: float, by_reach: bool) -> Measured:
-    """Lgb, and its error by those of length and drop; or of reach and drop, where these were read.
+    """Return Lgb, and its error from the errors of length and drop, or of reach and drop if these were read.
 
-    `angle`: logarithm of the tip's; `over`: length or reach.
+    `angle`: logarithm of the angle of the tip. `over`: length or reach.
     """
     strip, fall, reach = _hanging(angle)
     length = over / reach if by_reach else over

@@ -17,11 +17,11 @@ from withe.simulation.hands import RunningHand
 __all__ = ["JawMotion", "Motion", "lead"]
 
 FloatArray = npt.NDArray[np.float64]
-_COMES_IN = 0.1  # of the first motion, over which the jaw's errors grow
+_COMES_IN = 0.1  # share of the first motion over which the errors of the jaw grow
 _FOLLOWS = 0.2  # [s]
-_RINGS = 5  # times that, until what it was given rings no more
-_RESOLVED = 2e-3  # of the way of an edge in a step [m]
-_LANDING = 0.1  # after an edge has been quick, until steps may be longer [s]
+_RINGS = 5  # times that, until oscillations have decayed
+_RESOLVED = 2e-3  # longest path of an edge in a step [m]
+_LANDING = 0.1  # time after a fast motion of an edge until steps may be longer [s]
 _JUMP = np.array([1e-3, 1e-3, 0.05])  # between motions, at most [m], [m], [rad]
 
 
@@ -119,7 +119,7 @@ class JawMotion:
         return True
 
     def __call__(self, time: float) -> FloatArray:
-        """Pose of the outer edge at a time: x, z [m], angle. What the jaw holds is there if no table is."""
+        """Return the pose of the outer edge at a time: x, z [m], angle. The table may displace the held part."""
         return self._way(time) + self._drawn.off(time, min(1.0, time / self._comes_in))
 
 

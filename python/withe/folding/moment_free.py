@@ -30,7 +30,7 @@ __all__ = ["SMOOTHING", "connects", "goal_pose", "greedy", "least_ratio", "least
 
 FloatArray = npt.NDArray[np.float64]
 _MOST_STEPS = 2000
-_ROOM = 2e-3  # of a path on which the sheet slides least, for it to be short [Lgb]
+_ROOM = 2e-3  # additional slide that is allowed for a shorter path [Lgb]
 SMOOTHING = 1.02
 """Largest friction of a smoothed path, relative to the friction that the nodes of the path need."""
 
@@ -43,7 +43,7 @@ def goal_pose(solve: Manifold, x: float, z: float, depth: float, finger: float) 
     """
     angle = last_angle = np.pi
     last_change = 0.0
-    for i in range(60):  # the secant method, from one step to what is found
+    for i in range(60):  # the secant method
         inner = (x - depth + depth * np.cos(angle), z + finger * abs(np.cos(angle)) - depth * np.sin(angle))
         pose = solve([inner[0]], [inner[1]])
         if not pose.valid[0]:
@@ -127,7 +127,7 @@ def _shortest_within(
     goal: Elastica,
     start: Elastica | None,
 ) -> Elastica | None:
-    """Nodes of the shortest path over those that need least of something; `bounds` as `_spread` has them."""
+    """Return nodes of the shortest path over the nodes with the least need; `bounds` as in `_spread`."""
     grid = make_grid(solve)
     cost, allowed = 1.0 + 0.4 * grid.pose.max_curvature, _allowed(solve, holding)
     network = make_network(grid, cost, allowed)
@@ -143,10 +143,10 @@ def _spread(
     begin: IndexArray,
     ends: IndexArray,
 ) -> npt.NDArray[np.bool_] | None:
-    """Nodes that are reached by as little as one of the ends can be; None if none is, finitely.
+    """Return nodes on paths to an end with the least possible need; None if every path has an infinite need.
 
-    `needed` of nodes; `bounds`: what may be needed in any case, and how much more than the least.
-    Always on from those of least need, as Prim's algorithm goes; all of those that are no worse at a time.
+    `needed`: need of each node. `bounds`: need that is always allowed, and allowed excess over the least need. The
+    search continues from the nodes with the least need, like Prim's algorithm, with all equally good nodes at once.
     """
     first, neighbours = network.graph.indptr, network.graph.indices
     seen, reached = np.zeros((2, len(network.allowed)), dtype=bool)
@@ -206,7 +206,7 @@ def greedy(solve: Manifold, holding: Holding, goal: Elastica) -> Elastica | None
     raised = lift(solve.width)
     way = take(
         raised, slice(0, int(np.searchsorted(raised.suspended, 0.95 * holding.length)))
-    )  # no force: nothing is less
+    )  # no force: the least need
     heading, turns = 0.5 * np.pi, np.linspace(-np.pi / 3, np.pi / 3, 25)
     while goal.x[0] - way.x[-1] > grid.spacing:
         if len(way.x) > _MOST_STEPS:
@@ -227,7 +227,7 @@ def greedy(solve: Manifold, holding: Holding, goal: Elastica) -> Elastica | None
 
 
 def _head(nodes: Elastica) -> int:
-    """Return the number of initial nodes without tangential force. Their positions say little about forces."""
+    """Return the number of initial nodes without tangential force. Their positions hardly determine forces."""
     pulls = np.abs(nodes.tangential_force) > 1e-9
     return int(np.argmax(pulls)) if pulls.any() else 0
 
@@ -268,7 +268,7 @@ def smoothed(
 def _along(
     solve: Manifold, nodes: Elastica, head: int, way: FloatArray, cut: Callable[[FloatArray], FloatArray]
 ) -> Elastica:
-    """Poses without moment on a way that goes on after the first `head` nodes, which are of the lift."""
+    """Return poses without moment on a path after the first `head` nodes, which belong to the lift."""
     from scipy.interpolate import CubicSpline
 
     places = cut(np.concatenate([poses_of(nodes)[:head], way]))

@@ -99,19 +99,19 @@ def train(
 
 
 def _drawn(count: int, draw: Callable[[int], tuple[FloatArray, FloatArray]]) -> Elastica:
-    """As many sheets as are asked for, at positions that are drawn; not all positions have one."""
+    """Return `count` sheets at random positions. Positions without a sheet are skipped."""
     x, z = draw(int(1.3 * count) + 100)
     pose = elastica(x, z)
     return take(pose, np.flatnonzero(pose.valid)[:count])
 
 
 def _even(random: np.random.Generator, count: int) -> Elastica:
-    """Sheets at positions spread evenly."""
+    """Return sheets at positions that are uniform over the grid."""
     return _drawn(count, lambda many: (random.uniform(0.0, WIDE, many), random.uniform(0.0, HIGH, many)))
 
 
 def _spread(random: np.random.Generator, count: int) -> Elastica:
-    """Sheets spread evenly over what the small network is asked: many of them where x is small."""
+    """Return sheets that are uniform over the questions to the small network: many have a small x."""
 
     def draw(many: int) -> tuple[FloatArray, FloatArray]:
         length = np.exp(random.uniform(np.log(_STRAIGHT[0]), np.log(_STRAIGHT[1]), many))

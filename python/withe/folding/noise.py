@@ -12,10 +12,10 @@ from withe.common import validation
 __all__ = ["Drawn", "Noise"]
 
 FloatArray = npt.NDArray[np.float64]
-_MOST = 2.0  # standard deviations; what is farther out is drawn again
-_LEAST_FRICTION = 0.01  # over that of the paper: a sheet without friction is no paper
-_WAVES = 6  # of the jitter
-_SLOWEST, _FASTEST = 0.5, 4.0  # of these [Hz]
+_MOST = 2.0  # standard deviations; values farther out are drawn again
+_LEAST_FRICTION = 0.01  # relative to the friction of the paper
+_WAVES = 6  # number of waves of the jitter
+_SLOWEST, _FASTEST = 0.5, 4.0  # their frequencies [Hz]
 _SHORTEST, _LONGEST = 0.03, 0.3  # waves of friction along the table [m]
 
 
@@ -114,7 +114,7 @@ class Drawn:
         )
 
     def friction_at(self, x: FloatArray) -> FloatArray:
-        """Friction at places along the table [m], over that of the paper; not below 0."""
+        """Return friction at places along the table [m], relative to that of the paper; at least 0."""
         amplitude, wave, phase = self.patches.T
         share = (amplitude * np.sin(np.multiply.outer(x, wave) + phase)).sum(axis=-1)
         return np.asarray(np.maximum(0.0, self.friction * (1.0 + share)))

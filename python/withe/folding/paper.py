@@ -68,7 +68,7 @@ class Paper:
         object.__setattr__(self, "outline", _checked_outline(self.outline))
 
     def _require_metres(self) -> None:
-        """Refuse what no paper is, and sizes in millimetres are."""
+        """Refuse sizes that no paper has, such as sizes in millimetres."""
         for name, value, most, what in (
             ("length", self.length, _LARGEST, f"{_LARGEST:g} m"),
             ("width", self.width, _LARGEST, f"{_LARGEST:g} m"),
@@ -139,7 +139,7 @@ def folded_share(target: str) -> float:
 
 
 def require_length(paper: Paper, planned: Paper) -> None:
-    """Refuse a sheet whose length differs from that of a plan: the jaw would hold it at another place."""
+    """Refuse a sheet whose length differs from that of a plan, since the jaw would hold it at a wrong place."""
     if paper.length != planned.length:
         raise ValueError(f"plan must be for a sheet of {paper.length:g} m, got one for {planned.length:g} m")
 

@@ -15,7 +15,7 @@ __all__ = ["add_paper", "jaw_stiffness", "strip_numbers"]
 
 FloatArray = npt.NDArray[np.float64]
 
-_DENSITY = 800.0  # of paper [kg/m^3]
+_DENSITY = 800.0  # density of paper [kg/m^3]
 _GRAVITY = 9.81  # [m/s^2], by which Lgb is defined
 
 

@@ -21,7 +21,7 @@ KIND, VERSION = "plan of a fold", 1
 _LIMITS = ("speed", "turning", "acceleration")
 _SHARES = ("gravito_bending_length", "friction")
 _FLAGS = ("valid", "stable")
-_ROUNDED = 1e-6  # of angles that quaternions tell [rad]
+_ROUNDED = 1e-6  # rounding error of angles from quaternions [rad]
 
 
 def sheet_listed(sheet: Elastica | None) -> dict[str, list[Any]] | None:

@@ -28,8 +28,8 @@ Grasp = Literal["moment_free", "free"]
 Source = Literal["exact", "network"]
 _POSES = 251
 _POSES_OF_REST = 101
-_TARGETS = 150  # along a sheet, of which a message says whether they can be reached
-_CURVATURE = 2.5  # [1/Lgb] at most, where nobody says
+_TARGETS = 150  # number of targets along a sheet that are tested for a message
+_CURVATURE = 2.5  # [1/Lgb], default of the greatest curvature
 _CLEARANCE = 2e-3  # [m] of an edge on its way over the sheet
 
 
@@ -298,7 +298,7 @@ def plan_above(present: FoldPlan, height: float) -> FoldPlan:
 
 
 def _anew_from(task: _Task, inner: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Poses of the jaw's inner edge, and forces near those of the sheet, by a search over the manifold."""
+    """Return poses of the inner edge of the jaw, and approximate forces of the sheet, by a search over the manifold."""
     start = task.solve([inner[0]], [inner[1]])
     if not start.valid[0]:
         raise ValueError(
@@ -362,7 +362,7 @@ def _checked_goal(goal: Elastica | None, task: _Task) -> Elastica:
 
 
 def _reachable(task: _Task) -> str:
-    """Between which targets a path leads to some, of those that stand evenly along the sheet."""
+    """Return a text with the range of targets that a path reaches, from targets evenly along the sheet."""
 
     def reaches(target: float) -> bool:
         goal = _goal(replace(task, target=target))

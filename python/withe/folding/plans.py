@@ -23,7 +23,7 @@ from withe.io import PlanFile, listed
 __all__ = ["SHORT", "FoldPlan", "flat_forces"]
 
 FloatArray = npt.NDArray[np.float64]
-SHORT = 0.5  # the same of a sheet that a plan knows: poses say little of so short a part [Lgb]
+SHORT = 0.5  # the same for the sheet of a plan [Lgb]: poses hardly determine so short a part
 _GRAVITY = 9.81  # [m/s^2]
 _COAST = 5e-3  # [m]
 _LOW = 1e-5  # an edge less high than this lies on the table [Lgb]

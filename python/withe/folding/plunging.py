@@ -25,26 +25,26 @@ from withe.folding.widths import free_width
 __all__ = ["plunge"]
 
 FloatArray = npt.NDArray[np.float64]
-_HEIGHTS = (0.4, 0.6, 0.8, 1.0)  # over the target, from which it goes down [Lgb]
+_HEIGHTS = (0.4, 0.6, 0.8, 1.0)  # heights over the target at which a plunge begins [Lgb]
 _NO_SLIDE = 1e-4  # [m]
-_SHORT = 0.2  # of the target, of a second try [Lgb]: where a sheet has slid back, it must lie under its edge
+_SHORT = 0.2  # distance before the target in a second try [Lgb]: the sheet must lie under the edge
 _CORRECTIONS = 4
 _ENOUGH = 5e-5  # [m]
-_CREASE = 0.5  # by which it moves with the edge
-_HOLDING = 0.3  # in the end [s]
-_BESIDE = (0.0, -5e-4, 5e-4, 5e-4, -5e-4)  # of where a jaw should be, that holds sheets at the bounds [m]
-_COARSE = {"edges": 75, "time_step": 0.02}  # of sheets at the bounds, whose creases are known to some 0.02 mm
+_CREASE = 0.5  # motion of the crease, relative to the edge
+_HOLDING = 0.3  # time at the end [s]
+_BESIDE = (0.0, -5e-4, 5e-4, 5e-4, -5e-4)  # errors of the jaw for sheets at the bounds [m]
+_COARSE = {"edges": 75, "time_step": 0.02}  # for sheets at the bounds; creases have errors of about 0.02 mm
 
 
 class _Tried:
-    """One sheet that a paper may be: led slowly to where plunges begin, once, and from there by every one of them."""
+    """One possible sheet of a paper. It is folded slowly once to the place where every plunge begins."""
 
     def __init__(self, slow: FoldPlan, sheet: SimulatedSheet, looks: int) -> None:
         self._sheet, self._target = sheet, slow.target
         self._held: Held | None = None
         self._from = slow.poses[-1:]
-        self.slide = 0.0  # until a plunge begins [m]
-        self._known = 0.0  # of that, what is seen [m]
+        self.slide = 0.0  # slide before a plunge begins [m]
+        self._known = 0.0  # visible part of this slide [m]
 
         def motions() -> Iterator[Motion]:
             if not looks:
@@ -157,8 +157,8 @@ def plunge(
                 raise ValueError(f"no plunge is possible: the sheet snaps before the plunge begins; {_needs(plan)}")
 
         best: Part | None = None
-        begin = 0.0  # aside, as the last way that folds the sheet
-        least = nearest = np.inf  # of the best way, and how far the crease is off on that which comes nearest
+        begin = 0.0  # shift of the last path that folds the sheet
+        least = nearest = np.inf  # errors of the best path, and of the path with the nearest crease
         for down in ways:
             aside, aimed = _aimed(tried[0], down, _SHORT * lgb, begin)
             way, begin = down(aside), aside if abs(aimed[0]) <= bound else 0.0
@@ -189,7 +189,7 @@ def _aimed(
     The secant method starts from `aside`. The crease moves by about half of the shift of the edge.
     """
     missed = sheet.missed(down(aside))
-    if not abs(missed[0]) <= short:  # its sheet slides back from under the edge
+    if not abs(missed[0]) <= short:  # the sheet slides back from under the edge
         aside = -short
         missed = sheet.missed(down(aside))
     slope = _CREASE

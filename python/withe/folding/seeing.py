@@ -21,15 +21,15 @@ from withe.perception.tracing import check_image, read_image
 __all__ = ["SeenEdge", "camera_over", "find_edge", "overhead_camera"]
 
 FloatArray = npt.NDArray[np.float64]
-_CORNERS, _QUALITY, _APART = 40, 0.05, 12.0  # at most, of the best, [px]
-_BLUR, _BLOCK = 1.5, 7  # of what is inside [px]: steps of single pixels along an edge look like corners
-_WINDOW = (5, 5)  # half of what a corner is refined by [px]
-_BORDER = 8  # of the picture, at which the sheet is cut off [px]
+_CORNERS, _QUALITY, _APART = 40, 0.05, 12.0  # greatest number; least quality, relative to the best; least distance [px]
+_BLUR, _BLOCK = 1.5, 7  # [px], since steps of single pixels along an edge look like corners
+_WINDOW = (5, 5)  # half size of the window that refines a corner [px]
+_BORDER = 8  # distance from the border of the picture at which a sheet is cut off [px]
 _PICTURE = (640, 480)  # width and height of a picture [px]
-_HEIGHT, _PIXEL = 0.6, 5e-4  # of an overhead camera, and of a pixel on the table under it [m]
-_EDGE_SHARE = 1 / 1.1  # of a picture's height that a far edge may span: room for the edge to turn and for _BORDER
-_OFF = 0.01  # of the width, by which two corners' distance may differ from it
-_TURN = np.radians(20.0)  # of an edge, at most
+_HEIGHT, _PIXEL = 0.6, 5e-4  # height of an overhead camera, and size of a pixel on the table [m]
+_EDGE_SHARE = 1 / 1.1  # greatest length of a far edge, relative to the height of a picture
+_OFF = 0.01  # allowed error of the distance of two corners, relative to the width
+_TURN = np.radians(20.0)  # greatest angle of an edge
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from withe.perception.tracing import check_image, read_image
 __all__ = ["strip_ends"]
 
 FloatArray = npt.NDArray[np.float64]
-_TIP = 10.0  # of the strip that says where it ends [px], and four times its thickness at least
+_TIP = 10.0  # length at the end that determines the tip [px], at least four times the thickness
 
 
 def strip_ends(image: npt.ArrayLike | str | os.PathLike[str]) -> tuple[float, float]:

@@ -36,7 +36,7 @@ def travel_times(poses: FloatArray, speed: float, turning: float, acceleration: 
     half = 0.5 * acceleration
     square = np.minimum(1.0, half / np.maximum(bend, 1e-12))  # u^2
     square[0] = square[-1] = 0.0
-    gain = 2.0 * half / speed * np.diff(q)  # of u^2 over a piece, at |p'| = speed
+    gain = 2.0 * half / speed * np.diff(q)  # change of u^2 over a piece, at |p'| = speed
     for i in range(1, len(q)):
         square[i] = min(square[i], square[i - 1] + gain[i - 1])
     for i in range(len(q) - 1, 0, -1):

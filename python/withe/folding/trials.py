@@ -30,7 +30,7 @@ from withe.folding.simulated_sheet import SimulatedSheet
 
 __all__ = ["Outcome", "Trial", "run_trials"]
 
-_SCALE = 4000.0  # of the picture of a strip [px/m]
+_SCALE = 4000.0  # scale of the picture of a strip [px/m]
 
 
 @dataclass(frozen=True)
@@ -190,12 +190,12 @@ def _workers(processes: int) -> Iterator[Executor]:
 
 
 def _begin() -> None:
-    """Ctrl-C on a terminal reaches every process: ours end without a word, and the one that asked says what it has."""
+    """End worker processes silently at Ctrl-C, which reaches every process. The main process reports its results."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def _alike(trials: list[Trial]) -> list[list[Trial]]:
-    """Those of one sheet that ask for one plan, open and watched: whoever carries them out plans once."""
+    """Group trials with the same sheet and the same plan, watched or not, so that each group plans only once."""
     groups: dict[Any, list[Trial]] = {}
     for trial in trials:
         planner, sheet = _hashable(trial.planner), _hashable(trial.sheet)
@@ -227,10 +227,10 @@ def _measured(paper: Paper, seed: int, noise: Noise, options: tuple[tuple[str, A
 
 @lru_cache(maxsize=4)
 def _planned(paper: Paper, target: float | str, options: tuple[tuple[str, Any], ...]) -> tuple[FoldPlan, float]:
-    """A plan, and the seconds that it took: trials of one sheet, watched or not, may ask for the same."""
+    """Return a plan, and its computing time [s]. Trials of one sheet, watched or not, share it."""
     began = time.thread_time()
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # of slide that is predicted: it is measured here
+        warnings.simplefilter("ignore", UserWarning)  # predicted slide is not reported, since it is measured here
         found = plan(paper, target, progress=False, **dict(options))
     return found, time.thread_time() - began
 

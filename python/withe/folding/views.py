@@ -36,7 +36,7 @@ def strip_picture(paper: Paper, curl: float, length: float, scale: float, random
     width, height = points.max(axis=0) + _MARGIN + [0.0, _MARGIN]
     size = int(np.ceil(width * scale)), int(np.ceil(height * scale))
     pixels = (points + np.array([0.0, _MARGIN])) * scale - 0.5
-    pixels = np.vstack([pixels[0] - [5.0, 0.0], pixels])  # it goes on into the clamp, beyond the border
+    pixels = np.vstack([pixels[0] - [5.0, 0.0], pixels])  # the strip continues into the clamp, beyond the border
     half = 0.5 * max(1.5, paper.thickness * scale)
     way = np.gradient(pixels, axis=0)
     across = half * way[:, ::-1] * [-1.0, 1.0] / np.linalg.norm(way, axis=1)[:, None]

@@ -62,7 +62,7 @@ def watched_parts(
         if len(poses) == 1:
             break
     if plunge is not None:
-        farther = latest - plan.offset - plan.plunge_slide  # than when the plunge was planned
+        farther = latest - plan.offset - plan.plunge_slide  # additional slide since the plunge was planned
         yield Part(plunge.times, np.vstack([poses[-1:], shifted(plunge.poses[1:], farther)]))
 
 

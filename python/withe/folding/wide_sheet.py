@@ -28,11 +28,11 @@ from withe.scene.scene import Scene
 __all__ = ["WideFold", "WideSheet"]
 
 FloatArray = npt.NDArray[np.float64]
-_IN_PLANE = 1e3  # times as stiff in its plane as out of it is a strip; more changes no spin by a hundredth of a degree
+_IN_PLANE = 1e3  # in-plane stiffness of a strip, relative to its bending; more changes no spin by 0.01 degrees
 _TWIST = 1.5  # G J / EI of a flat strip, Poisson's ratio 1/3
-_CROSS_WEIGHT = 0.05  # of what joins the far ends, per length, over that of a strip
-_RIB_WEIGHT = 1e-4  # the same of ribs
-_RIB_WIDTH = 0.96  # of the strip's
+_CROSS_WEIGHT = 0.05  # weight of the link of the far ends per length, relative to a strip
+_RIB_WEIGHT = 1e-4  # the same for ribs
+_RIB_WIDTH = 0.96  # relative to the width of a strip
 _RIB_SPACING = 0.02  # [m]: between ribs a layer sinks by micrometres
 
 

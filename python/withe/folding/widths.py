@@ -43,7 +43,7 @@ class Width:
         return SheetWidth() if self.even else SheetWidth(list(self.places), list(self.widths))
 
     def __getstate__(self) -> dict[str, object]:
-        """Without what is made for the engine, which is no part of a file or a copy."""
+        """Return the state without data for the engine, which files and copies do not contain."""
         return {"places": self.places, "widths": self.widths}
 
     def weight(self, place: FloatArray | float) -> FloatArray:
@@ -72,7 +72,7 @@ EVEN = Width()
 def free_width(paper: Paper, depth: float) -> Width:
     """Width of the part of a paper that hangs freely from a jaw, relative to the width of the paper."""
     if paper.is_strip:
-        return EVEN  # whatever its length: what was made for one serves all
+        return EVEN  # one object serves strips of every length
     lgb = paper.gravito_bending_length
     shares, widths = np.array(paper.outline).T
     beyond = shares * paper.length > depth

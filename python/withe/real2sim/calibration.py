@@ -248,7 +248,7 @@ def _solve(problem: CameraProblem, frames: list[int], free: BoolArray, bar: Prog
 
 
 def _calibration(problem: CameraProblem, found: dict[int, FloatArray], free: BoolArray) -> Calibration:
-    """Return the camera, with the focal length for a distance of one metre, which a picture of a plane does not show."""
+    """Return the camera, with the focal length for a distance of one metre, since pictures of planes do not show it."""
     last = next(reversed(found.values()))
     view = problem.view(last)
     forwards = np.cross(*view.axes)

@@ -381,7 +381,7 @@ class Linearisation:
         return first @ (turned / again), (again[:, None] * turned.T) @ (roots[:, None] * axes.T)
 
     def _full(self, inverse: Inverse, shift: float) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
-        """Return all modes: slow ones from the inverse, of which they are the greatest, and fast ones from the matrix."""
+        """Return all modes: slow ones (the greatest of the inverse) from the inverse, fast ones from the matrix."""
         from scipy.linalg import eig, eigh
 
         mass = self.mass
