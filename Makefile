@@ -30,7 +30,7 @@ PYTHON_SOURCES := $(shell find python/withe -name '*.py' -o -name '*.pyi' -o -na
 # Folders too: a deleted file is a change.
 SOURCE_FOLDERS := $(wildcard cpp/*/) $(shell find python/withe -type d -not -name __pycache__)
 
-.PHONY: help demo view learn test ctest-build ctest ctest-baseline pytest asan tsan asan-python bench wheel lint format format-check prose types stubs stub-check \
+.PHONY: help demo view learn test ctest-build ctest ctest-baseline pytest asan tsan asan-python bench docs wheel lint format format-check prose types stubs stub-check \
     tidy tidy-changed clean distclean
 
 help:
@@ -45,6 +45,7 @@ help:
 	@echo "make asan-python   random sequences of calls through Python under them; SEQUENCES=1000 SEED=7 runs others"
 	@echo "make wheel         dist/*.whl for machines without compiler"
 	@echo "make bench         all benchmarks (about an hour); NAME=work_precision runs one"
+	@echo "make docs          the documentation, into out/docs"
 	@echo "make lint          ruff; make format applies formatters, make format-check only looks"
 	@echo "make prose         house style of the prose on lines that changed since BASE="
 	@echo "make types         mypy --strict"
@@ -88,6 +89,11 @@ $(STAMPS)/dev_tools: $(STAMPS)/test_tools
 $(STAMPS)/bench_tools: $(STAMPS)/build_tools
 	@echo "Installing what the benchmarks compare with into .venv"
 	@$(PIP_INSTALL) $(call requirements,bench vision) rich
+	@touch $@
+
+$(STAMPS)/doc_tools: $(STAMPS)/build_tools
+	@echo "Installing what the documentation needs into .venv"
+	@$(PIP_INSTALL) $(call requirements,docs)
 	@touch $@
 
 # One build folder serves the installed module and the C++ tests, so the engine is compiled once.
@@ -153,6 +159,10 @@ asan-python: $(STAMPS)/build_tools
 
 bench: $(STAMPS)/installed $(STAMPS)/bench_tools
 	@python benchmarks $(NAME)
+
+docs: $(STAMPS)/installed $(STAMPS)/doc_tools
+	@python -m sphinx --jobs $(JOBS) --quiet --fail-on-warning --keep-going docs out/docs
+	@echo "Open out/docs/index.html"
 
 wheel: $(STAMPS)/dev_tools
 	@python tools/make_wheel.py

@@ -1,0 +1,47 @@
+"""Configuration of the documentation: `make docs` builds it into out/docs."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import pages
+
+import withe
+
+project, author, copyright = "withe", "The withe authors", "2026, the withe authors"
+release = version = withe.__version__
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.mathjax",
+    "sphinx.ext.napoleon",
+    "sphinx_copybutton",
+    "sphinx_design",
+]
+exclude_patterns = ["README.md"]
+source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
+
+myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
+myst_heading_anchors = 3
+
+autodoc_member_order = "groupwise"
+autodoc_typehints = "none"  # docstrings have types with shapes and units
+autosummary_generate = True
+autosummary_imported_members = True
+# Words in the types of attributes, such as the shape (frames, n), are the names of several attributes.
+suppress_warnings = ["ref.python"]
+napoleon_google_docstring = False
+napoleon_use_ivar = True
+napoleon_use_param = False
+napoleon_use_rtype = False
+default_role = "code"
+
+html_theme = "furo"
+html_title = f"withe {release}"
+html_static_path = []
+html_theme_options = {"navigation_with_keys": True}
+
+pages.write(Path(__file__).parent)
