@@ -184,7 +184,7 @@ def paragraphs_of(passage: Passage) -> Iterator[Lines]:
         if text.startswith(("```", "~~~")):
             in_fence = not in_fence
         in_doctest = bool(text) and (text.startswith((">>>", "...")) or in_doctest) and passage.kind != "markdown"
-        if not text or in_fence or in_doctest or text.startswith(("```", "~~~", "#!")) or not text.strip("-=~ "):
+        if not text or in_fence or in_doctest or text.startswith(("```", "~~~", "#!", ":")) or not text.strip("-=~ "):
             if paragraph:
                 yield paragraph
             paragraph, indent = [], -1
