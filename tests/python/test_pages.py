@@ -149,3 +149,11 @@ def robots_learn(names):
     assert names["seen"].shape == (100, 6)
     assert np.all(names["rewards"] < 0.0)
     assert names["policy"].predict(names["seen"][0])[0].shape == (2,)
+
+
+def test_the_readme_is_one_page_whose_links_lead_to_files():
+    text = (ROOT / "README.md").read_text()
+    assert len(text.split()) <= 900
+    links = [link for link in re.findall(r"\]\(([^)]+)\)", text) if "://" not in link]
+    assert len(links) > 15
+    assert [link for link in links if not (ROOT / link).exists()] == []
