@@ -15,9 +15,9 @@ from withe.perception.tracing import check_image, read_image
 
 __all__ = ["JAW", "Cable", "MeasuredCable", "measure"]
 
-JAW = 0.010  # [m] of a cable that a jaw holds
+JAW = 0.010  # [m], length of cable in a jaw
 _HIGHEST_LOOP, _THICKEST = 10.0, 0.5  # [m]
-LOOP_HEIGHT = 1.142240  # of a loop that hangs on a floor, touching it tangentially [Lgb]: 0.90660 (EI / w)^(1/3)
+LOOP_HEIGHT = 1.142240  # [Lgb], height of a hanging loop that touches the floor tangentially: 0.90660 (EI / w)^(1/3)
 _TABLE = {  # Lgb, radius, length [m] [Choi, dissertation, table 9.1]
     1: (0.018, 1.6e-3, 0.875),
     2: (0.032, 1.6e-3, 0.885),

@@ -23,10 +23,10 @@ from withe.recording import Record
 __all__ = ["DRAWN", "Deployment", "deploy", "drawn_setup", "hang", "place", "trial_cable"]
 
 FloatArray = npt.NDArray[np.float64]
-# Standard deviations of what a trial has and a planner does not know, at noise 1.
+# Standard deviations of the errors of a trial that a planner does not know, at noise 1.
 DRAWN = 10  # numbers of a trial
 _LGB, _FRICTION = 0.05, 0.20  # shares
-_LYING = 1.1  # [radii]: how high the centreline of what lies may be
+_LYING = 1.1  # [radii], greatest height of the centreline of a lying cable
 _CURVATURE, _OFFSET, _TURN = 0.5, 5e-4, np.radians(0.5)  # [1/m], [m], [rad]
 
 

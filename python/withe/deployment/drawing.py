@@ -15,7 +15,7 @@ __all__ = ["draw_plan"]
 
 FloatArray = npt.NDArray[np.float64]
 _MOST_SHOWN = 2.0  # coefficients of friction, by colours
-_MOST_DRAWN = 3.3  # and by lines: a little above what plans bear of a floor
+_MOST_DRAWN = 3.3  # by lines: a little above the greatest friction that plans accept
 
 
 def draw_plan(pattern: Pattern, jaw: FloatArray, found: Feasibility, title: str) -> Any:

@@ -23,7 +23,7 @@ __all__ = ["CURVATURES", "FORMS", "LENGTHS", "SHIPPED", "STIFFNESSES", "GraspNet
 
 FloatArray = npt.NDArray[np.float64]
 SHIPPED = Path(__file__).parent / "small.pt"
-LENGTHS = (0.1, 50.0)  # [Lgb]: what networks learn, and answer
+LENGTHS = (0.1, 50.0)  # [Lgb], range of training and of answers
 CURVATURES = (0.0, 4.0)  # [1/Lgb], to either side
 STIFFNESSES = (300.0, 8000.0)
 _LEAST_FORCE = 0.01  # [w Lgb]
@@ -68,7 +68,7 @@ def _learn(solutions: tuple[FloatArray, FloatArray, FloatArray, Grasp]) -> tuple
 
 
 FORMS = {
-    # Beyond some Lgb the rod hangs as a string does: what is learned is how it differs from one.
+    # A rod of many Lgb hangs like a string: the network learns the difference from a string.
     "small": Form(
         ("log of suspended length", "size of curvature", "log of stretch stiffness"),
         ("x", "y beside a string", "z above a string", "ex over side", "ey", "ez over side"),

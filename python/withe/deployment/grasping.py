@@ -18,7 +18,19 @@ __all__ = ["Grasp", "grasp"]
 
 FloatArray = npt.NDArray[np.float64]
 _BEND_STIFFNESS = 2.0  # EI in units of w Lgb^2
-_SHARES = (0.0, 0.15, 0.3, 0.45, 0.6, 0.75, 0.9, 1.05, 1.2, 1.4, 1.7)  # of the curvature that a push may be [w Lgb^2]
+_SHARES = (
+    0.0,
+    0.15,
+    0.3,
+    0.45,
+    0.6,
+    0.75,
+    0.9,
+    1.05,
+    1.2,
+    1.4,
+    1.7,
+)  # pushes that are tried, relative to the curvature [w Lgb^2]
 _CARRYING = 3.0  # [Lgb] along which a push is carried back at most
 _SLICK = 0.2  # coefficient of friction of the slickest floor that is planned for: it is to hold every push
 _THICKEST = 0.25  # [Lgb]: a rod's radius
@@ -252,7 +264,7 @@ def least_friction(
     own = np.stack([rows for rows, _ in candidates])[choice, column, 7]
     along = (own - _SLICK * np.abs(laid[:, None] - laid)).max(1)
     _, need = rows_at(along)
-    push = np.where(np.isfinite(need), along, own)  # own where there is no such grasp: the bend is too tight
+    push = np.where(np.isfinite(need), along, own)  # without such a grasp (too sharp a bend) its own push
     chosen, _ = rows_at(push, suspended)
     return _described(chosen, np.stack([suspended, curvature, push, push, push, push], -1), suspended.shape)
 

@@ -24,8 +24,8 @@ _USED = 8.0  # [Lgb]: farther up the jaw may bend it
 _ERROR = 5e-4  # [m]
 # Lengths below are in (EI / w)^(1/3) = 2^(1/3) Lgb.
 _TOP = 10.0  # height above the free end at which slopes are small
-_STRONGEST = 6.6  # over Ai, the slope up there of a cable that curls as much as is measured
-_SEEN_ASIDE = 1.08  # of a free end that hangs at 73 degrees: one row of a picture shows one point of the cable
+_STRONGEST = 6.6  # slope at the top of a cable with the greatest measurable curl, relative to Ai
+_SEEN_ASIDE = 1.08  # for a free end at 73 degrees: each row of a picture then shows one point of the cable
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ def measure_curvature(
             "curls up, so that aside does not determine its curvature"
         )
     (curvature, _), (slope, _) = _known()(total), _known()(total, 1)
-    # It hangs in the plane in which it bends: the curvature's components are as those of how far it hangs aside.
+    # It hangs in the plane of its bending: curvature and offset have the same direction.
     ratio = curvature / total if total > 0.0 else slope
     along, across = (x / total, away / total) if total > 0.0 else (1.0, 0.0)
     known = off * np.hypot(slope * along**2 + ratio * across**2, (slope - ratio) * along * across)

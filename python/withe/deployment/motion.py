@@ -124,7 +124,7 @@ class Piece:
         return self.reach / speed + self._ramp(speed)
 
     def _reached(self, speed: float) -> float:
-        """A speed, or what the way is long enough to reach."""
+        """Return a speed, or the greatest speed that the length of the path allows."""
         return min(speed, float(np.sqrt(self.reach * _ACCELERATION / 1.875)))
 
     def _ramp(self, speed: float) -> float:
@@ -212,7 +212,7 @@ def _on_floor(cable: Cable, path: Path) -> FloatArray:
 
 
 def _touch_down(cable: Cable, path: Path, way: Piece, start: Start) -> Piece:
-    """From the upright cable that stands on its free end, which rolls if it is free, to the first pose of laying."""
+    """Return the piece from the upright cable on its end, which rolls if it is free, to the first pose of laying."""
     suspended = (cable.length - 0.5 * JAW) / cable.gravito_bending_length
     angles = np.linspace(_UPRIGHT, 0.0, _PIVOT_ANGLES)
     found = pivoting(suspended, angles, cable.stretch_stiffness)
@@ -223,7 +223,7 @@ def _touch_down(cable: Cable, path: Path, way: Piece, start: Start) -> Piece:
     base = np.append(path.points[0], cable.radius)
     positions = base + _turned(forward, rolled + _in_jaw(cable, found))
     quaternions = _product(forward, _from_vectors(found.rotation))
-    # The last pose is that of laying, exactly: a method or a bent beginning may differ from the straight one.
+    # The last pose is exactly the first pose of laying, which may differ by the method or by a bent beginning.
     share = np.linspace(0.0, 1.0, _PIVOT_ANGLES)[:, None]
     blend = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
     positions = positions + blend * (way.positions[0] - positions[-1])

@@ -18,7 +18,7 @@ __all__ = ["train"]
 
 FloatArray = npt.NDArray[np.float64]
 _SAMPLES = {"small": 100_000, "source": 6358}
-_BEYOND = 1.03  # of the range: at the edge of its samples a network is worst
+_BEYOND = 1.03  # relative to the range: a network is worst at the border of its samples
 
 
 @keyword_hints
@@ -100,7 +100,7 @@ def _even(random: np.random.Generator, count: int) -> tuple[FloatArray, FloatArr
 
 
 def _spread(random: np.random.Generator, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Questions spread evenly over what the small network is asked, and a little beyond where there are grasps."""
+    """Return uniform questions over the range of the small network, and slightly beyond it if there are grasps."""
     length = np.exp(random.uniform(np.log(LENGTHS[0]), np.log(_BEYOND * LENGTHS[1]), count))
     curvature = random.uniform(0.0, _BEYOND * CURVATURES[1], count)
     low, high = np.log(STIFFNESSES[0] / _BEYOND), np.log(STIFFNESSES[1] * _BEYOND)

@@ -23,15 +23,15 @@ FloatArray = npt.NDArray[np.float64]
 MotionOf = Callable[[Path, Method], Motion]
 _KNOTS = 1.0  # [Lgb] between the knots of the shift
 _COLOURS = 7  # knots so far apart are shifted at the same time: each moves the cable 3.5 knots to either side
-_PROBE = 5e-4  # [m] by which knots are shifted to see what moves
-_NODES, _NODES_PER_LGB = 100, 4  # of the cable in the engine
+_PROBE = 5e-4  # [m], shift of knots for differences
+_NODES, _NODES_PER_LGB = 100, 4  # nodes of the cable in the engine
 _TIME_STEP = 0.2  # [s]
 _PATH_POINTS_PER_LGB = 5
-_DAMPING = 0.03  # of the greatest diagonal entry
-_ROUNDS = 3  # of derivatives by differences
-_STEPS = 4  # of Gauss-Newton's method with each
-_GOOD = 2e-4  # [m]: better than the engine tells at this coarseness
-_GAIN = 0.97  # of the error that a step must leave at most to go on
+_DAMPING = 0.03  # relative to the greatest diagonal entry
+_ROUNDS = 3  # number of derivatives by differences
+_STEPS = 4  # steps of Gauss-Newton's method with each
+_GOOD = 2e-4  # [m], below the accuracy of the engine with this mesh
+_GAIN = 0.97  # greatest ratio of errors after and before a step; otherwise the search ends
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Trial:
 
 
 class _Engine:
-    """Lays the cable quasi-statically along paths, and says where it comes to lie."""
+    """Simulation that lays the cable quasi-statically along paths, and returns its final positions."""
 
     def __init__(self, path: Path, setup: Setup, pattern: Pattern, motion_of: MotionOf, shown: Progress) -> None:
         self.setup, self.motion_of, self.shown = setup, motion_of, shown
@@ -65,7 +65,7 @@ class _Engine:
         self.places = np.stack([np.interp(self.s, pattern.arc_length, pattern.points[:, i]) for i in range(2)], 1)
 
     def trial(self, shift: FloatArray, method: Method) -> Trial | None:
-        """None where there is no such way, or the engine finds no equilibrium on it."""
+        """Return a trial; None if there is no such path, or if the engine finds no equilibrium on it."""
         self.shown.advance(1)
         try:
             motion = self.motion_of(_shifted(self.path, self.basis, shift), method)
@@ -81,7 +81,7 @@ class _Engine:
         """
         first = self.path.points[0]
         back = _turn(-trial.shift[-1] / self.path.length)
-        laid = (trial.away + self.places - first - trial.shift[-3:-1]) @ back  # as if it had not been moved
+        laid = (trial.away + self.places - first - trial.shift[-3:-1]) @ back  # without the rigid motion
         wanted = self.places - first
         centred, target = laid - laid.mean(0), wanted - wanted.mean(0)
         turned = np.stack([-centred[:, 1], centred[:, 0]], 1)

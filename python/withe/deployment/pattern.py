@@ -32,14 +32,17 @@ _COLUMNS: dict[str, tuple[int, ...]] = {  # arrays of a pattern, by node
     "curvature_bend": (),
 }
 _FUNCTION_SAMPLES = 2001
-_SLOWEST = 0.15  # of the way along the curve over that along what was given, where it turns back by 160 degrees
+_SLOWEST = 0.15  # least speed of the curve relative to the given points, reached where it turns back by 160 degrees
 _MUCH_FARTHER = 1.5
 _AT_ONCE = 500  # points whose distances from all pieces of a curve are in memory
 _AVERAGED = 101  # samples of an average
-_REACH = 0.02  # of the length: a chord at an end
+_REACH = 0.02  # relative to the length: chord at an end
 _ENOUGH = 10.0  # [smoothing], for a direction
-_LEAST_BEHIND, _MOST_BEHIND = 0.1, 0.5  # of a pattern's length, in which what lies behind it becomes straight
-_BENT_START = 1.0  # [rad]: curvature at a function's start times its length that asks for a lead-in
+_LEAST_BEHIND, _MOST_BEHIND = (
+    0.1,
+    0.5,
+)  # relative to the length of a pattern: distance over which the continuation becomes straight
+_BENT_START = 1.0  # [rad]: curvature at the start of a function times its length; above it a lead-in is added
 
 
 @keyword_hints
@@ -271,7 +274,7 @@ class Pattern:
         s = spacing * np.arange(int(travelled[-1] / spacing) + 1)
         curve = make_interp_spline(s, curve(np.interp(s, travelled, fine)), k=5)
         points, first, second, third = (curve(s, order) for order in range(4))
-        fourth = fourth_differences(len(s)) @ points / spacing**4  # what smoothing kept small
+        fourth = fourth_differences(len(s)) @ points / spacing**4  # smoothing keeps it small
         curvature = _cross(first, second)
         self.arc_length, self.points = s[:nodes], points[:nodes]
         self.tangent: FloatArray = (first / np.linalg.norm(first, axis=1)[:, None])[:nodes]
@@ -310,7 +313,7 @@ class Pattern:
             raise ValueError("arc_length must increase from 0")
         for name, shape in _COLUMNS.items():
             setattr(pattern, name, validation.number_array(content[name], name, (count, *shape)))
-        behind = content.get("curvature_behind", [0.0])  # as in files from before that was kept
+        behind = content.get("curvature_behind", [0.0])  # absent in older files
         pattern.curvature_behind = validation.number_array(behind, "curvature_behind", ("n",))
         pattern.deviation = validation.non_negative(content["deviation"], "deviation")
         pattern.lead_in = validation.non_negative(content["lead_in"], "lead_in")
@@ -394,7 +397,7 @@ def distances(points: FloatArray, curve: FloatArray) -> FloatArray:
 
 
 def _require_smooth(speed: FloatArray, s: FloatArray) -> None:
-    """Refuse curves that stand still for a moment, where they turn back [m]."""
+    """Refuse curves whose speed vanishes where they turn back [m]."""
     slowest = int(speed.argmin())
     if speed[slowest] < _SLOWEST:
         raise ValueError(

@@ -76,7 +76,7 @@ def posts_along(
 
 
 def require_room(posts: Sequence[Post], pattern: Pattern, cable: Cable) -> None:
-    """Refuse posts that stand on the pattern."""
+    """Refuse posts on the pattern."""
     for post in posts:
         if not isinstance(post, Post):
             raise ValueError(f"posts must be withe.deployment.Post, got {post!r:.80}")

@@ -30,10 +30,10 @@ __all__ = ["LayPlan", "PlanMethod", "plan"]
 
 FloatArray = npt.NDArray[np.float64]
 PlanMethod = Literal["exact", "least_friction", "optimised", "network", "intuitive"]
-_TAIL_SHARES = (1.0, 0.5, 0.5, 0.5)  # of the one before, where a tail crosses
-_TAIL = 4.0  # [Lgb] of cable beyond the pattern, where there is so much: shorter ends need much friction
+_TAIL_SHARES = (1.0, 0.5, 0.5, 0.5)  # length relative to the previous one, if a tail crosses
+_TAIL = 4.0  # [Lgb], preferred length of cable beyond the pattern: shorter ends need much friction
 _OPTIMISING_SPEED, _OPTIMISING_STEP = 0.025, 0.04  # [m/s], [s]: of quasi-static runs, where only the way counts
-_MUCH_LONGER = 50.0  # than its cable: a pattern in millimetres
+_MUCH_LONGER = 50.0  # length of a pattern relative to its cable; above it, the pattern is in millimetres
 _MOST_FRICTION = 3.0  # no floor has more
 
 
@@ -310,7 +310,7 @@ def _improved(
 
 
 def _needed(pattern: Pattern, cable: Cable, method: Method, grasps: Grasp, helped: bool) -> FloatArray:
-    """Friction that each place of the pattern needs; refused if no floor has it and nothing else helps."""
+    """Return the friction that each place of the pattern needs. Unless `helped`, refuse impossible friction."""
     count = len(pattern.points)
     force = np.concatenate([grasps.force, np.repeat(grasps.force[-1:], count, axis=0)])[:count]
     found = examine(pattern, cable, _MOST_FRICTION, method, force)
@@ -329,7 +329,7 @@ def _slips(pattern: Pattern, needed: FloatArray, friction: float) -> str:
 
 
 def _worst_slip(found: Feasibility) -> Slip | None:
-    """The stretch that needs most, of those that no floor holds."""
+    """Return the stretch with the greatest needed friction, among stretches that no floor holds."""
     slips = [slip for slip in found.slips if slip.test in ("floor", "lift-off")]
     return max(slips, key=lambda slip: slip.needed, default=None)
 
@@ -372,7 +372,7 @@ def _held(cable: Cable, pattern: Pattern, tail: float | None) -> tuple[Cable, fl
 
 
 def _uncrossed(pattern: Pattern, cable: Cable, tail: float | None) -> tuple[Cable, float, Path]:
-    """The longest of a few tails that does not cross the pattern or itself, or the one that was asked for."""
+    """Return the longest of a few tails that does not cross the pattern or itself, or the requested tail."""
     if len(pattern.crossings):
         first, second = 1e3 * pattern.crossings[0]
         where = f"but does at {first:.0f} and {second:.0f} mm"

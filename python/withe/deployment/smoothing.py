@@ -10,8 +10,8 @@ import numpy.typing as npt
 __all__ = ["fourth_differences", "least_tension", "smooth"]
 
 FloatArray = npt.NDArray[np.float64]
-_POWERS = (2, 4, 8)  # of the norm that stands for the greatest value
-_ROUNDS = 12  # of Newton's method at each
+_POWERS = (2, 4, 8)  # powers of the norm that replaces the greatest value
+_ROUNDS = 12  # iterations of Newton's method at each
 _BARRIER = 1e-2
 
 
@@ -26,7 +26,7 @@ class _Norm:
         return np.asarray(np.linalg.norm((self.matrix @ x + self.offset).reshape(2, -1), axis=0))
 
     def rounding(self, x: FloatArray) -> float:
-        """Bound of what rounding leaves of the rows."""
+        """Return a bound on the rounding error of the rows."""
         return float(np.finfo(float).eps * (abs(self.matrix) @ np.abs(x) + np.abs(self.offset)).max())
 
     def value(self, x: FloatArray) -> float:
@@ -71,7 +71,7 @@ def _solved(root: Any, rest: Any, right: FloatArray) -> FloatArray:
 
 
 def _minimised(norm: _Norm, x: FloatArray, extra: Any) -> FloatArray:
-    """Newton's method in norms of rising power; `extra(x)` gives value, gradient and Hessian of what is added."""
+    """Minimise norms of increasing power by Newton's method. `extra(x)` is an additional term with its derivatives."""
     for power in _POWERS:
         scale = float(norm.sizes(x).max())
         if scale <= norm.rounding(x):  # a straight line
@@ -146,7 +146,7 @@ def least_tension(middle: FloatArray, across: FloatArray, along: FloatArray, spa
     mean = sparse.diags([0.5 * middle[1:], 0.5 * middle], [-1, 0], shape=shape)
     slope = sparse.diags([-1.0 / spacing, 1.0 / spacing], [-1, 0], shape=shape)
     norm = _Norm(sparse.vstack([-mean, slope]).tocsr(), np.concatenate([across, along]))
-    light = 1e-9 * sparse.identity(count)  # where nothing is needed any tension would do
+    light = 1e-9 * sparse.identity(count)  # otherwise any tension would be a solution where none is needed
 
     def ridge(x: FloatArray) -> tuple[float, FloatArray, Any]:
         return 0.5e-9 * float(x @ x), 1e-9 * x, light
@@ -170,7 +170,7 @@ def fourth_differences(count: int) -> Any:
 
 
 def _quadratic(both: Any, raw: FloatArray, deviation: FloatArray) -> FloatArray:
-    """Least squares of what the floor gives, weighed against those of the distance so that the greatest is 0.9."""
+    """Return least squares of floor forces and distances, weighted such that the greatest distance is 0.9."""
     from scipy import sparse
 
     near = np.tile((deviation.min() / deviation) ** 2, 2)

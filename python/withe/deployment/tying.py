@@ -22,10 +22,10 @@ from withe.simulation.hands import RunningHand
 __all__ = ["Move", "Tying", "tie"]
 
 FloatArray = npt.NDArray[np.float64]
-_OPENING = 0.012  # [m] from where a gripper reaches to what it still takes hold of
-_HIGHER = 1.2  # [m] by which a cable hangs higher than the one that is laid before it
-_LOWERED = 3.0  # [s] in which it comes down from there
-_RESTS = 0.5  # [s] after grippers have opened
+_OPENING = 0.012  # [m], greatest distance at which a gripper still grasps a cable
+_HIGHER = 1.2  # [m], additional height of a hanging cable above the one that is laid before it
+_LOWERED = 3.0  # [s], time of its lowering
+_RESTS = 0.5  # [s], after grippers have opened
 _LEG = 2.0  # [s] from point to point
 
 
@@ -187,7 +187,7 @@ def _check(
 
 
 class _Table:
-    """The floor, what lies and hangs there, and what was done."""
+    """The floor, its lying and hanging cables, and the moves so far."""
 
     def __init__(self, plans: Sequence[LayPlan], setups: Sequence[Setup]) -> None:
         self.plans, self.setups = plans, setups

@@ -23,10 +23,10 @@ __all__ = ["ROLLING_FRICTION", "Motion", "Setup", "hung", "jaw_path", "jaw_stiff
 FloatArray = npt.NDArray[np.float64]
 _DENSITY, _VISCOUS_TIME, _GRAVITY = 1180.0, 0.02, 9.81  # [kg/m^3], [s], [m/s^2]
 _SETTLING = 2.0  # [s] after the jaw has opened
-ROLLING_FRICTION = 0.01  # of the floor: a couple over normal force times radius, that of rubber on what is hard
-_JAW_STIFFNESS = (2e3, 0.05)  # [N/m, N m/rad], of its pads at least; and so many times EI / Lgb^3, EI / Lgb
+ROLLING_FRICTION = 0.01  # couple over normal force times radius: rubber on a hard floor
+_JAW_STIFFNESS = (2e3, 0.05)  # [N/m, N m/rad], least stiffness of its pads; ratios to EI / Lgb^3, EI / Lgb follow
 _JAW_RATIOS = (1e4, 300.0)
-_STRESSED = 1.0  # [s] in which a cable that is put down takes its stress
+_STRESSED = 1.0  # [s], time in which a placed cable reaches its stress
 _RECORD_EVERY = 0.1  # [s]
 
 
@@ -128,7 +128,7 @@ def place(setup: Setup, points: FloatArray, *, progress: bool) -> tuple[FloatArr
     record : Record
     """
     scene, cable = _scene(setup, np.column_stack([points, np.full(len(points), setup.cable.radius)]))
-    scene.ignore_contact(cable, cable)  # where a pattern touches itself, the cable lies in itself
+    scene.ignore_contact(cable, cable)  # at places where a pattern touches itself, the cable overlaps itself
     simulation = scene.build(integrator=_integrator(setup), time_step=setup.time_step, planar=False)
     simulation.set(cable, natural_curvature=(0.0, 0.0), over=_STRESSED)
     duration = _STRESSED if setup.quasi_static else _STRESSED + _SETTLING
@@ -217,7 +217,7 @@ def jaw_path(setup: Setup, motion: Motion, begin: Any) -> Any:
 
     def at(time: float) -> tuple[FloatArray, Any]:
         time = float(np.clip(time, motion.times[0], motion.times[-1]))
-        rise = min(1.0, time)  # [s]: what is wrong comes in smoothly
+        rise = min(1.0, time)  # [s]: errors increase smoothly
         return where(time) + rise * offset, turn**rise * Rotation.from_quat(turned(time)) * first * drawn
 
     return at
