@@ -324,7 +324,7 @@ def add_goals(report: Report, flights: list[Flight]) -> None:
             report.goal(f"{integrator}: angular momentum", worst_of(own, "angular"), 1e-9, at_least=False)
         if integrator != "backward_euler":  # its forces act at the end of a step, and their work differs slightly
             report.goal(f"{integrator}: dissipated comes back", worst_of(own, "fed"), 1e-9, at_least=False)
-        if integrator == "implicit_midpoint":  # plain, and so without a bound: it warns
+        if integrator == "implicit_midpoint":  # the plain rule has no bound, and warns
             continue
         conserves = integrator in ("energy_momentum", "fourth_order")
         limit = 1e-6 if conserves else 1e-3

@@ -101,7 +101,7 @@ def draw(simulation: withe.Simulation, path: Path) -> None:
 
 
 def main() -> int:
-    """Compare, draw, and say whether it fits."""
+    """Compare, draw, and return whether the results agree."""
     simulation, seconds = sagging_rod(nodes=201)
     tip = shape(simulation)[-1]
     error = float(np.linalg.norm(tip - TIP))

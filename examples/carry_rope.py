@@ -22,12 +22,12 @@ LIFT, ASIDE = 0.3, 0.35  # [m]
 PICKED = np.array([(0.0, 0.0), (0.7, LIFT), (1.2, LIFT), (1.7, 0.10)])  # time [s], height over the floor [m]
 CARRIED = (0.5, 1.5)  # begin and end of the way aside [s]
 SETTLED = 1.5  # after the hand has opened [s]
-STIFFNESS = (2e3, 2.0)  # of the hand [N/m], [N m/rad]
+STIFFNESS = (2e3, 2.0)  # stiffness of the hand [N/m], [N m/rad]
 FINGER = 0.03  # [m]
 
 
 def scene_of() -> tuple[withe.Scene, withe.Rod]:
-    """The rope on the floor, and two fingers that touch nothing: they show where the hand is."""
+    """Return the rope on the floor, and two fingers without contact, which show the position of the hand."""
     scene = withe.Scene()
     cotton = withe.Material(youngs_modulus=1.5e6, poisson_ratio=0.4, density=700.0, viscosity=6e3)
     start, end = (-0.5 * LENGTH, 0.0, RADIUS), (0.5 * LENGTH, 0.0, RADIUS)

@@ -23,7 +23,7 @@ import numpy as np
 
 import withe
 
-RADIUS, PITCH, HEIGHT, NODES = 0.01, 0.05, 0.2, 68  # of a helix [m]
+RADIUS, PITCH, HEIGHT, NODES = 0.01, 0.05, 0.2, 68  # of a helix [m], [m], [m], [-]
 THICKNESS, SIDE, RATE = 1e-3, 0.03, 15.0  # radius of a flagellum [m], side of the polygon [m], turning [rad/s]
 VISCOSITY, REGULARIZATION = 0.1, 1.02e-3  # [Pa s], [m]
 TURN_LENGTH = float(np.hypot(2.0 * np.pi * RADIUS, PITCH))

@@ -27,13 +27,13 @@ PREPARED, PREPARED_STEP = 9.0, 5e-3  # [s]
 STEP = 1e-3  # [s]
 MODELS: tuple[withe.parts.ContactModel, ...] = ("imcv2", "barrier")
 LABELS = {"imcv2": "IMCv2", "barrier": "barrier"}
-BLOCK = 50  # steps that one model takes before the other goes on
-MOST_APART = 0.05  # of the radius
+BLOCK = 50  # number of steps of one model before those of the other
+MOST_APART = 0.05  # relative to the radius
 
 
 @dataclass
 class Run:
-    """One simulation and what its steps took: arrays with an entry a step, those without contact too."""
+    """One simulation and the cost of its steps: arrays with an entry per step, also for steps without contact."""
 
     simulation: withe.Simulation
     contacts: list[int] = field(default_factory=list)
@@ -65,7 +65,7 @@ class Run:
                 return
 
     def means(self) -> tuple[float, float, float, float]:
-        """Contacts, iterations, milliseconds, and those without the fluid, over the steps with contact."""
+        """Return means over steps with contact: contacts, iterations, milliseconds with and without the fluid."""
         touching = np.array(self.contacts) > 0
         if not touching.any():
             return 0.0, np.nan, np.nan, np.nan

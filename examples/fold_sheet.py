@@ -21,12 +21,12 @@ from withe import folding
 
 EDGES, TIME_STEP = 150, 0.01  # [s]
 SLIDE_OFF = 2e-4  # [m]
-MOMENTS = 5  # of a film
+MOMENTS = 5  # number of pictures of a film
 SHEET, JAW, GHOST = "#00798c", "#d1495b", "#c9d1d6"
 
 
 def film(axes: np.ndarray, fold: folding.Fold, jaw: folding.Jaw, title: str) -> None:
-    """The sheet from the side at moments in a row, before what it was at those in between."""
+    """Draw the sheet from the side at some moments, in front of its shapes between these moments."""
     record = fold.record
     frames = np.linspace(0, len(record) - 1, MOMENTS).round().astype(int)
     positions = 1e3 * record.positions("sheet")

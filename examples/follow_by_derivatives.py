@@ -25,7 +25,7 @@ import withe
 
 EFFORT = 1e-3  # square root of w [m]
 SEGMENTS, NODES, CONTROL_STEP = (3, 4, 4, 4, 4), 21, 0.1  # [s]
-BEND_STEP = 0.05  # that an action adds to the discrete curvature of a segment, in sum
+BEND_STEP = 0.05  # total discrete curvature that an action adds to a segment
 
 
 class Controller:
@@ -72,9 +72,9 @@ class Controller:
         return np.clip(found, -1.0, 1.0)  # rounding
 
     def responses(self, arm: withe.Simulation, steps: int) -> list[np.ndarray]:
-        """K_1, K_2 ..: where the tip goes for a unit of each action, shape (3, 10) [m]."""
+        """Return K_1, K_2, ...: displacements of the tip per unit of each action, shape (3, 10) [m]."""
         now = arm.copy()
-        now.set("arm", natural_curvature=arm.get("arm", "natural_curvature"))  # on its way to nowhere else
+        now.set("arm", natural_curvature=arm.get("arm", "natural_curvature"))  # ends any ramp of the natural curvature
         A, B = now.step_jacobian([("arm", "natural_curvature")])
         if self._tip is None:
             self._tip = tip_of_state(arm, A.shape[0])

@@ -27,13 +27,18 @@ import withe
 ARMS, HORIZON, CONTROL_STEP = 16, 8, 0.1  # [-], control steps, [s]
 SEGMENTS, BEND_STEP, MOST_BEND = np.array([3, 4, 4, 4, 4]), 0.05, 2.0
 EDGES = 20  # on 1 m
-LOW, HIGH, SPEED, TURNING = np.array([-0.6, -0.6, 0.3]), np.array([0.6, 0.6, 0.9]), 0.5, 0.025  # of the target
+LOW, HIGH, SPEED, TURNING = (
+    np.array([-0.6, -0.6, 0.3]),
+    np.array([0.6, 0.6, 0.9]),
+    0.5,
+    0.025,
+)  # limits, speed and turning of the target
 NEAR = 0.03  # e [m]
 LENGTH_OF_EPISODE = 500
 
 
 class Policy:
-    """A small network, asked as Stable-Baselines3's policies are."""
+    """A small network with the interface of policies of Stable-Baselines3."""
 
     def __init__(self, seed: int) -> None:
         torch.manual_seed(seed)
@@ -89,7 +94,7 @@ class Pursuit:
         return np.concatenate([part.ravel() for part in parts]).astype(np.float32)
 
     def go(self, policy: Policy) -> tuple[np.ndarray, np.ndarray]:
-        """A horizon: what was seen (HORIZON, 79), and derivatives of L by the actions (HORIZON, 10)."""
+        """Return observations (HORIZON, 79) of one horizon, and derivatives of L by its actions (HORIZON, 10)."""
         steps, count = round(CONTROL_STEP / self.arm.time_step), iter(range(10**9))
         seen, targets, free, slopes = [], [], [], []
 
@@ -130,7 +135,7 @@ class Pursuit:
 
 
 def learn(steps: int, seed: int, curve: Curve) -> Policy:
-    """The policy after so many control steps of all arms together."""
+    """Return the policy after a total number of control steps of all arms."""
     policy, generator = Policy(seed), np.random.default_rng(seed)
     drawn = withe.learning.Follow().build(generator)
     pursuits = [Pursuit(drawn, each) for each in generator.spawn(ARMS)]

@@ -28,7 +28,7 @@ import numpy as np
 import withe
 
 LENGTH, RADIUS, MODULUS, DENSITY, NODES = 1.0, 2e-3, 1.8e5, 1180.0, 301
-SPEED = 1e-2  # of each grip [m/s]
+SPEED = 1e-2  # speed of each grip [m/s]
 FRICTIONS, MODULI = (0.1, 0.3, 0.5), (1.8e4, 1.8e5, 1.8e6, 1.8e7)
 DURATION, SHORT = 13.0, 6.4  # [s]
 DRAWING = {"reef": withe.knots.reef_knot, "granny": withe.knots.granny_knot}

@@ -19,11 +19,11 @@ import numpy as np
 import withe
 
 LIMBS, NODES, LENGTH, RADIUS = 5, 60, 0.3, 5e-3  # [m]
-SIDE = 0.015  # of the pentagon of their tops [m]
+SIDE = 0.015  # side of the pentagon of their tops [m]
 LARGEST = np.radians(39.0)  # turn of a stencil, half of which is reached
 CURLING = 10.0  # [s]
 TIME_STEP = 2.5e-3  # [s]
-DEEPEST = 0.05  # of a radius
+DEEPEST = 0.05  # relative to a radius
 
 
 def build(friction: float, seed: int) -> tuple[withe.Simulation, list[withe.Rod], np.ndarray]:

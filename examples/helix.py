@@ -14,7 +14,7 @@ import numpy as np
 
 import withe
 
-REST_TIP = (-0.016275, -0.000590, -0.198762)  # of the public code [m]
+REST_TIP = (-0.016275, -0.000590, -0.198762)  # result of the public code [m]
 
 
 def centreline() -> np.ndarray:
@@ -27,7 +27,7 @@ def centreline() -> np.ndarray:
 
 
 def build(integrator: str, time_step: float = 5e-3) -> withe.Simulation:
-    """The helix, free of stress as it is drawn, with its first edge held."""
+    """Return the helix, drawn without stress, with its first edge clamped."""
     scene = withe.Scene(gravity=(0.0, 0.0, -9.8))
     silicone = withe.Material(youngs_modulus=1.0e7, poisson_ratio=0.5, density=1273.52)
     helix = scene.add_rod(points=centreline(), radius=5e-3, material=silicone, name="helix")

@@ -79,7 +79,7 @@ def tie(n: int, nodes: int, shortening: float, friction: float, drag: float) -> 
         friction=friction, friction_model="lagged", slip_tolerance=1e-5, stiffness=9.0 * BENDING / RADIUS**3
     )
     simulation = scene.build(integrator="backward_euler", time_step=TIME_STEP)
-    # The second drag is the one under which waves of the tails die soonest; left alone they shake the pull by 4 %.
+    # With the second drag, waves of the tails decay fastest. Without it they change the pull by 4 %.
     for duration, slowing in ((4.0, 0.2), (10.0, 0.02)):
         simulation.set(damping, drag=slowing)
         simulation.step(round(duration / TIME_STEP))

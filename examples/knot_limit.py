@@ -25,7 +25,7 @@ import withe
 RADIUS, MODULUS, DENSITY = 1e-3, 1e6, 1000.0  # [m], [Pa], [kg/m^3]
 BENDING = MODULUS * np.pi * RADIUS**4 / 4.0  # [N m^2]
 LINE_DENSITY = DENSITY * np.pi * RADIUS**2  # [kg/m]
-TAIL = 1.3  # length over e: what bends there decays within 0.22 e
+TAIL = 1.3  # length over e; bending decays within 0.22 e
 NORMAL_FORCES = 0.492
 TOLERANCE = 0.03
 
@@ -36,8 +36,8 @@ class Knot(NamedTuple):
     epsilon: float
     shortening: float  # e [m]
     energy: float  # [J]
-    pull: float  # of the grips, over that of the limit
-    normal_forces: float  # over epsilon^3 B / h^2
+    pull: float  # pull of the grips, relative to that of the limit
+    normal_forces: float  # relative to epsilon^3 B / h^2
 
 
 def centreline(epsilon: float) -> np.ndarray:
@@ -68,7 +68,7 @@ def rest(epsilon: float) -> tuple[Knot, withe.Simulation]:
     rope = scene.add_rod(points=points, radius=RADIUS, material=rubber, natural="straight", name="rope")
     grips = [scene.clamp(node, hold="edge", spin=True) for node in (rope.start, rope.end)]
     size = 2.0 * np.pi * RADIUS / epsilon**2
-    time = size**2 * np.sqrt(LINE_DENSITY / BENDING) / 20.0  # in which waves of bending run round the loop
+    time = size**2 * np.sqrt(LINE_DENSITY / BENDING) / 20.0  # time of bending waves around the loop
     scene.add_drag(3.0 * LINE_DENSITY / time)
     # Forces spread over some hundred edges, surfaces a hundredth of a radius deep.
     scene.enable_contact(stiffness=0.75 * epsilon**3 * BENDING / RADIUS**3)
@@ -86,7 +86,7 @@ def rest(epsilon: float) -> tuple[Knot, withe.Simulation]:
 
 
 def pulls_between(knots: list[Knot]) -> tuple[np.ndarray, np.ndarray]:
-    """Epsilon, and the mean pull between neighbours over that of the limit, 2 pi^2 B / e^2."""
+    """Return epsilon, and the mean pull between neighbours, relative to the limit 2 pi^2 B / e^2."""
     e, energy = np.array([k.shortening for k in knots]), np.array([k.energy for k in knots])
     limit = 2.0 * np.pi**2 * BENDING * np.diff(1.0 / e)
     return np.sqrt(2.0 * np.pi * RADIUS / np.sqrt(e[1:] * e[:-1])), np.diff(energy) / limit

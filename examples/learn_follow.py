@@ -21,13 +21,13 @@ import numpy as np
 import withe
 
 DISCOUNT = 0.99
-HORIZON = 0.9  # discount that is learned with: what is done now is seen within a second
+HORIZON = 0.9  # discount of the training: effects of an action are visible within a second
 PUBLISHED = 99.0  # discounted return after 3e6 steps [arXiv 2511.06667]
 BETWEEN = 50_000  # control steps from one look to the next
 
 
 class Aimed(withe.learning.Follow):
-    """Follow, where the learner is told besides how its target lies from the tip, as through a lens within 0.1 m."""
+    """Task `Follow` with the additional observation of the target relative to the tip, enlarged within 0.1 m."""
 
     def observe(self, robots: withe.Batch) -> np.ndarray:
         """Observations of each robot, shape (n, 79)."""
@@ -127,7 +127,7 @@ def asked(text: str, steps: int, folder: Path) -> tuple[int, int, Path]:
 
 
 def check_tools() -> None:
-    """Says before a long run what the film at its end would lack."""
+    """Report missing packages for the film before a long run."""
     missing = [name for name in ("imageio_ffmpeg", "matplotlib") if importlib.util.find_spec(name) is None]
     if missing:
         raise SystemExit(f"the film needs {', '.join(missing)}: pip install 'withe[view]' (make view)")

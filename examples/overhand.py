@@ -30,7 +30,7 @@ FRICTION = 0.07
 RANGES = {1: (375, 100), 2: (375, 120), 3: (400, 125), 4: (450, 200)}
 POINTS = (350, 325, 300, 275, 250, 225, 200, 175, 150, 125)
 RATIOS = {1: (0.75, 0.92, 120), 2: (0.75, 0.92, 120), 4: (0.8, 1.0, 250)}  # least, greatest, down to which e / h
-SETTLED = 0.92  # of the shortening drawn: friction has turned against the pull by then
+SETTLED = 0.92  # share of the drawn shortening at which friction acts against the pull
 SHOWN = {3: (160, 126), 4: (250, 225)}  # before and after a knot inverts
 COLORS = {1: "#00798c", 2: "#edae49", 3: "#5c8001", 4: "#d1495b"}
 
@@ -73,7 +73,7 @@ def pull(n: int, nodes: int, speed: float) -> Pull:
 
 
 def draw_knot(axes: Axes, x: np.ndarray, color: str) -> None:
-    """A knot without its tails, seen across its axis and flat: what is nearer hides what is farther."""
+    """Draw a knot without its tails, seen across its axis. Nearer parts hide farther parts."""
     from matplotlib.collections import PolyCollection
 
     axis = (x[-1] - x[0]) / np.linalg.norm(x[-1] - x[0])

@@ -20,9 +20,9 @@ import numpy as np
 from withe.deployment import Cable, Deployment, Pattern, deploy, plan, posts_along
 
 FRICTION = 0.4
-HELD = 1.5  # coefficient of friction of a floor that would hold the letters: what the real one does not, posts do
+HELD = 1.5  # coefficient of friction of a floor that holds the letters; posts replace it
 EASING = 0.14  # [m]
-LETTERS = {  # turns [rad], radii, straight pieces [m]; where posts stand, as shares of the way
+LETTERS = {  # turns [rad], radii, straight pieces [m]; places of posts as shares of the length
     "U": ((np.pi,), (0.095,), (0.14, 0.14), np.linspace(0.12, 0.88, 7)),
     "S": ((1.8, -1.8), (0.105, 0.105), (0.09, 0.05, 0.08), np.linspace(0.1, 0.85, 8)),
 }

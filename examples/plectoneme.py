@@ -26,7 +26,7 @@ from withe.knots import writhe
 
 RADIUS, MODULUS, DENSITY = 1e-3, 1e6, 1000.0  # [m], [Pa], [kg/m^3]
 BENDING = MODULUS * np.pi * RADIUS**4 / 4.0  # [N m^2]
-TWISTING = BENDING / 1.5  # of a material that keeps its volume
+TWISTING = BENDING / 1.5  # for an incompressible material
 FORCES = (0.001, 0.005, 0.01, 0.03)  # F h^2 / B, h the radius of the rod
 TOLERANCES = {"angle": 0.03, "moment": 0.03, "pressure": 0.05}
 
@@ -97,7 +97,7 @@ def wind(force: float, turns: int, edge: float) -> tuple[withe.Simulation, withe
     stiffness = expected.pressure * BENDING * edge / RADIUS**2 / (2.0 * 0.01 * RADIUS)
     scene.enable_contact(stiffness=stiffness)
     simulation = scene.build(integrator="backward_euler", time_step=wave_time / 40.0)
-    # Drawn without twist: this one is what the moment of the theory twists it by.
+    # The rod is drawn without twist. The moment of the theory causes this twist.
     twist = expected.moment * BENDING / RADIUS / TWISTING
     simulation.set(rod, natural_twist=-np.sign(writhe(points)) * twist)
     simulation.step(1200)

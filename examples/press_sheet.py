@@ -19,17 +19,17 @@ import numpy as np
 import withe
 
 LENGTH, WIDTH, THICKNESS, LGB = 0.297, 0.21, 1e-4, 0.048  # [m]
-WEIGHT = 0.08 * WIDTH * 9.81  # of 80 g/m^2 [N/m]
-DEPTH = 0.01  # of the sheet between the fingers [m]
-STIFFNESS, LIMIT = 2e3, 3.0  # of the jaw [N/m], [N]
+WEIGHT = 0.08 * WIDTH * 9.81  # weight of 80 g/m^2 [N/m]
+DEPTH = 0.01  # depth of the sheet between the fingers [m]
+STIFFNESS, LIMIT = 2e3, 3.0  # stiffness and force limit of the jaw [N/m], [N]
 FOLDING, LOWERING, HOLDING = 6.0, 1.0, 0.5  # [s]
-LOW = 2e-3  # by which the jaw is led too low [m]
+LOW = 2e-3  # error of the height of the jaw, downwards [m]
 FINGER = 2e-3  # radius of a finger [m]
-FINGERS = {"upper finger": 1.1 * FINGER, "lower finger": -1.1 * FINGER}  # over the sheet before it is folded [m]
+FINGERS = {"upper finger": 1.1 * FINGER, "lower finger": -1.1 * FINGER}  # heights over the flat sheet [m]
 
 
 def scene_of(edges: int) -> tuple[withe.Scene, withe.Rod]:
-    """The sheet on the table, and two fingers that touch nothing: they show where the jaw is."""
+    """Return the sheet on the table, and two fingers without contact, which show the position of the jaw."""
     scene = withe.Scene()
     bend = 2.0 * WEIGHT * LGB**3
     stiff = withe.Stiffness(
@@ -73,7 +73,7 @@ def pose(t: float, middle: np.ndarray, axes: np.ndarray, off: float = 0.0) -> tu
 
 
 def draw(record: withe.Record, low: np.ndarray, pressing: np.ndarray, path: Path) -> None:
-    """The sheet as it is pressed, and with what."""
+    """Draw the sheet while it is pressed, and the force on it."""
     import matplotlib.pyplot as plt
 
     record.picture(path, camera=(0.12, -0.42, 0.1), size=(1200, 800))

@@ -21,11 +21,11 @@ import withe
 LENGTH, RADIUS, NODES = 1.2, 6e-3, 121  # [m]
 EYE, RISE, FRICTION = 0.2, 0.3, 0.25  # [m] from the rope's end, [m], [-]
 RISEN, WALKED, AWAY = 1.0, 2.0, 0.5  # [s], [s], [m]
-GAP, WIRE = 1.6 * RADIUS, 0.4 * RADIUS  # of the eye as it is drawn [m]
+GAP, WIRE = 1.6 * RADIUS, 0.4 * RADIUS  # of the drawn eye [m]
 
 
 def scene_of() -> tuple[withe.Scene, withe.Rod]:
-    """The rope on the floor, its end held, and an eye that is drawn as eight short wires, which touch nothing."""
+    """Return the rope on the floor with a held end, and an eye drawn as eight short wires without contact."""
     scene = withe.Scene()
     cotton = withe.Material(youngs_modulus=1.5e6, poisson_ratio=0.4, density=700.0, viscosity=6e3)
     start, end = (-LENGTH, 0.0, RADIUS), (0.0, 0.0, RADIUS)

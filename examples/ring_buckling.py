@@ -17,7 +17,7 @@ from scipy.optimize import brentq
 
 import withe
 
-RADIUS = 0.1  # of the ring [m]
+RADIUS = 0.1  # radius of the ring [m]
 BENDING, TWISTING = 2.0e-3, 1.6e-3  # [N m^2]
 
 
@@ -27,7 +27,7 @@ def michell(twisting: float) -> float:
 
 
 def build(nodes: int, integrator: str = "static", twisting: float = TWISTING) -> tuple[withe.Simulation, withe.Rod]:
-    """A ring closed without twist. Holding one node takes away its rigid motions and nothing else."""
+    """Return a ring that is closed without twist. One held node removes only its rigid motions."""
     scene = withe.Scene(gravity=(0.0, 0.0, 0.0))
     stiffness = withe.Stiffness(stretch=500.0, bend=(BENDING, BENDING), twist=twisting)
     ring = scene.add_rod(

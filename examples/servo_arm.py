@@ -26,11 +26,11 @@ from scipy.optimize import brentq
 import withe
 
 LENGTH, RADIUS, NODES = 0.6, 4e-3, 41  # [m]
-MODULUS, DENSITY = 3e9, 1140.0  # of nylon [Pa], [kg/m^3]
-STIFFNESS = 6.0  # of the servo [N m/rad]
+MODULUS, DENSITY = 3e9, 1140.0  # nylon [Pa], [kg/m^3]
+STIFFNESS = 6.0  # stiffness of the servo [N m/rad]
 ANGLE, RISE = 0.5 * np.pi, 0.2  # [rad], [s]
 UNTIL = 1.6  # [s]
-FREQUENCY_ERROR, REST = 2e-3, 0.05  # that are allowed
+FREQUENCY_ERROR, REST = 2e-3, 0.05  # allowed errors
 
 
 def arm() -> tuple[withe.Simulation, withe.Joint]:

@@ -24,7 +24,7 @@ import withe
 LENGTH, RADIUS, DENSITY, MODULUS, GRAVITY = 0.35, 0.35 * 0.011, 1000.0, 1e6, 9.80665
 PERIOD, FROUDE = 2.0, 0.1
 FRICTION = LENGTH / (PERIOD**2 * GRAVITY * FROUDE)
-COUPLES = (3.4e-3, 3.3e-3, 4.2e-3, 2.6e-3, 3.6e-3, 3.5e-3)  # of a cubic B-spline from tail to head [N m]
+COUPLES = (3.4e-3, 3.3e-3, 4.2e-3, 2.6e-3, 3.6e-3, 3.5e-3)  # coefficients of a cubic B-spline from tail to head [N m]
 PEER = 0.0278  # [m/s]
 
 

@@ -64,7 +64,7 @@ def draw(log: real2sim.Log, camera: real2sim.Calibration, found: real2sim.Fit, p
 
 
 def main() -> None:
-    """Calibrate, fit, and say what is not told."""
+    """Calibrate, fit, and print unobservable unknowns."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, default=Path("out"), help="folder of the picture")
     parser.add_argument("--basis", choices=("constant", "linear"), default="constant", help="curvature along a limb")

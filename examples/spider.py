@@ -23,11 +23,15 @@ import withe
 
 LIMB, RADIUS, MODULUS, DENSITY = 0.1, 5e-3, 3e6, 1180.0  # [m], [m], [Pa], [kg/m^3]
 VISCOSITY = MODULUS * 1e-3  # [Pa s]
-STIFFNESS = 2e4  # of contact [N/m]: an impact of the fall sinks some percent of a radius in
+STIFFNESS = 2e4  # of contact [N/m]: surfaces overlap by some percent of a radius in the impact
 NODES = 25
 FEET = ((1.0, 0.0), (0.0, 1.0), (0.0, -1.0), (-1.0, 0.0))
-HEIGHTS = {0.05: 0.18769, 0.10: 0.15088}  # of the top in the public code [m]
-APART, HEIGHT_OFF, MOVING = 0.02, 1e-3, 1e-3  # of a limb or an energy, [m], of the greatest kinetic energy
+HEIGHTS = {0.05: 0.18769, 0.10: 0.15088}  # heights of the top in the public code [m]
+APART, HEIGHT_OFF, MOVING = (
+    0.02,
+    1e-3,
+    1e-3,
+)  # relative to a limb or an energy; [m]; relative to the greatest kinetic energy
 FRAME = 0.01  # [s]
 ASIDE = "top 1e-9 m aside"
 

@@ -27,14 +27,14 @@ from scipy.optimize import OptimizeResult, minimize
 import withe
 
 LENGTH, EDGES, PLACES = 0.3, 48, 9  # [m]
-DENSITY, MODULUS = 1100.0, 2.6e7  # of a printed polyurethane [kg/m^3], [Pa]
+DENSITY, MODULUS = 1100.0, 2.6e7  # printed polyurethane [kg/m^3], [Pa]
 CYLINDER = 6.5e-3  # radius of the arm to begin with [m]
 THINNEST, THICKEST = 3.5e-3, 12e-3  # [m]
 OBJECT, ROUND, GAP = np.array([0.16, -0.055]), 0.035, 2e-3  # centre, x and z; radius; clearance [m]
-WEIGHT, SAG = 0.5, 0.015  # of the object [N], by which it may pull the arm down [m]
+WEIGHT, SAG = 0.5, 0.015  # weight of the object [N], allowed sag of the arm [m]
 STRONGEST = 0.3  # moment of the tendon [N m]
 FIRST, FIRST_MOMENT = (8.0, 4.0), 100.0  # radii at both ends [mm] and moment [mN m] to begin with
-CLOSE = 1e-3  # that is asked of the clearance, RMS [m]
+CLOSE = 1e-3  # required error of the clearance, RMS [m]
 PLACE_OF_EDGE = (np.arange(EDGES) + 0.5) / EDGES
 TENTS = np.stack([np.interp(PLACE_OF_EDGE, np.linspace(0, 1, PLACES), row) for row in np.eye(PLACES)], axis=1)
 
@@ -60,7 +60,7 @@ def hold(radii: np.ndarray, moment: float, weight: float) -> Held:
     tendon = scene.add_moment(arm.end, (0.0, moment, 0.0))
     for node in outer(nodes):
         scene.add_force(arm.node(int(node)), (0.0, 0.0, -weight / len(outer(nodes))))
-    # Solved to rounding, so that differences tell of derivatives.
+    # Solved to rounding error, so that differences approximate derivatives.
     simulation = scene.build(
         integrator="static", planar=True, solver=withe.Solver(step_tolerance=1e-13, force_tolerance=1e-12)
     )
@@ -95,7 +95,7 @@ class Design:
     """J, the sag and the mass of a design, each with its derivatives by radii at places [mm] and the moment [mN m]."""
 
     def __init__(self, basis: np.ndarray) -> None:
-        self.basis = basis  # of the edges' radii
+        self.basis = basis  # functions for the radii of the edges
         self.equilibria = 0
         self._last: tuple[bytes, tuple[Held, Held]] = (b"", ())
 

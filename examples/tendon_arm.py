@@ -30,7 +30,7 @@ LENGTH, RADIUS, OFFSET, NODES = 0.242, 0.4e-3, 8e-3, 61  # [m]
 STEEL = withe.Material(youngs_modulus=210e9, poisson_ratio=0.3125, density=7850.0)
 AREA, INERTIA = np.pi * RADIUS**2, 0.25 * np.pi * RADIUS**4
 TENSION, TOOL = 3.0, 5e-3  # [N], [kg]
-ERROR = 1e-4  # that is allowed [m]
+ERROR = 1e-4  # allowed error [m]
 
 
 def backbone(scene: withe.Scene, tool: float = 0.0) -> withe.Rod:
@@ -86,7 +86,7 @@ def theory(sections: int = 400) -> np.ndarray:
 
 
 def hanging() -> tuple[withe.Simulation, withe.Rod, list[withe.Tendon]]:
-    """The backbone with three straight tendons, its weight and that of a tool."""
+    """Return the backbone with three straight tendons, its weight and the weight of a tool."""
     scene = withe.Scene()
     rod = backbone(scene, TOOL)
     angles = 2.0 * np.pi * np.arange(3) / 3

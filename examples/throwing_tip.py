@@ -35,8 +35,8 @@ POINTS = np.array([(0.22, 0.14), (0.29, 0.02), (0.08, 0.24)])  # x and z of the 
 TIMES = (0.35, 0.6, 1.0)  # [s]
 REACHED = np.array([round(t / INTERVAL) for t in TIMES])  # the interval at whose end
 ACCURACY, SMOOTH = 1e-3, 1e-3  # a [m], w [m^2]
-MISS = 1e-3  # that is allowed [m]
-STEP = 2e-6  # of differences [1/m]: their error falls with its square down to here
+MISS = 1e-3  # allowed distance from a point [m]
+STEP = 2e-6  # step of differences [1/m]: down to this step their error decreases with its square
 
 
 class Thrown(NamedTuple):
@@ -60,7 +60,7 @@ def resting() -> withe.Simulation:
     scene.clamp(arm.start)
     scene.add_floor(0.0)
     scene.enable_contact(stiffness=2e5, distance_tolerance=2e-3)
-    # Solved to rounding, so that differences between runs tell of derivatives.
+    # Solved to rounding error, so that differences between runs approximate derivatives.
     tolerances = {"solver": withe.Solver(step_tolerance=1e-13, force_tolerance=1e-12)}
     simulation = scene.build(
         integrator="backward_euler", planar=True, time_step=INTERVAL / STEPS, adaptive=False, **tolerances
@@ -76,7 +76,7 @@ def muscles() -> np.ndarray:
 
 
 def throw(simulation: withe.Simulation, controls: np.ndarray, differentiable: bool = False) -> Thrown:
-    """Run all intervals from a simulation, which stays as it is; controls of shape (intervals, 2)."""
+    """Run all intervals from a simulation, which does not change; controls have the shape (intervals, 2)."""
     shapes, touching, steps = muscles(), [], count()
 
     def act(now: withe.Simulation) -> None:
@@ -119,7 +119,7 @@ def error_of_derivatives(simulation: withe.Simulation, controls: np.ndarray) -> 
 
 
 def draw(thrown: Thrown, controls: np.ndarray, path: Path) -> None:
-    """The arm, the way of its tip, the points, and what the muscles did."""
+    """Draw the arm, the path of its tip, the points, and the controls of the muscles."""
     import matplotlib
 
     matplotlib.use("Agg")

@@ -114,7 +114,7 @@ def is_tied(name: str, found: Tying) -> bool:
 
 
 def draw(axes: object, found: Tying, name: str) -> None:
-    """From above, what lies higher over what lies lower."""
+    """Draw the view from above. Higher parts hide lower parts."""
     for panel, title, shapes in zip(axes[: len(found.names)], found.names, found.shapes, strict=True):
         pieces = [
             (points[i : i + 2, 2].mean(), 1e3 * points[i : i + 2, :2], number)

@@ -24,11 +24,11 @@ import withe
 RADIUS, MODULUS, DENSITY, GRAVITY = 6e-3, 1e6, 1100.0, 9.81  # [m], [Pa], [kg/m^3], [m/s^2]
 BENDING = MODULUS * np.pi * RADIUS**4 / 4.0  # [N m^2]
 WEIGHT = DENSITY * GRAVITY * np.pi * RADIUS**2  # [N/m]
-LONGEST = (7.837 * BENDING / WEIGHT) ** (1.0 / 3.0)  # that stands by itself [m]
+LONGEST = (7.837 * BENDING / WEIGHT) ** (1.0 / 3.0)  # greatest length that stands by itself [m]
 LENGTH = 1.37 * LONGEST
 NODES, TIME_STEP = 21, 5e-3  # [s]
 PUSH, PUSHED = 3e-2, (1.0, 1.2)  # [N], from when to when [s]
-STEADY = 0.02  # of the length: where the tip has to be in the end
+STEADY = 0.02  # relative to the length: allowed distance of the tip at the end
 
 
 class Balanced(NamedTuple):
@@ -98,7 +98,7 @@ def pushed(duration: float, controlled: bool) -> Balanced:
 
 
 def draw(held: Balanced, fallen: Balanced, path: Path) -> None:
-    """Both arms, one beside the other, and what the muscle did."""
+    """Draw both arms side by side, and the control of the muscle."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -116,7 +116,7 @@ def draw(held: Balanced, fallen: Balanced, path: Path) -> None:
         for k in shown:
             axis.plot(100.0 * x[k, :, 0], 100.0 * x[k, :, 2], color=color, alpha=0.25, linewidth=3)
         axis.plot(100.0 * x[-1, :, 0], 100.0 * x[-1, :, 2], color=color, linewidth=5, solid_capstyle="round")
-        axis.plot((-2.0, 2.0), (0.0, 0.0), color="#8a9299", linewidth=4)  # its foot is clamped; there is no floor
+        axis.plot((-2.0, 2.0), (0.0, 0.0), color="#8a9299", linewidth=4)  # the foot is clamped; there is no floor
         axis.set(title=title, xlabel="cm", aspect="equal", xlim=(-16, 24), ylim=(-20, 28))
     times = held.record.times
     axes[2].axvspan(*PUSHED, color="#e3e7ea", label="push")
@@ -141,9 +141,9 @@ def main() -> None:
     A, B, gain = regulator(simulation, muscle(simulation))
     growing = np.linalg.eigvals(A)
     growing = growing[np.abs(growing) > 1.0 + 1e-9]
-    expected = -2.0 * np.pi * float(simulation.linearise().frequencies(1)[0])  # of exp(rate t), undamped
+    expected = -2.0 * np.pi * float(simulation.linearise().frequencies(1)[0])  # rate of exp(rate t), undamped
     print(f"{LENGTH / LONGEST:.2f} times as long as what stands; {len(growing)} growing mode(s)")
-    rate = (1.0 - 1.0 / np.abs(growing).max()) / TIME_STEP  # that backward Euler has this factor of
+    rate = (1.0 - 1.0 / np.abs(growing).max()) / TIME_STEP  # rate for which backward Euler has this factor
     print(f"it grows with {rate:.3f} 1/s; by the linearised equations, without damping, {expected:.3f} 1/s")
     closed = np.abs(np.linalg.eigvals(A - B @ gain)).max()
     print(f"with the regulator the slowest mode decays with {-np.log(closed) / TIME_STEP:.2f} 1/s")

@@ -140,7 +140,8 @@ void register_elastica(py::module_& module) {
       .def(py::init<>(), "1 everywhere.")
       .def(py::init<const std::vector<double>&, const std::vector<double>&>(), py::arg("places"), py::arg("widths"))
       .def("width_at", &SheetWidth::width_at, py::arg("place"))
-      .def("weight_at", &SheetWidth::weight_at, py::arg("place"), "Of the part from the tip to a place.");
+      .def("weight_at", &SheetWidth::weight_at, py::arg("place"),
+           "Return the weight of the part from the tip to a place.");
   py::class_<SheetManifold>(module, "SheetManifold", "All poses in which a sheet can be held, tabulated once.")
       .def(py::init<const SheetWidth&>(), py::arg("width"), py::call_guard<py::gil_scoped_release>())
       .def(

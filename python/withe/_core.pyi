@@ -1328,7 +1328,7 @@ class SheetWidth:
     ) -> None: ...
     def weight_at(self, place: typing.SupportsFloat | typing.SupportsIndex) -> float:
         """
-        Of the part from the tip to a place.
+        Return the weight of the part from the tip to a place.
         """
     def width_at(self, place: typing.SupportsFloat | typing.SupportsIndex) -> float: ...
 

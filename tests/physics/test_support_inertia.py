@@ -116,7 +116,7 @@ def test_a_shaft_turns_in_a_bearing_without_a_motion_of_its_line(nodes, while_ru
     bearing = scene.clamp(shaft.end, spin=not while_running)
     simulation = scene.build(integrator="static", time_step=0.1)
     if while_running:
-        # Elsewhere than it was drawn.
+        # The bearing is moved away from its drawn pose.
         simulation.move(bearing, tangent=(0.3, 0.0, 1.0), over=0.5)
         simulation.step(6)
         simulation.release(bearing)

@@ -25,10 +25,10 @@ def test_synthetic_cables_are_found_in_order_within_two_pixels(case, seed):
     ("case", "seed", "scale"),
     [
         ("ragged 30", 1172, 1),  # a bay reaches into the crossing, and the skeleton runs around it
-        ("ragged 30", 1250, 1),  # as wide as one cable at its waist: two that cross, not two that touch
-        ("ragged 60", 6130, 1),  # a border that falls back by a fifth of the width is no strand that ends
-        ("ragged 30", 3012, 1),  # a hole in the crossing has two sides
-        ("crossing 15", 1126, 0.5),  # which flank shows, left or right, differs by less than a pixel
+        ("ragged 30", 1250, 1),  # two cables cross, but the waist is as narrow as for one cable
+        ("ragged 60", 6130, 1),  # the border recedes by 0.2 widths, but no strand ends there
+        ("ragged 30", 3012, 1),  # the crossing has a hole, which has two sides
+        ("crossing 15", 1126, 0.5),  # the left and the right flank differ by less than a pixel
         ("specks", 1049, 0.5),  # two specks side by side are twice as long as the cables are wide
     ],
 )

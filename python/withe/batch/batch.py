@@ -275,7 +275,7 @@ class Batch(Setting, Reading):
         )
 
     def _left_rings(self, heard: Iterable[int]) -> list[tuple[int, str, float]]:
-        """Rings that the engine has released: simulation, name, and when [s]; `heard`: simulations that may know."""
+        """Return rings that the engine has released: simulation, name and time [s]. `heard`: simulations to ask."""
         lanes = set(heard)
         for lane, support, time in self._lanes.engine.take_left_rings():
             forget_left_rings(self[lane]._session, [(support, time)])

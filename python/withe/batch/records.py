@@ -51,7 +51,7 @@ class BatchRecord(Sequence[Record]):
     def __getitem__(self, which: str) -> npt.NDArray[Any]: ...
 
     def __getitem__(self, which: int | slice | str) -> Record | BatchRecord | npt.NDArray[Any]:
-        """The record of a simulation, or what was recorded under a name, shape (n, frames, ...)."""
+        """Return the record of a simulation, or all values of a name, shape (n, frames, ...)."""
         if isinstance(which, str):
             return self._stacked([record[which] for record in self._records])
         if isinstance(which, slice):
@@ -150,12 +150,12 @@ class Equilibria(Sequence[Equilibrium]):
     def __getitem__(self, index: slice) -> Equilibria: ...
 
     def __getitem__(self, index: int | slice) -> Equilibrium | Equilibria:
-        """That of a simulation.
+        """Return the equilibrium of a simulation.
 
         Raises
         ------
         ConvergenceError
-            None was found for it.
+            No equilibrium was found for it.
         """
         if isinstance(index, slice):
             return Equilibria(self.failures[index], self._found[index])

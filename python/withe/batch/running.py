@@ -112,7 +112,7 @@ class BatchRun(Generic[B]):
                 report(done * self._batch.time_step)
 
     def _ended(self) -> list[int]:
-        """Those of the simulations on their way that end here."""
+        """Return the running simulations that end at this frame."""
         if self._until is None:
             return []
         answer = np.asarray(self._until(self._batch))
@@ -122,7 +122,7 @@ class BatchRun(Generic[B]):
         return [number for number in self._going if ends[number]]
 
     def _capture(self, numbers: list[int], done: int) -> None:
-        """Take a frame of simulations; time steps add up to its time but for rounding."""
+        """Record a frame of simulations. Time steps add up to its time, up to rounding."""
         if not numbers:
             return
         for name, function in self._extras.items():

@@ -110,7 +110,7 @@ def known_attributes(instead: str) -> Callable[[T], T]:
 
     def refusing(known: T) -> T:
         def assign(self: Any, name: str, value: Any) -> None:
-            own = type(self) is known  # classes that derive from it may have what they want
+            own = type(self) is known  # derived classes may have any attributes
             if own and not name.startswith("_") and not hasattr(known, name):
                 near = get_close_matches(name, [word for word in dir(known) if not word.startswith("_")], 1)
                 meant = f"did you mean {near[0]}?" if near else instead

@@ -33,6 +33,6 @@ def cluster_executor(client: Any) -> Iterator[Executor]:
     try:
         yield executor
     except BaseException:
-        executor.shutdown(wait=False)  # which cancels them, in Dask
+        executor.shutdown(wait=False)  # in Dask this cancels them
         raise
     executor.shutdown()

@@ -16,9 +16,9 @@ __all__ = ["Diagram", "alexander", "closed_far_away", "diagram", "signature"]
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 _FAR = 20.0  # sizes of an open curve, at which its ends are joined
-_VIEW_SEED = 7  # of the directions from which curves are looked at: none is special
+_VIEW_SEED = 7  # seed of random view directions, none of which is special
 _VIEWS = 50
-_ROUND = 0.2  # how far a coefficient of a polynomial may be from an integer
+_ROUND = 0.2  # greatest distance of a coefficient of a polynomial from an integer
 
 
 @dataclass(frozen=True)

@@ -162,7 +162,7 @@ def _hinted(function: Callable[..., Any], name: str) -> Any:
 
 
 def _explained(function: Callable[..., Any], name: str, given: int, keywords: Collection[str]) -> str | None:
-    """Explain an error in the arguments of a call, `given` of them by position; None where Python says it best."""
+    """Explain an error in the arguments of a call, `given` of them by position; None if Python explains it best."""
     parameters = list(inspect.signature(function).parameters.values())
     kinds = [each.kind for each in parameters]
     takes_any = inspect.Parameter.VAR_KEYWORD in kinds

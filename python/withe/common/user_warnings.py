@@ -74,7 +74,7 @@ def each_cause_once(heard: set[Cause]) -> Iterator[None]:
 
 @contextmanager
 def located_at(place: Place) -> Iterator[None]:
-    """Locate warnings at a line; those of a thread at the line that started the thread."""
+    """Locate warnings at a line. Warnings of a thread are located at the line that started the thread."""
     token = _place.set(place)
     try:
         yield

@@ -42,7 +42,7 @@ _LARGEST = 1e50
 # Numbers that BLAS adds up by itself, without threads.
 _ALONE = 8192
 _IDENTITY = np.eye(3)
-_ORTHONORMAL = 1e-15  # to which rotations and their products are rounded
+_ORTHONORMAL = 1e-15  # rounding error of rotations and their products
 
 
 def number(value: Any, what: str) -> float:

@@ -68,10 +68,10 @@ class Grid:
 
 @lru_cache(maxsize=8)
 def lift(width: Width = EVEN) -> Elastica:
-    """Sheets raised without tangential force and without moment at the tip, by lifted length: the gentle branch."""
+    """Return sheets that are raised without tangential force and without moment at the tip, by lifted length."""
     normal = np.zeros_like(_LIFTS)
     for i, lifted in enumerate(_LIFTS):
-        # As much as a short strip, that hardly turns, has on the table; or on from the lengths before.
+        # First guess: force of a short strip, which hardly turns; then extrapolation from the lengths before.
         guess = _least_lift(lifted, width) if i < 2 else 2.0 * normal[i - 1] - normal[i - 2]
         normal[i] = _without_moment(lifted, guess, width)
     return at_forces(np.stack([normal, np.zeros_like(normal), _LIFTS], axis=1), width)

@@ -8,9 +8,9 @@ from numpy.typing import ArrayLike, NDArray
 __all__ = ["Camera"]
 
 Array = NDArray[np.float64]
-_ROUNDING = 1e-13  # of a distorted direction, over its length or 1
-_INVERTED = 1e-9  # the same: what a direction that was found may be off where it is distorted again
-_ITERATIONS = 60  # of Newton's method; where the lens turns back it halves the error only
+_ROUNDING = 1e-13  # error of a distorted direction, relative to its length or 1
+_INVERTED = 1e-9  # the same: greatest error of a result when it is distorted again
+_ITERATIONS = 60  # of Newton's method; where the lens turns back, each one only halves the error
 _HALVINGS = 30
 
 

@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 _SAMPLES = 32  # profiles across a side
 _ROUNDS = 10
 _DONE = 0.003  # px
-_REACH = 0.55  # of a cell, on both sides of an edge: the cells inside must not shine through
+_REACH = 0.55  # relative to a cell, on both sides of an edge: the inner cells must have no influence
 
 
 def refine_square(gray: NDArray[np.uint8], quad: Array, cells: int) -> Array:

@@ -416,7 +416,7 @@ class Record:
                 )
                 for each in header.get("tendons", [])
             ]
-            if "energy_spring" not in arrays:  # as in files from before there were springs
+            if "energy_spring" not in arrays:  # absent in files older than springs
                 arrays["energy_spring"] = np.zeros(len(arrays["times"]))
             return cls(rods, arrays, [str(name) for name in header["extras"]], obstacles, springs, tendons)
         except (KeyError, IndexError, TypeError, ValueError) as error:

@@ -142,7 +142,7 @@ class Recorder(Generic[S]):
         self._rods = tuple(_outline(rod) for rod in simulation.rods)
         self._columns: dict[str, _Column] = {}
         self._frames = 0
-        self.derivatives: Derivatives | None = None  # of a differentiable run
+        self.derivatives: Derivatives | None = None  # only in a differentiable run
 
     def capture(self) -> None:
         """Take one frame. A callback's exception propagates, and then no part of the frame is kept.

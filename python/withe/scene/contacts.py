@@ -395,7 +395,7 @@ def _set_pair(
     restitution: float | None = None,
     stiffness: float | None = None,
 ) -> None:
-    """Give two bodies something of their own, besides what they have."""
+    """Give a pair of bodies its own values, in addition to those that it has."""
     key = pair_of(directory, a, b)
     settings = directory.contact
     pair = settings.pairs.get(key, PairSettings())

@@ -23,7 +23,7 @@ _ORDINALS = ("first", "second", "third", "fourth")
 
 
 class JoinedNodes:
-    """The joins of a scene by their nodes, so that a new one is compared with those at its own node alone."""
+    """The joins of a scene by their nodes, so that a new one is compared only with those at its own node."""
 
     def __init__(self, directory: Directory) -> None:
         self._directory = directory

@@ -66,7 +66,7 @@ def plot(record: Frames, *, shapes: int = 6) -> Any:
         if axes.name == "3d":
             _fit(axes)
     if "inline" in pyplot.get_backend():
-        pyplot.close(figure)  # a notebook shows what the cell returns, and would show this twice
+        pyplot.close(figure)  # a notebook would show it twice, since it also shows the returned figure
     return figure
 
 
@@ -85,7 +85,7 @@ _STYLE = {
     "lines.solid_capstyle": "round",
     "font.size": 10,
 }
-_UNSEEN = 0.05  # of a rod's thickness
+_UNSEEN = 0.05  # relative to the thickness of a rod
 _OBSTACLE, _OBSTACLE_FILL = "#8a9299", "#d9dfe4"
 _ENERGY_COLOURS = {
     "kinetic": "#e76f51",
@@ -202,7 +202,7 @@ def _draw_solid(
 
 
 def _box(axes: Any, positions: FloatArray) -> None:
-    """Three axes of one scale around all positions, with few ticks where there is little room."""
+    """Set three axes of equal scale around all positions, with few ticks if there is little space."""
     points = positions.reshape(-1, 3)
     size = np.ptp(points, axis=0)
     spans = np.maximum(1.05 * size, 0.1 * size.max())
@@ -218,7 +218,7 @@ def _box(axes: Any, positions: FloatArray) -> None:
 
 
 def _ticks(low: float, high: float, count: int) -> list[float]:
-    """Round numbers away from both ends, where their labels would meet those of the next axis."""
+    """Return round numbers, not near both ends, where their labels would overlap those of the next axis."""
     ticker = require("matplotlib.ticker", "view")
     room = 0.1 * (high - low)
     for wanted in range(count, count + 6):
@@ -267,9 +267,9 @@ def _prefix(largest: float, units: tuple[float, ...]) -> tuple[float, str]:
 
 
 def _plane(positions: FloatArray, thickness: float) -> list[int] | None:
-    """The two coordinates of a motion in a coordinate plane; None for any other.
+    """Return the two coordinates of a motion in a coordinate plane; None for any other motion.
 
-    What leaves the plane by far less than rods are thick cannot be seen: rods that lie on a floor sink in a little.
+    Motion out of the plane is ignored if it is far below the thickness of rods: rods on a floor sink in slightly.
     """
     extents = np.ptp(positions.reshape(-1, 3), axis=0)
     flat = extents <= 1e-6 * extents.max()

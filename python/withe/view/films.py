@@ -36,7 +36,7 @@ def film_places(times: FloatArray, interval: float) -> FloatArray:
 
 
 class Film:
-    """Pictures that go to ffmpeg as they are made."""
+    """Film, whose pictures are sent to ffmpeg one by one."""
 
     def __init__(self, encoder: str, path: Path, size: tuple[int, int], fps: float) -> None:
         source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", f"{fps:g}", "-i", "-"]

@@ -12,7 +12,7 @@ from withe.common.outlines import RodOutline
 __all__ = ["stands_out"]
 
 FloatArray = npt.NDArray[np.float64]
-_NEAR = 0.1  # of the radius of a rod
+_NEAR = 0.1  # relative to the radius of a rod
 
 
 def stands_out(rod: RodOutline, pose: FloatArray, others: Sequence[FloatArray]) -> npt.NDArray[np.bool_]:

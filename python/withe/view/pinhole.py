@@ -11,7 +11,7 @@ __all__ = ["Pinhole", "check_pinhole", "look_through", "towards"]
 
 FloatArray = npt.NDArray[np.float64]
 
-_NEAREST = 1e-4  # what is closer to the camera is cut off, over the distance of the farthest
+_NEAREST = 1e-4  # least visible distance, relative to that of the farthest point
 
 
 @runtime_checkable
@@ -77,7 +77,7 @@ def look_through(view: Any, camera: Pinhole, size: tuple[int, int], points: Floa
 
 
 def _projection(matrix: FloatArray, size: tuple[int, int], near: float, far: float) -> FloatArray:
-    """From coordinates x right, y up, z backwards to those of OpenGL's clipped volume.
+    """Return the matrix from coordinates x right, y up, z backwards to the clip coordinates of OpenGL.
 
     Pixel (u, v), counted from the middle of the first, lies at 2 (u + 1/2) / width - 1 and 1 - 2 (v + 1/2) / height.
     """

@@ -204,7 +204,7 @@ class Stage:
         return mixed
 
     def _floor(self, points: FloatArray) -> float | None:
-        """Height of the level plane on which the shadow of rods that are near it falls; None where there is none."""
+        """Return the height of the horizontal plane near rods that receives their shadow; None without such a plane."""
         heights = [
             float(places[0, 2])
             for obstacle, places in zip(self._record.obstacles, self._places, strict=True)
@@ -220,9 +220,9 @@ class Stage:
     def _frame_camera(
         self, direction: FloatArray, points: FloatArray, around: FloatArray, ground: float | None, aside: float
     ) -> None:
-        """Look from a direction at the middle of all points, from as near as all are in view.
+        """Look from a direction at the middle of all points, from the least distance at which all are in view.
 
-        So is what is around the rods. A share of the picture, `aside`, is left to the scale on the right.
+        The surroundings of the rods are in view too. A share of the picture, `aside`, is for the scale on the right.
         """
         reach = max(float(rod.radii.max()) for rod in self._record.rods)
         everything = np.concatenate([points, around])
@@ -336,9 +336,9 @@ class Stage:
             self._footprints_of_obstacles.append(np.full(len(points), area / len(points)))
 
     def _add_ghost(self, pyvista: Any, frames: list[int], place: int) -> None:
-        """Rods of one frame in pale colours, which do not move, where they stand out from what later frames show.
+        """Add the rods of one frame in pale colours, at rest, where they differ from those of later frames.
 
-        The points of their surfaces are kept, with the areas that cast shadows.
+        The points of their surfaces are stored, with the areas that cast shadows.
         """
         strength = 0.2 + 0.3 * place / max(1, len(frames) - 2)
         for index, rod in enumerate(self._record.rods):

@@ -11,7 +11,7 @@ __all__ = ["cloud", "ends", "framing", "patch", "profile", "spring_width", "surf
 
 FloatArray = npt.NDArray[np.float64]
 
-_FAR = 1.5  # diagonals of what is in view
+_FAR = 1.5  # diagonals of the visible region
 
 
 def _box(points: FloatArray) -> tuple[FloatArray, float]:
