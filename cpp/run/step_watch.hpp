@@ -39,9 +39,9 @@ struct SolvedStep {
 /// contact has times of its own, which steps need not resolve.
 void watch_step(const SolvedStep& step, StepWatch& watch, Warnings& warnings, EnergyScratch& scratch);
 
-/// Notes on the vibrations that steps resolve, of the slowest rod. Each rod is taken alone, clamped at one end and free of
-/// stress. Its frequencies are w = b^2 sqrt(B / m) / L^2 [Euler and Bernoulli]; b is 1.875 for the first mode and about
-/// (n - 1/2) pi for the nth.
+/// Notes on the vibrations that steps resolve, of the slowest rod. Each rod is taken alone, clamped at one end and free
+/// of stress. Its frequencies are w = b^2 sqrt(B / m) / L^2 [Euler and Bernoulli]; b is 1.875 for the first mode and
+/// about (n - 1/2) pi for the nth.
 std::vector<std::string> step_notes(const Model& model, const Options& options, const Parameters& parameters);
 
 }  // namespace withe
