@@ -42,7 +42,7 @@ NAMES = (
 
 
 def main() -> int:
-    """Run what was asked for, or all."""
+    """Run the requested benchmarks, or all."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"by default {', '.join(NAMES)}")
     parser.add_argument("--quick", action="store_true", help="the short form of each")

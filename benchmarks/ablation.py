@@ -44,7 +44,7 @@ GUARD = 4.0  # [s]
 
 @dataclass
 class Run:
-    """Counts of one scene; `lost` says why it did not end."""
+    """Counts of one scene. `lost` is the reason if its run did not end."""
 
     iterations: int = 0
     evaluations: int = 0
@@ -191,7 +191,7 @@ def groups(quick: bool) -> dict[str, list[Scene]]:
 
 @contextmanager
 def without(heuristic: str) -> Iterator[None]:
-    """Simulations that are built here lack a heuristic; nothing where it has no name."""
+    """Build simulations without a heuristic while the body runs. Without a name nothing changes."""
     made = BuildOptions.engine
 
     def engine(options: BuildOptions) -> _core.Options:
@@ -209,7 +209,7 @@ def without(heuristic: str) -> Iterator[None]:
 
 @contextmanager
 def _guarded() -> Iterator[None]:
-    """Ends what goes on and on within one step."""
+    """Stop a run that stays in one step for too long."""
 
     def ring(*_: object) -> None:
         raise TimeoutError(f"not done after {GUARD:g} s")

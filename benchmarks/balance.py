@@ -50,7 +50,7 @@ def look(simulation: withe.Simulation) -> Look:
 
 
 def static_residual(case: StressCase, simulation: withe.Simulation, moment: int) -> float | None:
-    """Greatest force out of balance over what is allowed: 1e-6 of the forces that act, and what rounding leaves."""
+    """Return the greatest imbalance of forces, relative to 1e-6 of the acting forces plus rounding errors."""
     if case.event == "drawn curl":
         return None
     state = look(simulation)
@@ -249,7 +249,7 @@ class _Sum:
         self._pair(-np.cross(moment, self._t) / self._lengths - torque[:, None] * self._spin)
 
     def over_allowed(self) -> float:
-        """The greatest of forces and couples out of balance, over what is allowed."""
+        """Return the greatest imbalance of forces and couples, relative to the allowed imbalance."""
         case = self._case
         free = slice(1, -1 if case.both_ends and case.nodes > 2 else None)
         # A node's place rounds as the length does, which shows in strains and in turns of edges.

@@ -105,7 +105,7 @@ def fly(case: Case, integrator: str, steps_a_period: int, steps: int, *, tight: 
 
 
 def takes(integrator: str, case: Case) -> bool:
-    """Fourth order goes back in time: nothing that loses, no contact."""
+    """Return False for fourth order with losses or contact, since its steps go partly backwards in time."""
     return integrator != "fourth_order" or not (case.viscous or case.kind == "contact")
 
 
@@ -264,7 +264,7 @@ def add_driven(report: Report) -> None:
     report.table("Driven rods: work and impulse of a support, greatest errors of a step", header, rows)
 
 
-# --- what is printed and drawn ----------------------------------------------------------------------------------
+# --- printing and drawing ---------------------------------------------------------------------------------------
 
 
 def plot(flights: list[Flight]) -> None:

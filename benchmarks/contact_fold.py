@@ -17,7 +17,7 @@ from reporting import Report, arguments, bar
 import withe
 
 LENGTH, WIDTH, THICKNESS, LGB = 0.297, 0.21, 1e-4, 0.048  # [m]
-WEIGHT = 0.08 * WIDTH * 9.81  # of 80 g/m^2 [N/m]
+WEIGHT = 0.08 * WIDTH * 9.81  # weight of 80 g/m^2 [N/m]
 FRICTION, DURATION = 0.3, 10.0  # [-], [s]
 CASES = (("backward_euler", 10e-3, 0.5), ("energy_momentum", 5e-3, 2.0))  # integrator, step [s], goal [s]
 

@@ -49,7 +49,7 @@ def _is_tight(case: ContactCase, simulation: withe.Simulation) -> bool:
 
 
 def judge(number: int) -> Verdict:
-    """Run a case and say what became of it."""
+    """Run a case and return its outcome."""
     case, verdict = draw_case(number), Verdict(number)
     simulation = build(case)
     energy = simulation.energy()

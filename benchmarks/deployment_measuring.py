@@ -11,7 +11,7 @@ from withe.deployment import Cable, measure, trial_cable
 from withe.perception.synthetic import render_mask
 
 MARGIN = 40  # [px]
-PIXEL, NEAR_PIXEL = 5e-4, 2.5e-4  # [m], of pictures of what hangs and of a loop
+PIXEL, NEAR_PIXEL = 5e-4, 2.5e-4  # [m], in pictures of a hanging cable and of a loop
 
 
 def looped(cable: Cable, seed: int) -> Cable:
@@ -56,4 +56,4 @@ def loop() -> np.ndarray:
 
     found = over(brentq(lambda reaction: over(reaction).y[3, -1], 4.6, 4.85, xtol=1e-10))
     line = found.sol(np.linspace(0.0, found.t[-1], 401))[2:].T
-    return np.concatenate([[[-3.0, 0.0]], line, [[line[-1, 0] - 2.0, 0.0]]])  # both layers go on
+    return np.concatenate([[[-3.0, 0.0]], line, [[line[-1, 0] - 2.0, 0.0]]])  # both layers continue

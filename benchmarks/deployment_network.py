@@ -12,11 +12,11 @@ from withe import deployment
 from withe.deployment.grasp_network import CURVATURES, LENGTHS, SHIPPED, STIFFNESSES
 
 DATA = Path(__file__).resolve().parent.parent / "tests" / "data"
-NODES = 200  # of a pattern
+NODES = 200  # nodes of a pattern
 GOALS = {"position": (2e-3, 1e-2), "rotation": (2e-3, 1e-2)}  # median, 95 %: [Lgb], [rad]
 # The dissertation's own weights on the table: median, 95 % and greatest.
 PUBLISHED = {"position": (0.073, 0.34, 0.79), "rotation": (0.015, 0.046, 0.077)}
-NUMBER = 2  # of the cable of the pattern
+NUMBER = 2  # number of the cable of the pattern
 
 
 def errors(found: deployment.Grasp, exact: deployment.Grasp) -> dict[str, np.ndarray]:

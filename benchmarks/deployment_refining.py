@@ -8,7 +8,7 @@ from reporting import Report, bar
 
 from withe.deployment import Cable, Deployment, LayPlan, deploy, plan
 
-# Pattern and friction, cable 2: each kind of curve, from what friction holds to what slips.
+# Pattern and friction for cable 2: each kind of curve, from held to slipping.
 CELLS = (("line", 0.2), ("circle", 0.4), ("sine", 0.4), ("letterU", 0.4), ("letterL", 0.7))
 NUMBER = 2
 NODES = (100, 200, 400)

@@ -52,8 +52,8 @@ PUBLISHED = {
 }
 NOISY_WAYS = ("exact", "intuitive", "network")
 NOISY_SPEED = 0.025  # [m/s]
-IN_TIME = 0.02  # [s], steps of what is laid in time: errors are within 0.1 mm of those at 0.0025
-SLIPPED = 1.0  # [mm]: what counts as a slip that should have been foreseen
+IN_TIME = 0.02  # [s], time step of dynamic runs: errors are within 0.1 mm of those at 0.0025 s
+SLIPPED = 1.0  # [mm], least slip that a plan should predict
 LARGE = 5.0  # [mm]: mean error above which a cell is explained
 NEAR = 2.0  # [Lgb] beside a stretch that friction does not hold, which moves with it
 COLOURS = {
@@ -76,7 +76,7 @@ class Run:
     cable: int
     friction: float
     way: str
-    seed: int | None  # of what the planner does not know; None: it knows all
+    seed: int | None  # seed of the unknown errors; None: no errors
     nodes: int
     error: float = np.nan
     std: float = np.nan
@@ -134,7 +134,7 @@ class Cell:
 
     @property
     def marks(self) -> str:
-        """Tests that say that it will slip: f floor, which is (9.2), l lift-off, e free end, t tail, o overlap."""
+        """Return the tests that predict slip: f floor (9.2), l lift-off, e free end, t tail, o overlap."""
         failed = {slip.test for slip in self._said}
         letters = {"floor": "f", "lift-off": "l", "free end": "e", "tail": "t", "overlap": "o"}
         return "".join(letter for test, letter in letters.items() if test in failed)
@@ -204,7 +204,7 @@ class Patterns:
                 cable if seed is None else looped(cable, seed),
                 self.pattern(name),
                 way,
-                friction=friction if way == "optimised" else None,  # that the others slip is what the table shows
+                friction=friction if way == "optimised" else None,  # the table shows that the others slip
                 speed=NOISY_SPEED,
                 crossings="over",
                 progress=False,
@@ -213,7 +213,7 @@ class Patterns:
 
 
 def carried_out(run: Run, patterns: Patterns) -> Run:
-    """Lay through equilibria, or in time: with noise, and what no row of equilibria follows."""
+    """Lay through equilibria, or dynamically: with noise, or if no sequence of equilibria exists."""
     try:
         motion = patterns.plan(run.pattern, run.cable, run.planned, run.friction, run.seed)
         if run.way == "placed":
@@ -236,7 +236,7 @@ def carried_out(run: Run, patterns: Patterns) -> Run:
 
 
 def cells_of(runs: list[Run], patterns: Patterns, trials: int) -> dict[Key, Cell]:
-    """Those that were laid without noise; with noisy trials where all of them were."""
+    """Return cases without noise, and cases with noisy trials if all trials are complete."""
     cells = {}
     for run in runs:
         if run.seed is None:
@@ -248,7 +248,7 @@ def cells_of(runs: list[Run], patterns: Patterns, trials: int) -> dict[Key, Cell
 
 
 def tables(report: Report, cells: dict[Key, Cell], ways: tuple[str, ...]) -> None:
-    """Means and standard deviations, point by point and from the nearest point, beside what was published."""
+    """Return means and standard deviations, per point and from the nearest point, with the published values."""
     rows, nearest, slipped = [], [], []
     for key in dict.fromkeys(key[:3] for key in cells):
         here = [cells.get((*key, way)) for way in ways]
@@ -420,26 +420,26 @@ def main() -> None:
     report.write()
 
 
-_here: list[Patterns] = []  # of a worker
+_here: list[Patterns] = []  # patterns of a worker
 
 
 def begin(nodes: int) -> None:
-    """A worker: patterns of its own; Ctrl-C is for who has begun it, who lets it end what it does."""
+    """Initialise a worker with its own patterns. It ignores Ctrl-C: the main process lets it end its task."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     _here.append(Patterns(nodes))
 
 
 def carried_out_here(run: Run) -> Run:
-    """By a worker."""
+    """Carry out a run in a worker."""
     return carried_out(run, _here[0])
 
 
 def laid(wanted: list[Run], patterns: Patterns, lines: Lines, known: bool) -> list[Run]:
-    """Carry out what is wanted; each run is printed and written as it ends. Those that were not interrupted."""
+    """Carry out the requested runs, and print and write each at its end. Return the completed ones."""
     done = {(run.key, run.seed, run.nodes): run for run in (Run(**line) for line in lines.known)}
     left = [run for run in wanted if (run.key, run.seed, run.nodes) not in done]
     if not known and left:
-        os.environ.setdefault("OMP_NUM_THREADS", "1")  # of workers, torch's too
+        os.environ.setdefault("OMP_NUM_THREADS", "1")  # for workers, also for torch
         workers = ProcessPoolExecutor(
             min(os.cpu_count() or 1, len(left)), get_context("spawn"), initializer=begin, initargs=(patterns.nodes,)
         )

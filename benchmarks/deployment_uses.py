@@ -33,7 +33,7 @@ from withe.deployment.cable import LOOP_HEIGHT
 from withe.errors import ConvergenceError
 
 WAYS = ("exact", "optimised", "intuitive")  # optimised: placement only
-PUBLISHED = {"S": "9, 0", "U": "9, 0", "trefoil": "9, 0", "reef": "7, 0"}  # of 10: optimal, intuitive
+PUBLISHED = {"S": "9, 0", "U": "9, 0", "trefoil": "9, 0", "reef": "7, 0"}  # successes of 10: optimal, intuitive
 GOALS = {"S": 0.9, "U": 0.9, "trefoil": 0.9, "reef": 0.7}
 NODES, QUICK_NODES = 130, 60
 RULER = 5e-4  # [m], standard deviation

@@ -103,7 +103,7 @@ class KnotRun:
 
 
 def largest_stable_step(run: dict, first: float, duration: float, parts: int = 10) -> float:
-    """Largest step [s] that survives so long, to a fifth: what `KnotRun` takes in `run`, without the step."""
+    """Return the largest stable step [s], to a fifth. `run`: arguments of `KnotRun` without the step."""
     step = first
     while step > 1e-9:
         one = KnotRun(**run, time_step=step)

@@ -11,7 +11,7 @@ from rods_in_motion import steps_of
 
 __all__ = ["PushRun"]
 
-# Too little to limit the step. The rod does not sink: the plane answers all that presses on it, whatever its depth.
+# Too small to limit the step. The rod does not sink: the plane supports any pressing force at every depth.
 STIFFNESS = 100.0  # [N/m]
 SLIP_TOLERANCE = 1e-3  # [m/s]
 

@@ -106,7 +106,7 @@ class ElasticaRun:
             rod.omega_collection[:] = np.einsum("ijk,j->ik", frames, np.array([0.0, -1.0, 0.0])) * slope
 
     def step(self, count: int) -> None:
-        """Take so many steps."""
+        """Take `steps` steps."""
         step, system, now, time_step = self._stepper.step, self._system, self._time, self._time_step
         for _ in range(count):
             now = step(system, now, time_step)
@@ -131,7 +131,7 @@ class ElasticaRun:
         return Motion(np.array(times), np.array(tips))
 
     def time_per_step(self, seconds: float) -> float:
-        """Processor time of a step, over steps that take about so long, or the whole run [s]."""
+        """Return the processor time of a step [s], over steps of about this total time, or over the whole run."""
         start, done = time.thread_time(), 0
         while done < self.count and time.thread_time() - start < seconds:
             now = min(500, self.count - done)

@@ -19,11 +19,11 @@ from rods_in_motion import steps_of
 
 __all__ = ["SheetRun", "Strip"]
 
-CONTACT_STIFFNESS = 1.0  # [N/m]; the plane answers all that presses on it, whatever its depth
+CONTACT_STIFFNESS = 1.0  # [N/m]; the plane supports any pressing force at every depth
 CONTACT_DAMPING = 1e-3  # [kg/s]
-FILTER_ORDER = 5  # of the low-pass filter of velocities
+FILTER_ORDER = 5  # order of the low-pass filter of velocities
 POSES_APART = 5e-3  # [s]
-ROUND = 5e-3  # radius with which a rod is made, before it gets what a sheet has [m]: thinner ones are refused
+ROUND = 5e-3  # radius of a rod before it gets the stiffness of a sheet [m]; thinner rods are refused
 
 
 class _System(
@@ -196,7 +196,7 @@ class SheetRun:
             rod.inv_mass_second_moment_of_inertia[i, i, :] = 1.0 / inertia
 
     def frames(self, count: int = 100) -> Iterator[tuple[float, np.ndarray]]:
-        """Fold; time [s] and positions of the nodes [m], shape (nodes, 3), so many times on the way."""
+        """Fold. Return times [s] and positions of the nodes [m], shape (nodes, 3), at some moments."""
         now = np.float64(0.0)
         stops = np.linspace(0, self._count, count + 1).astype(int)
         for first, last in pairwise(stops):

@@ -28,7 +28,7 @@ CASES = {  # paper, target, bound of curvature of a free moment [1/Lgb]
     "cardboard half": (folding.Paper.cardboard(), "half", 4.0),
     "cardboard .20": (folding.Paper.cardboard(), 0.20, 6.5),
 }
-KNOWN = {  # by searches of their own: without moment, with a free one
+KNOWN = {  # from independent searches: without moment, with a free moment
     "A4 half": (0.220, 0.0),
     "US half": (0.306, 0.0),
     "US .20": (None, 0.275),
@@ -36,7 +36,7 @@ KNOWN = {  # by searches of their own: without moment, with a free one
     "cardboard .20": (None, 0.56),
 }
 FRICTION = 0.12
-POINT = folding.Jaw(depth=0.0, finger=0.0)  # what the known figures without moment are of
+POINT = folding.Jaw(depth=0.0, finger=0.0)  # jaw of the known values without moment
 COLOURS = {"ucs": "#ffffff", "slip, free moment": "#f4a261", "intuitive": "#e63946"}
 
 
@@ -54,7 +54,7 @@ def scattered(count: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def equilibria(report: Report, quick: bool) -> None:
-    """Scattered points: time, and the first integral, which nothing of the solution's way knows."""
+    """Solve at scattered points. Check time, and the first integral, which the solver does not use."""
     x, z = scattered(2_000 if quick else 100_000)
     folding.elastica(1.0, 1.0)  # makes the table
     found: list[Elastica] = []
@@ -261,7 +261,7 @@ def draw(top: Elastica | None) -> None:
 
 
 def replace_invalid(pose: Elastica, there: np.ndarray) -> Elastica:
-    """The same with harmless numbers where there is no sheet."""
+    """Return the same with harmless numbers for invalid sheets."""
     return replace(
         pose,
         tangential_force=np.where(there, pose.tangential_force, 0.0),

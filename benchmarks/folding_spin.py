@@ -73,7 +73,7 @@ def cases() -> Iterator[Case]:
 
 
 def turned(plan: folding.Plan, seed: int, replans: int) -> Turned:
-    """Fold one sheet, watched if it is planned anew on the way."""
+    """Fold one sheet, watched by a camera if the plan is updated on the way."""
     begin = time.thread_time()
     sheet = folding.WideSheet(plan.paper, seed, folding.Noise(friction_variation=0.0))
     try:
@@ -87,10 +87,10 @@ def turned(plan: folding.Plan, seed: int, replans: int) -> Turned:
 
 
 def planned(case: Case) -> folding.FoldPlan:
-    """By the paper, as it is thought to be."""
+    """Return the plan for the nominal paper."""
     paper = replace(PAPERS[case.paper], friction=case.friction, width=case.width)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # of slide that is predicted
+        warnings.simplefilter("ignore", UserWarning)  # predicted slide
         asked = WAYS[case.way]
         curvature = CURVATURES.get(case.paper) if asked.get("grasp") == "free" else None
         return folding.plan(paper, progress=False, curvature=curvature, **asked)

@@ -28,8 +28,8 @@ CASES = {
     "origami .30": (folding.Paper.origami(), 0.30),
 }
 REPLANS = 5
-LEFT = (0.02, 0.3)  # of Lgb and friction, in doubt about sheets that are measured and watched
-WAYS = {  # how the planner is asked, and whether the fold is watched
+LEFT = (0.02, 0.3)  # remaining uncertainty of Lgb and friction of measured and watched sheets
+WAYS = {  # arguments of the planner, and true if the fold is watched
     "intuitive": ({"method": "intuitive"}, False),
     "local": ({"method": "local"}, False),
     "ucs": ({"method": "ucs"}, False),
@@ -38,10 +38,10 @@ WAYS = {  # how the planner is asked, and whether the fold is watched
     "slip closed": ({"method": "slip", "grasp": "free"}, True),
     "ucs as a strip": ({"method": "ucs"}, False),
 }
-STRIP = "ucs as a strip"  # as the dissertation plans a square
+STRIP = "ucs as a strip"  # method of the dissertation for a square
 ONLY = {STRIP: ("origami .30",)}
 CURVATURES = {"cardboard half": 4.0, "cardboard .20": 6.5}  # bounds of free moments that such a fold needs [1/Lgb]
-CORNERS = ("origami .30",)  # that bear no moment
+CORNERS = ("origami .30",)  # cases that bear no moment
 PUBLISHED = {  # table 7.2, sheets 21 cm wide [cm]
     "A4 half": {"intuitive": "12.31 .63", "local": "13.51 .13", "ucs": "14.74 .05", "ucs closed": "14.64 .07"},
     "cardboard half": {"intuitive": "5.88 .38", "local": "none", "ucs": "12.8 .27", "ucs closed": "13.75 .19"},
@@ -55,7 +55,7 @@ Key = tuple[str, float, str]  # case, friction, way
 
 
 def trial_of(key: Key, seed: int, sheet: dict) -> folding.Trial:
-    """One fold: its sheet differs from the paper in what the seed says."""
+    """One fold. The seed determines the difference between its sheet and the paper."""
     case, friction, way = key
     paper, target = CASES[case]
     asked, watched = WAYS[way]
@@ -104,7 +104,7 @@ class Folded:
 
     @classmethod
     def of(cls, key: Key, outcome: folding.Outcome) -> Folded:
-        """From what `run_trials` hands out."""
+        """Return a fold from an outcome of `run_trials`."""
         return cls(
             *key,
             outcome.trial.seed,
@@ -127,13 +127,13 @@ class Folded:
 
 
 def run(wanted: dict[Key, list[folding.Trial]], options: argparse.Namespace) -> list[Folded]:
-    """Carry out trials; each is printed and written as it ends. Returns those that are."""
+    """Carry out trials, and print and write each at its end. Return the completed ones."""
     lines = Lines("folding_trials", resume=options.resume)
     asked = [(key, trial.seed, trial.sheet) for key, trials in wanted.items() for trial in trials]
     folds = [fold for fold in (Folded(**line) for line in lines.known) if (fold.key, fold.seed, fold.sheet) in asked]
     done = {(fold.key, fold.seed) for fold in folds}
     left = [trial for key, trials in wanted.items() for trial in trials if (key, trial.seed) not in done]
-    left.sort(key=lambda trial: trial.seed)  # what is interrupted has as many folds in every line, or nearly
+    left.sort(key=lambda trial: trial.seed)  # after an interruption all lines have nearly the same number of folds
     keys = {name_of(key): key for key in wanted}
     try:
         for outcome in folding.run_trials(left, workers=options.processes):
@@ -181,7 +181,7 @@ def infeasible(fold: Folded) -> bool:
 
 
 def goals(report: Report, groups: dict[Key, list[Folded]]) -> None:
-    """On the slippery table: what is folded without a camera, and with one."""
+    """Return cases on the slippery table, without and with a camera."""
     for (case, friction, way), folds in groups.items():
         soft = case in ("A4 half", "A4 .25", "US half", "origami .30")
         if friction != FRICTIONS[0] or not (way == "slip" or (soft and way == "ucs closed")):
@@ -196,7 +196,7 @@ def goals(report: Report, groups: dict[Key, list[Folded]]) -> None:
 
 
 def draw(groups: dict[Key, list[Folded]]) -> None:
-    """Errors of all trials, case by case, those that failed at the border."""
+    """Draw errors of all trials, per case. Failed trials are at the border."""
     import matplotlib
 
     matplotlib.use("Agg")

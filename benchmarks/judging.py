@@ -73,7 +73,7 @@ def judge_all(
                         shown.advance(1)
                     except BrokenProcessPool:
                         broken.append(futures[future])
-            # Those that were running when the process went down stand first among the broken ones.
+            # Runs that were active when the process ended are listed first among the failed ones.
             for number in sorted(broken, key=waiting.index)[:4]:
                 verdicts[number] = alone(number)
                 shown.advance(1)

@@ -35,7 +35,7 @@ def _even(case: Case, motion: Motion) -> np.ndarray:
 
 
 def _extrapolate(sizes: list[float], tips: list[np.ndarray]) -> tuple[np.ndarray, float]:
-    """Second order in edges and steps: the limit of the finest two, and its distance from the one before."""
+    """Return the limit of the two finest results, of second order in edges and steps, and its change."""
 
     def limit(a: int, b: int) -> np.ndarray:
         weight = sizes[b] ** 2 / (sizes[a] ** 2 - sizes[b] ** 2)

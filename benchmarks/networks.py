@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from reporting import OUT, kilobytes
 
-SOURCE_SECONDS = 120.0  # for which a source's network is trained here where tools/train_networks.py has made no file
-PUBLISHED_SIZE = "1900"  # of a source's network [kB]
+SOURCE_SECONDS = 120.0  # training time of a source's network, if tools/train_networks.py has not made a file
+PUBLISHED_SIZE = "1900"  # size of a source's network [kB]
 
 
 def torch_is_there() -> bool:
-    """True if networks can be asked; prints a note if not."""
+    """Return True if networks are available. Otherwise print a note."""
     there = importlib.util.find_spec("torch") is not None
     if not there:
         print("\nNetworks: torch is not installed")

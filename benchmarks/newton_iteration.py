@@ -53,7 +53,7 @@ def _run(executable: Path, lapacks: dict, quick: bool) -> dict[tuple[str, int], 
     seconds = defaultdict(list)
     for run in compiled.repetitions(executable, environment, quick=quick):
         name, nodes = run["name"].split("/")[:2]
-        # Processor time of both; that of dpbsv is noted by hand, without copying the band, and called real.
+        # Processor time of both. That of dpbsv is measured by hand, without the copy of the band, and called real.
         seconds[name, int(nodes)].append(1e-6 * run["real_time" if "dpbsv" in name else "cpu_time"])
     return {key: Timing(tuple(values)) for key, values in seconds.items()}
 

@@ -20,9 +20,9 @@ from ringing_rod import UNKNOWNS, let_go, ringing
 from soft_limb import CONSTANT, LIMB, log, published, robot, seen_curvatures
 
 LINEAR = [(rod, "natural_curvature", "linear") for rod in ("upper", "lower")]
-PUBLISHED_TIP = 2.9  # figure 6.7, whose camera is not told [mm]
-TRUTH = np.array([1e6, 3000.0])  # of what rings: Young's modulus [Pa], viscosity [Pa s]
-SCALE, NOISE = 3600.0, 0.5  # of the camera [px/m], of its tags [px]
+PUBLISHED_TIP = 2.9  # figure 6.7, whose camera is not published [mm]
+TRUTH = np.array([1e6, 3000.0])  # of the vibrating rod: Young's modulus [Pa], viscosity [Pa s]
+SCALE, NOISE = 3600.0, 0.5  # scale of the camera [px/m], noise of its tags [px]
 
 
 def _curvatures(report: Report) -> None:
@@ -123,7 +123,7 @@ def _errors(report: Report, seeds: int) -> None:
 
 
 def _drawn(nodes: int, turn: float, curvature: float) -> withe.Simulation:
-    """An arm drawn as an arc of 0.3 m that begins along x but for a turn upwards."""
+    """Return an arm drawn as an arc of 0.3 m. It begins along x, turned upwards by an angle."""
     scene = withe.Scene()
     rubber = withe.Material(youngs_modulus=5e6, density=1000.0)
     edge = 0.3 / (nodes - 1)

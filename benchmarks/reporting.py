@@ -54,7 +54,7 @@ RESUME = ("--resume", {"action": "store_true", "help": "keep what an earlier run
 
 
 def arguments(doc: str | None, *extra: tuple[str, dict]) -> argparse.Namespace:
-    """Command line of a benchmark: ``--quick`` for all, and what it adds."""
+    """Return the command line of a benchmark: ``--quick`` for all, and its own options."""
     parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="a few seconds: shows that it works, measures nothing")
     for flag, options in extra:
@@ -128,7 +128,7 @@ def kilobytes(path: Path) -> str:
     return f"{path.stat().st_size / 1e3:.0f}"
 
 
-# --- what a run that is cut off leaves ---------------------------------------------------------------------------
+# --- partial results of interrupted runs -------------------------------------------------------------------------
 
 
 class Lines:

@@ -27,7 +27,7 @@ __all__ = [
 
 ACTIONS = 60
 FINE = 32  # shorter steps of the converged run
-AGREE = 2e-3  # of it and of one in steps twice as long [m]: what is chaotic has no converged run
+AGREE = 2e-3  # difference from a run with steps twice as long [m]: chaotic runs do not converge
 WARM = 10  # control steps before the clock runs
 
 
@@ -36,7 +36,7 @@ class FreeArm(withe.learning.Follow):
 
 
 class PlanarArm(withe.learning.Obstacles2D):
-    """The planar arm in steps of 0.1 s, with nothing in its way."""
+    """The planar arm in steps of 0.1 s, without obstacles."""
 
     control_step = 0.1
     time_step = 0.05
@@ -102,7 +102,7 @@ def settled_tip(turns: np.ndarray, gravity: float) -> np.ndarray:
 
 
 def tip_error(kind: type[Arm], seed: int, count: int = ACTIONS) -> float:
-    """RMS distance of the tip from that of a converged run [m]."""
+    """Return the RMS distance of the tip from the tip of a converged run [m]."""
     return _apart(tips(kind(), seed, count), converged_tips(kind, seed, count))
 
 

@@ -19,7 +19,7 @@ __all__ = ["MujocoArms", "converged_error", "steps_a_second", "tips_of"]
 _EDGE, _LINE = LENGTH / EDGES, DENSITY * np.pi * RADIUS**2
 # Square sections alone keep a curvature in both directions: one as stiff in bending as the arm's circle.
 _HALF = 0.5 * (3.0 * np.pi) ** 0.25 * RADIUS
-_UPDATES = 4  # of the bends in a control step
+_UPDATES = 4  # updates of the bends in a control step
 _SCENE = """
 <mujoco>
   <option timestep="{step!r}" integrator="discrete" solver="Newton" gravity="0 0 -9.81"/>
@@ -143,13 +143,13 @@ def tips_of(time_step: float, bends: np.ndarray, updates: int = _UPDATES) -> np.
 
 
 def converged_error(time_step: float, fine: float, bends: np.ndarray) -> float:
-    """RMS distance of the tip from that of the same in short steps, whose bends go on evenly [m]."""
+    """Return the RMS distance of the tip from a run with short steps and evenly changing bends [m]."""
     apart = tips_of(time_step, bends) - tips_of(fine, bends, updates=100)
     return float(np.sqrt(np.mean(np.sum(apart**2, axis=1))))
 
 
 def steps_a_second(time_step: float, bends: np.ndarray, count: int, threads: int) -> float:
-    """Control steps a second of so many arms, after one that warms up; how they are led is known beforehand."""
+    """Return control steps per second of some arms, after a warm-up step. All actions are known beforehand."""
     arms, ways = MujocoArms(count, time_step, threads), ways_of(bends)
     arms.act(ways[0])
     start = time.perf_counter()

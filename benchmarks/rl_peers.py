@@ -134,7 +134,7 @@ def chain_tip(turns: np.ndarray) -> np.ndarray:
 
 
 def converged_error(time_step: float, fine: float, actions: np.ndarray) -> float:
-    """RMS distance of the tip from that of the same in short steps [m]."""
+    """Return the RMS distance of the tip from a run with short steps [m]."""
     apart = tips_of(ElasticaArm(time_step), actions) - tips_of(ElasticaArm(fine), actions)
     return float(np.sqrt(np.mean(np.sum(apart**2, axis=1))))
 

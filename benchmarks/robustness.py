@@ -55,7 +55,7 @@ class _RejectedError(Exception):
 
 @contextmanager
 def _clock(seconds: float) -> Iterator[None]:
-    """End what runs after so much processor time, also within the engine, as Ctrl-C does."""
+    """Stop a run after a given processor time, like Ctrl-C, also within the engine."""
 
     def ring(*_: object) -> None:
         raise _RejectedError("slow", f"not done after {seconds:g} s")
@@ -77,7 +77,7 @@ class _Ledger:
         energy = simulation.energy()
         self._start = self._stored(energy) + energy.gravity + energy.loads - energy.work
         self._gravity, self._loads = energy.gravity, energy.loads
-        # Rounding leaves some energy where nothing happens: a rod bent by 1e-4 rad has more.
+        # Rounding errors cause some energy even at rest: a rod bent by 1e-4 rad has more.
         self._scale = max(self._stored(energy), 1e-9 * case.stiffness / case.length)
         self.excess = 0.0
 
@@ -222,7 +222,7 @@ def _usable(case: StressCase) -> str:
 
 
 def judge(number: int) -> Verdict:
-    """Run a case and say what became of it."""
+    """Run a case and return its outcome."""
     case, verdict = draw_case(number), Verdict(number)
     try:
         with _clock(1.5 * LIMIT):

@@ -125,7 +125,7 @@ def simulation(case: Case, edges: int, **options: object) -> withe.Simulation:
 
 
 def integrators() -> tuple[str, ...]:
-    """Those of `INTEGRATORS` that this version has."""
+    """Return the integrators of `INTEGRATORS` that this version has."""
     found = []
     for name in INTEGRATORS:
         try:

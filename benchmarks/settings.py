@@ -18,7 +18,7 @@ GOAL = 20.0  # [us]
 
 
 def _simulation() -> withe.Simulation:
-    """A helix that stands on the floor, clamped at one end."""
+    """Return a helix that stands on the floor, clamped at one end."""
     turn = np.linspace(0.0, 3.0, NODES)
     scene = withe.Scene()
     rubber = withe.Material(youngs_modulus=1e6, density=1000.0)

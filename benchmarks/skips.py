@@ -15,7 +15,7 @@ from reporting import Report, arguments, bar, interleaved, once
 
 import withe
 
-SAME = 1e-9  # of the length
+SAME = 1e-9  # relative to the length
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def _simulation(
     linear_solver: str = "automatic",
     **options: object,
 ) -> withe.Simulation:
-    """An arm that falls under its weight; in space, with a load across, unless it is asked to stay in a plane."""
+    """Return an arm that falls under its weight. Unless it is planar, a transverse load moves it out of the plane."""
     scene = withe.Scene()
     arm = _arm(scene, nodes)
     if in_space:
@@ -63,7 +63,7 @@ def _simulation(
 
 
 def _nothing_more(scene: withe.Scene, arm: withe.Rod) -> None:
-    """Terms that are there and do nothing: a drag, loads and a custom force of zero."""
+    """Add terms without effect: a drag, loads and a custom force of zero."""
     scene.add_drag(1e-30)
     for node in range(1, 10):
         scene.add_force(arm.node(node), (0, 0, 0))
@@ -96,7 +96,7 @@ def _even_floor(scene: withe.Scene, arm: withe.Rod) -> None:
 
 
 def _hand(scene: withe.Scene, arm: withe.Rod) -> None:
-    """It yields by so much that it holds nothing."""
+    """Add a hand that is so soft that it exerts no force."""
     scene.grasp(arm, 0.3, 0.02, stiffness=(1e-15, 1e-15))
 
 
@@ -120,7 +120,7 @@ def _actuated(simulation: withe.Simulation) -> withe.Simulation:
 
 
 def skips(nodes: int) -> list[Skip]:
-    """The rows of the table "What is skipped", as far as this version knows the general path."""
+    """Return the rows of the table "What is skipped", as far as this version has the general path."""
     return [
         Skip(
             "anything out of a plane",

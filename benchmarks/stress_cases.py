@@ -130,9 +130,9 @@ def draw_case(number: int, methods: tuple[str, ...] = METHODS) -> StressCase:
     direction = rng.normal(size=3) * ((1.0, 0.0, 1.0) if planar else (1.0, 1.0, 1.0))
     strengths = {
         "load": (0.1, 100.0),  # P L^2 / EI
-        "jump": (0.01, 0.3),  # of the length
+        "jump": (0.01, 0.3),  # relative to the length
         "flip": (0.5, 30.0),  # radians of the rod's turn
-        "curl": (0.01, 1.0),  # of one turn per four edges
+        "curl": (0.01, 1.0),  # relative to one turn per four edges
         "drawn curl": (0.01, 1.0),
         "weight": (0.1, 1000.0),  # w L^3 / EI
     }
@@ -206,14 +206,14 @@ def natural_curvature_of(case: StressCase, moment: int) -> tuple[float, float]:
 def load_of(case: StressCase, moment: int) -> tuple[int, np.ndarray]:
     """Node and force [N] after the event of a moment."""
     node = case.nodes // 2 if case.both_ends else case.nodes - 1
-    # A rod drawn and born curved has nothing else to move it.
+    # A rod that is curved as drawn and naturally has no other drive.
     strength = {"load": case.strength, "drawn curl": 3.0 * (case.number % 2 == 0)}.get(case.event, 0.0)
     size = strength * case.stiffness / case.length**2
     return node, size * case.direction * (1.0 if moment == 0 else -1.0)
 
 
 def wall_of(case: StressCase, moment: int) -> np.ndarray:
-    """Directors of the wall of a rod drawn straight, rows d1, d2, tangent; -1: those of the far wall."""
+    """Return directors of the wall of a straight rod, rows d1, d2, tangent; -1: of the far wall."""
     frame = np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
     return frame @ _jump(case, moment).T if case.event == "jump" and moment >= 0 else frame
 

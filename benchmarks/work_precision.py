@@ -27,7 +27,7 @@ from rods_in_motion import CASES, Case, integrators, record, run_time, steps_of
 SATURATED = 0.5
 ROUNDS = 5
 SLICE = 2.0  # [s]
-_ENDLESS = 1e9  # a number that every reader of JSON knows
+_ENDLESS = 1e9  # a finite number, since JSON has no infinity
 
 
 @dataclass
@@ -113,7 +113,7 @@ def _stable_step(case: Case, edges: int) -> float:
 
 
 def _measure(point: Point, duration: float) -> Point:
-    """The error of a point; the step of a point of PyElastica or of Verlet becomes what it is in seconds."""
+    """Return the error of a point. Converts the step of PyElastica and of Verlet to seconds."""
     case = CASES[point.case]
     try:
         motion = _their_motion(case, point, duration) if point.theirs else _our_motion(case, point, duration)
@@ -182,7 +182,7 @@ def _their_run(point: Point, duration: float) -> Callable[[], float]:
 
 
 def _quick_guess(points: Iterable[Point], durations: dict[str, float]) -> None:
-    """One short look at each, to leave out what cannot be on a front."""
+    """Run each briefly, and omit those that cannot be on a front."""
     for point in points:
         case, duration = CASES[point.case], durations[point.case]
         point.time = run_time(case, point.edges, duration, limit=0.02, integrator=point.method, time_step=point.step)

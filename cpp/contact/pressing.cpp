@@ -20,7 +20,7 @@ Scalar unknown(double value, int index) {
     return Scalar::unknown(value, index);
 }
 
-/// Along the gradient of D at the end of the step.
+/// Pressing along the gradient of D at the end of the step.
 void add_end_pressing(const Touching& t, bool with_hessian, bool geometric, ContactLocal& out) {
   const ContactPair& pair = t.pair;
   const ClosestPoints& points = t.proximity.points;

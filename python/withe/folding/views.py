@@ -17,7 +17,7 @@ __all__ = ["strip_picture", "table_picture"]
 
 FloatArray = npt.NDArray[np.float64]
 Picture = npt.NDArray[np.uint8]
-_FINE = 4  # pixels of the drawing a pixel of the picture
+_FINE = 4  # pixels of the drawing per pixel of the picture
 _SHIFT = 6  # bits of the fractions of these
 _GRAIN = 3.0  # standard deviation of the sensor [grey levels]
 _PAPER, _BACK, _TABLE, _WALL = (236, 233, 226), (222, 226, 233), (38, 74, 62), (52, 60, 78)
