@@ -73,7 +73,7 @@ void check_contact(const ContactDescription& contact, const ContactDescription& 
   const auto share = [](double x) { return x >= 0.0 && x <= 1.0; };
   require(contact.obstacle_friction.rows() == own.obstacle_friction.rows() &&
               (contact.obstacle_rolling.size() == 0 || contact.obstacle_rolling.size() == own.obstacle_friction.rows()),
-          "friction needs three coefficients an obstacle, and rolling friction one");
+          "friction needs three coefficients per obstacle, and rolling friction one");
   require(std::isfinite(contact.friction) && contact.friction >= 0.0 && valid(contact.obstacle_friction) &&
               valid(contact.obstacle_rolling),
           "friction must not be negative");
