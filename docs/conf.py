@@ -40,7 +40,8 @@ default_role = "code"
 
 html_theme = "furo"
 html_title = f"withe {release}"
-html_static_path = []
+html_static_path = ["static"]
+html_css_files = ["wide.css"]
 html_theme_options = {"navigation_with_keys": True}
 
 pages.write(Path(__file__).parent)
