@@ -52,12 +52,6 @@ Reached reached(const Settings& settings, const Moving& now) {
 
 }  // namespace
 
-std::vector<SupportPose> poses_of(const std::vector<SupportMotion>& motions) {
-  std::vector<SupportPose> poses;
-  for (const SupportMotion& m : motions) poses.push_back(m.pose());
-  return poses;
-}
-
 bool has_rings(const Model& model) {
   return std::any_of(model.supports.begin(), model.supports.end(),
                      [](const Support& s) { return s.active && s.slides(); });

@@ -17,7 +17,6 @@ inline constexpr const char* kStiffnessHasNoGradient =
     "enable_contact(stiffness=) with a value that is high enough";
 inline constexpr const char* kRingHasNoGradient = "a rod slides through a ring; use a hand without slides=True";
 
-std::vector<SupportPose> poses_of(const std::vector<SupportMotion>& motions);
 bool has_rings(const Model& model);
 
 /// Begins a record at the present state. `contact`: in time steps; none where nothing can touch.

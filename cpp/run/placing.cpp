@@ -11,7 +11,6 @@
 #include "model/edge_vectors.hpp"
 #include "run/frames.hpp"
 #include "run/hold.hpp"
-#include "run/journal.hpp"
 #include "run/places.hpp"
 #include "steps/ring_forces.hpp"
 

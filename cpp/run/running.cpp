@@ -24,6 +24,12 @@ void SupportMotion::put(const SupportPose& pose) {
   fed = pose.fed;
 }
 
+std::vector<SupportPose> poses_of(const std::vector<SupportMotion>& motions) {
+  std::vector<SupportPose> poses;
+  for (const SupportMotion& m : motions) poses.push_back(m.pose());
+  return poses;
+}
+
 ObstacleWay ObstacleMotion::at(double time) const {
   const double share = shift.fraction(time), turned = turn.fraction(time);
   return {(1.0 - share) * from.shift + share * to.shift, (1.0 - turned) * from.turn + turned * to.turn};

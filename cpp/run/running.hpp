@@ -45,6 +45,8 @@ struct SupportMotion {
   void put(const SupportPose& pose);
 };
 
+std::vector<SupportPose> poses_of(const std::vector<SupportMotion>& motions);
+
 /// Motion of an obstacle.
 struct ObstacleMotion {
   ObstacleWay from, to;
