@@ -1,5 +1,5 @@
 # make demo    install what is missing, build, simulate a cantilever and compare it with theory
-# make test    all of ctest and pytest
+# make test    ctest and pytest, without the slow tests
 # make help    the rest
 #
 # PYTHON=/path/to/python3 chooses the interpreter that .venv is made from (default: the system's).
@@ -30,14 +30,15 @@ PYTHON_SOURCES := $(shell find python/withe -name '*.py' -o -name '*.pyi' -o -na
 # Folders too: a deleted file is a change.
 SOURCE_FOLDERS := $(wildcard cpp/*/) $(shell find python/withe -type d -not -name __pycache__)
 
-.PHONY: help demo view learn test ctest-build ctest ctest-baseline pytest asan tsan asan-python bench docs wheel lint format format-check prose types stubs stub-check \
+.PHONY: help demo view learn test test-all ctest-build ctest ctest-baseline pytest asan tsan asan-python bench docs wheel lint format format-check prose types stubs stub-check \
     tidy tidy-changed clean distclean
 
 help:
 	@echo "make demo          install what is missing, build, simulate a cantilever, compare with theory"
 	@echo "make view          install what pictures, films and notebooks need"
 	@echo "make learn         install torch, gymnasium and stable-baselines3, for withe.learning"
-	@echo "make test          all tests, C++ and Python"
+	@echo "make test          tests in C++ and Python, without the slow ones (about 5 minutes on two cores)"
+	@echo "make test-all      all tests, slow ones too"
 	@echo "make pytest        all tests in Python; TESTS=\"tests/physics -k knot\" runs some"
 	@echo "make ctest-baseline  C++ tests on an emulated machine without AVX (qemu-user)"
 	@echo "make asan          C++ tests under the address and undefined-behaviour sanitizers"
@@ -114,7 +115,10 @@ view: $(STAMPS)/installed $(STAMPS)/view_tools
 
 learn: $(STAMPS)/installed $(STAMPS)/learn_tools
 
+test: TESTS = $(IN_PARALLEL) -m "not slow"
 test: ctest pytest
+
+test-all: ctest pytest
 
 # With the C++ benchmarks, where what they measure with is installed, so that they go on compiling.
 GOOGLE_BENCHMARK := $(if $(wildcard /usr/include/benchmark/benchmark.h /usr/local/include/benchmark/benchmark.h),ON,OFF)
@@ -133,8 +137,10 @@ ctest-baseline: ctest-build
 	    qemu-x86_64 -cpu qemu64 $(BUILD)/tests/cpp/test_ROOM --gtest_brief=1
 
 # Each worker has a core: threads of NumPy's and torch's matrices would only wait for each other.
+IN_PARALLEL := --numprocesses $(TEST_JOBS) --dist worksteal
+
 pytest: $(STAMPS)/installed $(STAMPS)/test_tools
-	@OMP_NUM_THREADS=1 python -m pytest $(or $(TESTS),--numprocesses $(TEST_JOBS) --dist worksteal)
+	@OMP_NUM_THREADS=1 python -m pytest $(or $(TESTS),$(IN_PARALLEL))
 
 asan: $(STAMPS)/build_tools
 	@cmake --preset asan-ubsan

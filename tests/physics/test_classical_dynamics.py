@@ -177,6 +177,7 @@ def flown(edges, step):
     return np.array(found)
 
 
+@pytest.mark.slow
 def test_spaghetti_flies_as_a_beam_of_smooth_elements(spaghetti):
     """[Simo and Vu-Quoc 1986], the flexible one, in a plane: EA 1e4, EI 500, 8 N and 80 N m at an end."""
 

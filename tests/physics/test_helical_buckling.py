@@ -45,7 +45,9 @@ def test_numbers_solve_the_two_equations():
     assert MOMENT * BEND / TWIST + 4.0 * np.arccos(root) == pytest.approx(2.0 * np.pi * TURNS, rel=1e-7)
 
 
-@pytest.mark.parametrize(("bending", "bounds"), [("tangent", (1e-5, 8e-4)), ("angle", (2.5e-5, 1.5e-3))])
+@pytest.mark.parametrize(
+    ("bending", "bounds"), [("tangent", (1e-5, 8e-4)), pytest.param("angle", (2.5e-5, 1.5e-3), marks=pytest.mark.slow)]
+)
 def test_moment_and_tension_of_a_localised_helix_converge_at_second_order(bending, bounds):
     """Either measure of bending; edges longer than the chords of the helix and 2 tan(phi / 2) partly make up for each
     other here."""

@@ -12,7 +12,7 @@ import withe
 GRAVITY = 9.81
 
 
-@pytest.mark.parametrize("integrator", ["energy_momentum", "implicit_midpoint"])
+@pytest.mark.parametrize("integrator", ["energy_momentum", pytest.param("implicit_midpoint", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("radius", [4e-3, 8e-3])
 @pytest.mark.parametrize("tilt", [0.03, 0.05])
 def test_a_plank_on_a_cylinder_rocks_about_its_middle(integrator: Any, radius: float, tilt: float) -> None:

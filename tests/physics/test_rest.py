@@ -19,7 +19,10 @@ def dropped(friction=0.4, model="imcv2", friction_model="anchored", restitution=
     return simulation, simulation.energy().gravity * 0.9
 
 
-@pytest.mark.parametrize("friction_model", ["anchored", "implicit", "lagged", "semi_explicit"])
+@pytest.mark.parametrize(
+    "friction_model",
+    ["anchored", *(pytest.param(model, marks=pytest.mark.slow) for model in ("implicit", "lagged", "semi_explicit"))],
+)
 @pytest.mark.parametrize("model", ["imcv2", "barrier"])
 def test_a_dropped_cable_comes_to_rest_for_a_minute(model, friction_model):
     """Kinetic energy falls to rounding of the weight's."""
@@ -30,8 +33,8 @@ def test_a_dropped_cable_comes_to_rest_for_a_minute(model, friction_model):
         assert simulation.energy().kinetic < 1e-15 * fallen
 
 
-@pytest.mark.parametrize("restitution", [1.0, 0.5])
-@pytest.mark.parametrize("friction_model", ["anchored", "implicit"])
+@pytest.mark.parametrize("restitution", [1.0, pytest.param(0.5, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("friction_model", ["anchored", pytest.param("implicit", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("model", ["imcv2", "barrier"])
 def test_energy_momentum_steps_bring_it_to_rest_too(model, friction_model, restitution):
     """It is so light that it rests within the tolerance of contact, in steps of full length; jumps take 10 s.

@@ -58,6 +58,7 @@ def lifted(edges: int, way: np.ndarray) -> np.ndarray:
     return np.array([reaction.force[0], reaction.force[2], reaction.moment[1]])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("x", "z"), [(0.5, 1.5), (1.5, 2.0)])
 def test_a_tapered_rod_is_held_by_the_forces_of_the_continuum(x, z):
     weight = DENSITY * GRAVITY * THICKNESS * WIDEST

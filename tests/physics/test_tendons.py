@@ -177,7 +177,7 @@ def test_a_tendon_that_is_drawn_from_tip_to_base_does_the_same():
     np.testing.assert_allclose(tips[0], tips[1], atol=1e-12)
 
 
-@pytest.mark.parametrize("turns", [0.0, 0.5, 2.0])
+@pytest.mark.parametrize("turns", [0.0, 0.5, pytest.param(2.0, marks=pytest.mark.slow)])
 def test_tendons_that_wind_about_a_rod_bend_and_twist_it(turns):
     """One that winds and a straight one."""
     rate = 2.0 * np.pi * turns / LENGTH

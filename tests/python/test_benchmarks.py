@@ -31,6 +31,7 @@ def run(name, folder, *arguments):
     return done.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
     [
@@ -73,6 +74,7 @@ def test_the_short_form_writes_its_figures(name, tmp_path):
         assert goal["value"] is not None or not goal["met"]
 
 
+@pytest.mark.slow
 def test_a_run_that_was_cut_off_goes_on_with_what_it_had(tmp_path):
     run("deployment_tables", tmp_path, "--quick")
     file = tmp_path / "deployment_tables.jsonl"
@@ -136,6 +138,7 @@ def test_a_rod_that_is_pushed_sticks_or_slides_as_a_block_does(method, request):
     assert max(pushed(force)[0] for force in STICKING) < 1e-6
 
 
+@pytest.mark.slow
 def test_a_jaw_that_is_compiled_goes_as_one_that_is_interpreted(interpreted, monkeypatch):
     import numba
     from elastica_sheet import _put_jaw

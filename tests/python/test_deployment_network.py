@@ -124,6 +124,7 @@ def test_a_plan_from_the_network_is_that_of_exact_grasps_nearly():
     np.testing.assert_allclose(learned.feasibility(0.4).needed, exact.feasibility(0.4).needed)
 
 
+@pytest.mark.slow
 def test_the_network_lays_as_well_as_exact_grasps():
     cable, pattern = Cable(0.42, 1.6e-3, 0.03), bend()
     exact, learned = (

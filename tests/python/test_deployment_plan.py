@@ -174,7 +174,8 @@ def test_the_command_line_plans_and_says_what_holds(tmp_path, capsys):
     source = tmp_path / "wave.csv"
     np.savetxt(source, wave(), delimiter=",", header="x,y", comments="")
     pytest.importorskip("matplotlib").use("agg")
-    assert main(["deploy", str(source), "--dlo", "2", "--friction", "0.7", "--out", str(tmp_path)]) == 0
+    quick = ["--dlo", "2", "--nodes", "101", "--out", str(tmp_path)]
+    assert main(["deploy", str(source), *quick, "--friction", "0.7"]) == 0
     out = capsys.readouterr().out
     assert "holds at a coefficient of friction of 0.7" in out
     for ending in ("csv", "json", "png"):
@@ -185,16 +186,16 @@ def test_the_command_line_plans_and_says_what_holds(tmp_path, capsys):
     assert "wave_plan.csv must begin with a row x,y or x,y,z, or with numbers, got 't,x,y," in capsys.readouterr().err
     y_first = tmp_path / "y_first.csv"
     np.savetxt(y_first, wave()[:, ::-1], delimiter=",", header="y [m],x [m]", comments="")
-    assert main(["deploy", str(y_first), "--dlo", "2", "--out", str(tmp_path), "--no-picture"]) == 0
+    assert main(["deploy", str(y_first), *quick, "--no-picture"]) == 0
     assert (tmp_path / "y_first_plan.csv").read_text() == (tmp_path / "wave_plan.csv").read_text()
     y_first.write_text(y_first.read_text(), encoding="utf-8-sig")  # as spreadsheets save it
-    assert main(["deploy", str(y_first), "--dlo", "2", "--out", str(tmp_path), "--no-picture"]) == 0
+    assert main(["deploy", str(y_first), *quick, "--no-picture"]) == 0
     assert (tmp_path / "y_first_plan.csv").read_text() == (tmp_path / "wave_plan.csv").read_text()
     with_heights = tmp_path / "with_heights.csv"
     for header in ("x,y,z", "x [m],y [m],z [m]", ""):
         np.savetxt(with_heights, np.c_[wave(), np.zeros(len(wave()))], delimiter=",", header=header, comments="")
         with_heights.write_text(with_heights.read_text().lstrip())
-        assert main(["deploy", str(with_heights), "--dlo", "2", "--out", str(tmp_path), "--no-picture"]) == 0
+        assert main(["deploy", str(with_heights), *quick, "--no-picture"]) == 0
         assert (tmp_path / "with_heights_plan.csv").read_text() == (tmp_path / "wave_plan.csv").read_text()
     with_heights.write_text("x,y,z\n0,0,0\n0.1,0\n")
     assert main(["deploy", str(with_heights), "--dlo", "2"]) == 2

@@ -144,6 +144,7 @@ def test_bad_input_says_what_is_wrong(arc, arguments, message):
         deploy(plan(CABLE, arc), **arguments)
 
 
+@pytest.mark.slow
 def test_quasi_static_laying_is_what_slow_laying_tends_to(arc):
     motion = plan(CABLE, arc, speed=0.01)
     slow = deploy(motion, friction=0.6, nodes=NODES, progress=False)
@@ -152,6 +153,7 @@ def test_quasi_static_laying_is_what_slow_laying_tends_to(arc):
     assert not np.any(still.record.energy().kinetic)
 
 
+@pytest.mark.slow
 def test_bends_of_a_thick_cable_are_laid_where_they_should_lie():
     """Had friction across acted where the cable lifts off, and not behind it, 0.97 mm."""
     sine = np.genfromtxt(PATTERNS / "sine.csv", delimiter=",", skip_header=1)
@@ -159,6 +161,7 @@ def test_bends_of_a_thick_cable_are_laid_where_they_should_lie():
     assert found.error < 0.7e-3
 
 
+@pytest.mark.slow
 def test_a_push_holds_on_floors_on_which_a_bend_slips_without():
     pattern = Pattern(np.genfromtxt(PATTERNS / "letterU.csv", delimiter=",", skip_header=1), nodes=201)
     slips = {}
@@ -170,7 +173,7 @@ def test_a_push_holds_on_floors_on_which_a_bend_slips_without():
     assert slips["least_friction"] < 4e-4
 
 
-@pytest.mark.parametrize("nodes", [80, 200])
+@pytest.mark.parametrize("nodes", [80, pytest.param(200, marks=pytest.mark.slow)])
 def test_equilibria_follow_a_cable_of_any_mesh_that_slips_along_its_length(nodes):
     """The border of what slips goes on by a node an iteration: the finer the mesh, the more of them it takes."""
     sine = np.genfromtxt(PATTERNS / "sine.csv", delimiter=",", skip_header=1)
@@ -180,6 +183,7 @@ def test_equilibria_follow_a_cable_of_any_mesh_that_slips_along_its_length(nodes
     assert found.error == pytest.approx(4.07e-3, abs=1e-4)  # in time, at 6 mm/s, 80 nodes: 4.12 mm
 
 
+@pytest.mark.slow
 def test_equilibria_are_found_where_the_border_of_slip_has_many_nodes_to_go():
     """Laid along L, half of what lies of the limpest cable turns its slip in one step: 50 of 200 nodes, one by one."""
     letter = np.genfromtxt(PATTERNS / "letterL.csv", delimiter=",", skip_header=1)
@@ -199,6 +203,7 @@ def test_a_cable_put_on_its_pattern_moves_only_where_friction_fails(arc):
     assert np.abs(still.laid - moving.laid).max() < 1e-4
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:the cable slips")
 def test_optimising_makes_up_for_what_slips():
     pattern = Pattern(bend(1.0, radius=0.03), smoothing=3e-4)  # needs more friction than there is

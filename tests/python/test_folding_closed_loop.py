@@ -68,6 +68,7 @@ def test_a_fold_that_is_not_corrected_goes_the_planned_way(half):
     assert watched.record.positions("sheet")[-1, 0] == pytest.approx(half.poses[-1, :3], abs=1e-6)
 
 
+@pytest.mark.slow
 def test_a_watched_way_plunges_where_its_last_part_would_slide_unseen():
     sheet = SimulatedSheet(Paper.us_letter(), 1002, Noise(), **COARSE)
     paper = replace(sheet.paper, gravito_bending_length=sheet.truth.gravito_bending_length)
@@ -83,6 +84,7 @@ def test_a_watched_way_plunges_where_its_last_part_would_slide_unseen():
     assert abs(found.error) < 5e-4
 
 
+@pytest.mark.slow
 def test_a_plunge_without_moment_begins_over_the_target():
     """Also of a fold whose slow way skims the sheet on its last half, as that of a square over its diagonal does."""
     paper = replace(Paper.origami(), friction=0.12)

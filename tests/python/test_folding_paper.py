@@ -67,7 +67,7 @@ def test_the_error_is_that_of_drawn_readings():
     exact = measure(length=0.1, drop=0.043, error=error)
     drawn = [
         measure(length=0.1 + error * a, drop=0.043 + error * b).gravito_bending_length
-        for a, b in random.normal(size=(60, 2))
+        for a, b in random.normal(size=(30, 2))
     ]
     assert np.std(drawn) == pytest.approx(exact.error, rel=0.3)
 

@@ -157,7 +157,9 @@ def test_least_slide_without_a_moment_is_less_than_that_of_least_force():
 
 
 @pytest.mark.filterwarnings("ignore:the sheet slides")
-@pytest.mark.parametrize(("paper", "frictions"), [("a4", (0.12, 0.3)), ("us_letter", (0.28, 0.36))])
+@pytest.mark.parametrize(
+    ("paper", "frictions"), [pytest.param("a4", (0.12, 0.3), marks=pytest.mark.slow), ("us_letter", (0.28, 0.36))]
+)
 def test_more_friction_gives_no_worse_plan(paper, frictions):
     """At 0.24, 0.26 and 0.275 A4 slid by 0.03 to 0.08 mm on ways that were without slide at their nodes alone."""
     sheet = PAPERS[paper]()

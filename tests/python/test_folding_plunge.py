@@ -22,6 +22,7 @@ def ways():
     return paper, slow, plunge(slow, sheet=COARSE, progress=False)
 
 
+@pytest.mark.slow
 def test_us_letter_is_folded_short_on_a_slick_table(ways):
     paper, slow, quick = ways
     assert slow.slip_ratio.max() > 2 * paper.friction
@@ -72,6 +73,7 @@ def test_a_plunge_holds_over_what_the_plan_is_uncertain_of(ways, stiffness, fric
     assert abs(found.error) < 2e-3
 
 
+@pytest.mark.slow
 def test_the_planner_plunges_where_a_paper_that_it_may_be_would_slide(ways):
     """Half of US Letter does not slide as it is thought to be, and does where it is stiffer."""
     paper = ways[0]
@@ -100,6 +102,7 @@ def test_the_planner_comes_down_slowly_where_no_paper_slides():
     assert found.worst_slide[0] < 1e-4
 
 
+@pytest.mark.slow
 def test_where_nothing_bears_the_uncertainty_the_plan_says_so():
     """Cardboard on a table that is all but without friction."""
     paper = replace(Paper.cardboard(), friction=0.02)
@@ -112,6 +115,7 @@ def test_where_nothing_bears_the_uncertainty_the_plan_says_so():
     assert "fails within its uncertainty" in repr(found)
 
 
+@pytest.mark.slow
 def test_cardboard_is_folded_in_half_on_a_table_on_which_it_would_slide():
     """The plunge must fold all sheets; a way with less slide that misses some of them is not allowed."""
     paper = replace(Paper.cardboard(), friction=0.3)
@@ -135,6 +139,7 @@ def test_a_watched_plunge_goes_down_where_the_sheet_is_then(ways):
     assert found.record.positions("sheet")[-1, 0, 0] == pytest.approx(quick.poses[-1, 0] + 0.004, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_a_plunge_that_cannot_be_is_refused_with_the_friction_that_is_missing(ways):
     with pytest.raises(ValueError, match=r"would need friction 0\.2\d+, and the paper has 0\.12"):
         plunge(ways[1], within=1e-5, duration=0.025, sheet=COARSE, progress=False)

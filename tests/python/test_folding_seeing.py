@@ -81,6 +81,7 @@ def test_what_the_planner_must_not_see_is_measured():
         assert found.gravito_bending_length == pytest.approx(sheet.truth.gravito_bending_length, rel=3e-3)
 
 
+@pytest.mark.slow
 def test_a_strip_that_curls_is_as_stiff_as_it_is_when_both_of_its_sides_are_seen():
     random = np.random.default_rng(3)
     scaled, curls = [], []

@@ -57,6 +57,7 @@ def test_processes_fold_as_one_does(alone):
         assert outcome.failure == alone[outcome.trial.name].failure
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
 def test_workers_of_dask_fold_as_one_does(alone):
     distributed = pytest.importorskip("distributed")
@@ -68,6 +69,7 @@ def test_workers_of_dask_fold_as_one_does(alone):
         np.testing.assert_array_equal(figures(outcome), figures(alone[name]))
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_processes_at_once_and_keeps_what_has_come(tmp_path):
     """The first trial has no plan and comes within seconds; of the others none could end."""
     script = tmp_path / "many.py"

@@ -78,6 +78,7 @@ def test_a_camera_sees_how_both_sides_lie():
     assert flat.corners == pytest.approx(narrow.corners, abs=3e-4)
 
 
+@pytest.mark.slow
 def test_the_edges_of_a_wide_sheet_meet_where_it_is_watched(half):
     pytest.importorskip("cv2")
     sheet = WideSheet(A4, seed=3, unevenness=0.2, **MESH)
@@ -89,6 +90,7 @@ def test_the_edges_of_a_wide_sheet_meet_where_it_is_watched(half):
     assert watched.seen_slides[-1] == pytest.approx(watched.slides.mean(), abs=1e-3)
 
 
+@pytest.mark.slow
 def test_without_slide_nothing_turns():
     planned = plan(A4, method="slip", grasp="free")
     found = WideSheet(A4, seed=3, unevenness=0.2, **MESH).fold(planned, progress=False)

@@ -48,6 +48,7 @@ def test_cables_are_found_in_a_shaded_picture_without_any_filter(scene, picture)
     assert set(tracing.timings) > {"mask", "thin", "fit"}
 
 
+@pytest.mark.slow
 def test_the_upper_strand_is_told_from_the_lower_one_even_where_a_cable_crosses_itself():
     right = total = 0
     for seed in range(20):

@@ -50,6 +50,7 @@ def test_the_upper_cable_is_right_wherever_the_labels_tell_it(traced):
     assert right == total
 
 
+@pytest.mark.slow
 def test_the_default_filter_finds_the_right_number_too():
     wrong = [(tier, name) for tier, name, image, labels in pictures(FOLDER) if len(trace(image)) != labels.max()]
     assert wrong == []

@@ -9,7 +9,7 @@ from withe.perception import detect_tags
 cv2 = pytest.importorskip("cv2")
 
 
-@pytest.mark.parametrize("width", [24.0, 31.0, 45.0, 80.0])
+@pytest.mark.parametrize("width", [24.0, 31.0, 45.0, pytest.param(80.0, marks=pytest.mark.slow)])
 def test_tags_are_found_to_a_fraction_of_a_pixel(width):
     off, turned = [], []
     for seed in (0, 1, 2, 3, 104):  # in the last a tag of 24 px whose first corners are a pixel off

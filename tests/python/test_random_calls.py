@@ -12,7 +12,7 @@ PARTS = 5
 SEQUENCES = 500 * int(os.environ.get("WITHE_DRAWS", "1"))  # each
 
 
-@pytest.mark.parametrize("seed", range(PARTS))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, PARTS))])
 def test_random_calls_end_in_a_result_or_an_exception(seed):
     script = Path(__file__).with_name("random_calls.py")
     result = subprocess.run(

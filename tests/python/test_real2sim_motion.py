@@ -86,7 +86,8 @@ def swung(nodes, time_step, modulus, swings):
 
 
 @pytest.mark.parametrize(
-    ("nodes", "time_step", "cause"), [(5, 2e-3, "mesh too coarse"), (31, 1.5e-2, "time step too long")]
+    ("nodes", "time_step", "cause"),
+    [pytest.param(5, 2e-3, "mesh too coarse", marks=pytest.mark.slow), (31, 1.5e-2, "time step too long")],
 )
 def test_sigmas_count_what_a_coarse_mesh_and_a_long_step_leave(nodes, time_step, cause):
     random = np.random.default_rng(60)
@@ -107,6 +108,7 @@ def test_sigmas_count_what_a_coarse_mesh_and_a_long_step_leave(nodes, time_step,
     assert np.abs(scaled).max() > 0.05  # they are no larger than they need be
 
 
+@pytest.mark.slow
 def test_errors_have_the_size_that_the_covariance_says():
     exact = seen(0.0, viscosity=3000.0)
     rng = np.random.default_rng(7)

@@ -137,7 +137,7 @@ def test_a_photograph_of_a_sagging_rod_tells_its_shape_and_how_it_was_clamped():
     assert np.linalg.norm(simulation.positions("arm") - at_rest(nodes=121, turn=0.15, curvature=-2.0)[::4]) < 1e-3
 
 
-@pytest.mark.parametrize("points", [50, 400])
+@pytest.mark.parametrize("points", [50, pytest.param(400, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("known", [True, False])
 def test_errors_of_the_shape_have_the_size_that_the_covariance_says(points, known):
     simulation = arm()

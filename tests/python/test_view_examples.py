@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.slow
 ROOT = Path(__file__).resolve().parent.parent.parent
 # Options of each example, the number that it prints, and between what that number must lie.
 EXAMPLES = {
@@ -58,7 +59,6 @@ EXAMPLES = {
 SMALLER = {"fold_a_sheet": ("for seed in range(40, 44)", "for seed in range(40, 41)")}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(EXAMPLES))
 def test_an_example_finds_what_it_claims_and_writes_its_pictures(name, tmp_path, renderer):
     options, pattern, low, high = EXAMPLES[name]
@@ -73,7 +73,6 @@ def test_an_example_finds_what_it_claims_and_writes_its_pictures(name, tmp_path,
     assert list(tmp_path.glob("*.png"))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("path", sorted((ROOT / "notebooks").glob("*.ipynb")), ids=lambda path: path.stem)
 def test_a_notebook_runs_from_top_to_bottom(path, tmp_path):
     nbformat = pytest.importorskip("nbformat")
