@@ -279,14 +279,22 @@ def test_backward_euler_by_default_cuts_steps_in_which_a_rod_under_pressure_gain
     assert greatest_excess(loaded(straight(nodes), 1000.0, event, **options), 12) < 1e-3
 
 
-def let_go(integrator, steps_a_period):
-    """A rod drawn in a curl, straight by nature, let go."""
-    scene = rods.weightless()
+CURL_PERIOD = 2.0 * np.pi / 4.730**2  # of the first bending mode [s]
+
+
+def add_curl(scene):
+    """A rod drawn in a curl, straight by nature, and its nodes."""
     s = np.linspace(0.0, 1.0, 16)
     stiffness = rods.stiffness(stretch=1e4, bend=1.0)
     points = np.stack([s, 0.2 * s**3, 0.5 * s**2], axis=1)
-    rod = scene.add_rod(points=points, radius=0.02, line_density=1.0, stiffness=stiffness, natural="straight")
-    simulation = scene.build(integrator=integrator, time_step=2.0 * np.pi / 4.730**2 / steps_a_period)
+    return scene.add_rod(points=points, radius=0.02, line_density=1.0, stiffness=stiffness, natural="straight"), points
+
+
+def let_go(integrator, steps_a_period):
+    """A curl that begins to turn."""
+    scene = rods.weightless()
+    rod, points = add_curl(scene)
+    simulation = scene.build(integrator=integrator, time_step=CURL_PERIOD / steps_a_period)
     simulation.set_velocities(rod, np.cross((0.3, 4.0, 0.5), points))
     return simulation
 
@@ -379,3 +387,21 @@ def test_what_contact_takes_closes_the_balance_however_short_the_steps(step):
     energy = simulation.energy()
     assert energy.total + energy.dissipated == pytest.approx(start, abs=5e-4 * energy.kinetic)
     assert energy.kinetic > 5e-3
+
+
+@pytest.mark.filterwarnings("ignore::withe.CoarseStepWarning")
+@pytest.mark.parametrize("integrator", ["energy_momentum", "fourth_order"])
+@pytest.mark.parametrize("heavy", [1e3, 1e6, 1e9])
+def test_a_soft_rod_keeps_its_energy_beside_a_heavy_one_that_flies(integrator, heavy):
+    """The energy of the scene is that of the heavy rod, and tells nothing of the other one."""
+    scene = withe.Scene(gravity=(0.0, 0.0, -9.81))
+    soft, points = add_curl(scene)
+    stiffness = rods.stiffness(stretch=1e4 * heavy, bend=heavy)
+    other = scene.add_rod(start=(5, 0, 0), end=(6, 0, 0), nodes=4, radius=0.1, line_density=heavy, stiffness=stiffness)
+    simulation = scene.build(integrator=integrator, time_step=CURL_PERIOD / 8.0)
+    simulation.set_velocities(soft, np.cross((0.3, 4.0, 0.5), points))
+    simulation.set_velocities(other, (30.0, 0.0, 0.0))
+    first = simulation.energy(soft)
+    for _ in range(100):
+        simulation.step()
+        assert simulation.energy(soft).total == pytest.approx(first.total, abs=1e-6 * first.kinetic)

@@ -205,3 +205,40 @@ def test_an_obstacle_that_an_equilibrium_went_along_with_stays_there() -> None:
     simulation.step()
     assert simulation.obstacle_position(floor)[2] == pytest.approx(1e-3, rel=1e-12)
     assert abs(simulation.velocities(rod)).max() < 1e-2
+
+
+def pushed(seed: int, steps: int) -> tuple[withe.Simulation, float]:
+    """A rod between two clamps, and an obstacle that static steps push into it by 0.01 to 1 radii; the radius [m]."""
+    draw = np.random.default_rng(seed)
+    radius, nodes, weight = 3e-2 * 10 ** draw.uniform(-1.0, 0.0), int(draw.integers(11, 41)), draw.choice([0.0, 9.81])
+    material = withe.Material(youngs_modulus=10 ** draw.uniform(5.0, 9.0), poisson_ratio=0.5, density=1000.0)
+    scene = withe.Scene(gravity=(0.0, 0.0, -weight))
+    rod = scene.add_rod(start=(0, 0, 0), end=(50 * radius, 0, 0), nodes=nodes, radius=radius, material=material)
+    for end in (rod.start, rod.end):
+        scene.clamp(end)
+    x = 50.0 * radius * draw.uniform(0.3, 0.7)
+    if draw.random() < 0.5:
+        obstacle = scene.add_sphere((x, 0.0, -3.0 * radius), radius)
+    else:
+        obstacle = scene.add_capsule((x, -50.0 * radius, -3.0 * radius), (x, 50.0 * radius, -3.0 * radius), radius)
+    simulation = scene.build(integrator="static", time_step=1.0)
+    simulation.equilibrium()
+    at = simulation.positions(rod)
+    height = at[np.argmin(np.abs(at[:, 0] - x)), 2] - 2.0 * radius + 10 ** draw.uniform(-2.0, 0.0) * radius
+    place = simulation.obstacle_position(obstacle)
+    simulation.move(obstacle, position=np.add(place, (0.0, 0.0, height + 3.0 * radius)), over=float(steps))
+    simulation.step(steps)
+    return simulation, radius
+
+
+@pytest.mark.filterwarnings("ignore::withe.BranchChangedWarning", "ignore::withe.OutOfPlaneWarning")
+@pytest.mark.parametrize("steps", [1, 10])
+@pytest.mark.parametrize("seed", range(12))
+def test_contact_with_an_obstacle_that_is_pushed_in_static_steps_becomes_no_stiffer_than_it_need_be(
+    seed: int, steps: int
+) -> None:
+    """Contact stores its force times a depth of some 1e-4 to 1e-2 radii; a stiffer one stores less."""
+    simulation, radius = pushed(seed, steps)
+    force = simulation.contacts()["normal_force"].sum()
+    assert force > 0.0
+    assert simulation.energy().contact > 3e-5 * force * radius
