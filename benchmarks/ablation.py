@@ -183,7 +183,7 @@ def groups(quick: bool) -> dict[str, list[Scene]]:
         ]
         + [_stepped(_pushed_back, 100), *(_stepped(lambda law=law: _belt(law), 200) for law in contact_cases.LAWS)],
     }
-    return {name: scenes[:2] for name, scenes in found.items()} if quick else found
+    return {name: scenes[:1] for name, scenes in found.items()} if quick else found
 
 
 # --- runs ------------------------------------------------------------------------------------------------------
