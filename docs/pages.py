@@ -53,7 +53,8 @@ def name_page(module: str, name: str) -> list[str]:
     value = getattr(importlib.import_module(module), name)
     lines = [f"# {module}.{name}", "", "```{eval-rst}", f".. currentmodule:: {module}", ""]
     if inspect.isclass(value):
-        lines += [f".. autoclass:: {name}", "   :members:", "   :inherited-members: Env, Exception, VectorEnv, object, tuple"]
+        bases = "Env, Exception, VectorEnv, object, tuple"  # whose members are documented elsewhere
+        lines += [f".. autoclass:: {name}", "   :members:", f"   :inherited-members: {bases}"]
     else:
         lines += [f".. autofunction:: {name}" if inspect.isroutine(value) else f".. autodata:: {name}"]
     return [*lines, "```"]

@@ -79,7 +79,7 @@ void check_contact(const ContactDescription& contact, const ContactDescription& 
           "friction must not be negative");
   require(std::isfinite(contact.slip_tolerance) && contact.slip_tolerance > 0.0, "slip_tolerance must be positive");
   require(contact.obstacle_restitution.size() == own.obstacle_restitution.size(),
-          "restitution needs one coefficient an obstacle");
+          "restitution needs one coefficient per obstacle");
   require(share(contact.restitution) &&
               std::all_of(contact.obstacle_restitution.begin(), contact.obstacle_restitution.end(), share),
           "restitution must be from 0 to 1");
@@ -91,7 +91,7 @@ void check_shares(const Model& model, const ContactPairDescription& pair) {
   require((pair.first < 0) != (pair.second < 0), "friction varies between a rod and an obstacle only");
   const auto& rod = model.description.rods[at(std::max(pair.first, pair.second))];
   const auto size = static_cast<Eigen::Index>(rod.nodes.size()) + rod.rest_lengths.size();
-  require(pair.shares.size() == size, "friction of rod '" + rod.name + "' needs one number a node and an edge, ", size);
+  require(pair.shares.size() == size, "friction of rod '" + rod.name + "' needs one number per node and per edge, ", size);
   require(pair.shares.allFinite() && pair.shares.minCoeff() >= 0.0, "friction must be finite and not negative");
 }
 

@@ -73,7 +73,7 @@ Plan plan_of(const Model& model, const Options& options, const Parameters& param
   if (model.planar()) {
     plan.plane_normal = model.plane->normal;
     notes.push_back(
-        "planar: 2 unknowns a node, no twist; a scene that could buckle out of its "
+        "planar: 2 unknowns per node, no twist; a scene that could buckle out of its "
         "plane stays in its plane (build(planar=False) to force 3D)");
   } else {
     notes.push_back("3D: " + (options.planar.has_value() && !*options.planar ? std::string("planar=False")

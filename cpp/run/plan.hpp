@@ -21,7 +21,7 @@ struct Plan {
 
 /// History that a plan reports.
 struct PlanHistory {
-  bool left_plane = false;    ///< while running
+  bool left_plane = false;    ///< true if the scene left its plane while it ran
   std::string plane_left_by;  ///< what left the plane; empty where nothing did
   double separated = 0;       ///< how far overlapping rods were moved before the start [m]
   double stable_step = 0;     ///< of the explicit scheme [s]; 0 when not computed

@@ -15,7 +15,7 @@ struct Momentum {
 MatrixX3 positions(const Model& model, const State& state);
 /// Velocities of every node [m/s].
 MatrixX3 velocities(const Model& model, const State& state);
-/// Directors of the edges of a rod.
+/// Directors of the edges of a rod; each row has d1, d2 and t.
 MatrixX9 directors(const Model& model, const Configuration& c, int rod);
 /// Curvatures of the smooth rod, per stencil [1/m].
 MatrixX2 curvatures(const Model& model, const Parameters& parameters, const Configuration& c, int rod);

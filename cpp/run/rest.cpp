@@ -11,7 +11,7 @@
 namespace withe {
 namespace {
 
-// Times that an equilibrium is sought anew as contact becomes stiffer.
+// Number of attempts to find an equilibrium with stiffer contact.
 constexpr int kMaxStiffenings = 8;
 // Over what forces wanted of stiffness, what they may want where stiffer contact relieves surfaces.
 constexpr double kMaxRelievedRatio = 0.9;

@@ -6,7 +6,7 @@
 
 namespace withe {
 
-/// Moves overlapping rods apart in a scene with contact, and returns by how much at most [m]; 0 where none overlap.
+/// Moves overlapping rods apart in a scene with contact, and returns the greatest displacement [m]; 0 if none overlap.
 double separate(const Model& model, const Parameters& parameters, const Options& options, State& state);
 
 }  // namespace withe

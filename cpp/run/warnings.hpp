@@ -17,6 +17,7 @@ enum class Warning {
   drift,     ///< the integrator changes the energy
   crossing,  ///< rods pass through each other
   squeeze,   ///< obstacles squeeze a rod, and no contact stiffness is given
+  count,     ///< number of kinds
 };
 
 class Warnings {
@@ -49,7 +50,7 @@ class Warnings {
  private:
   static std::size_t index(Warning kind) { return static_cast<std::size_t>(kind); }
 
-  std::array<std::optional<std::string>, 8> messages_;
+  std::array<std::optional<std::string>, static_cast<std::size_t>(Warning::count)> messages_;
 };
 
 }  // namespace withe

@@ -14,7 +14,7 @@
 namespace withe {
 namespace {
 
-// Times that contact may be made stiffer before a step counts as failed.
+// Number of attempts with stiffer contact before a step counts as failed.
 constexpr int kMaxStiffenings = 4;
 // Inner steps times nodes that error control may take in one time step by default: about half a minute on one core.
 constexpr double kMaxWork = 3e7;
