@@ -123,10 +123,12 @@ void settle_contact(Equations& system, const Parameters& parameters, const Presc
   };
   int tries = 0;
   for (; r.converged && tries < kMaxStiffenings; ++tries) {
-    if (contact.contacts().depth() > kMaxDepth)
-      contact.stiffen(state, true);
-    else if (contact.presses_alike())
+    if (contact.contacts().depth() > kMaxDepth) {
+      contact.stiffen(state, true);  // contacts of a given stiffness; all others follow their forces
+      even_contact(parameters, system, given, false, state);
+    } else if (contact.presses_alike()) {
       break;
+    }
     again();
   }
   for (; r.converged && tries < kMaxStiffenings; ++tries) {

@@ -242,3 +242,14 @@ def test_contact_with_an_obstacle_that_is_pushed_in_static_steps_becomes_no_stif
     force = simulation.contacts()["normal_force"].sum()
     assert force > 0.0
     assert simulation.energy().contact > 3e-5 * force * radius
+
+
+@pytest.mark.filterwarnings("ignore::withe.BranchChangedWarning", "ignore::withe.OutOfPlaneWarning")
+def test_an_obstacle_that_is_pushed_in_a_static_step_ends_in_an_equilibrium() -> None:
+    """Surfaces are no deeper than contact lets them be, and a second search moves nothing."""
+    for seed in range(40):
+        simulation, radius = pushed(seed, 1)
+        before, gap = simulation.positions(), simulation.contacts()["gap"].min(initial=0.0)
+        assert gap > -0.04 * radius, seed
+        simulation.equilibrium()
+        assert np.abs(simulation.positions() - before).max() < 1e-6 * radius, seed
