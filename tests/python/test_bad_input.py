@@ -200,7 +200,10 @@ SCENES = [
     (lambda s, a, b: s.add_drag(1, rods=a), "rods of the drag must be a list of rods"),
     (lambda s, a, b: s.add_drag(1, rods=[a.end]), "rod of the drag must not be a node or an edge"),
     (lambda s, a, b: s.add_custom_force(3), "custom force must be a function, got 3"),
-    (lambda s, a, b: s.add_mass(a.end, 1, name="hand"), "name of the mass must be new: 'hand' is a rod"),
+    (
+        lambda s, a, b: s.add_mass(a.end, 1, name="hand"),
+        "name of the mass must be new: 'hand' is already the name of a rod",
+    ),
     (lambda s, a, b: s["leg"], "name must be a node of a rod"),
     (lambda s, a, b: setattr(s, "gravity", (0, 0)), "gravity must have shape (3,), got (2,)"),
     (lambda s, a, b: s.build(integrator="euler"), "integrator must be 'implicit_midpoint' or"),

@@ -432,7 +432,7 @@ def test_a_run_of_a_batch_calls_back_with_the_batch_and_ends_each_by_itself():
         assert (tips[:-1] >= limit).all()
     with pytest.raises(ValueError, match="must have equally many frames"):
         run.positions(arm)
-    with pytest.raises(ValueError, match=r"until must return one truth value or shape \(4,\)"):
+    with pytest.raises(ValueError, match=r"until must return one boolean or an array of shape \(4,\)"):
         batch.run(0.01, progress=False, until=lambda b: [True])
     for wrong in ({"duration": 0.003}, {"duration": 0.004, "record_every": 0.003}):
         with pytest.raises(ValueError, match=r"of a batch must be a whole number of time steps of 0\.002 s"):

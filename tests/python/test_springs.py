@@ -49,7 +49,7 @@ def test_a_spring_has_a_handle_a_name_and_the_drawn_length():
         ({"rest_length": -0.1}, "rest_length of spring 'spring 1' must"),
         ({"rest_length": float("inf")}, "rest_length of spring 'spring 1' must"),
         ({"damping": -0.1}, "damping of spring 'spring 1' must"),
-        ({"name": "a"}, "name of the spring must be new: 'a' is a rod"),
+        ({"name": "a"}, "name of the spring must be new: 'a' is already the name of a rod"),
     ],
 )
 def test_what_cannot_be_a_spring_is_refused(arguments, message):

@@ -117,7 +117,9 @@ class BatchRun(Generic[B]):
             return []
         answer = np.asarray(self._until(self._batch))
         if answer.shape not in ((), (len(self._lanes),)):
-            raise ValueError(f"until must return one truth value or shape ({len(self._lanes)},), got {answer.shape}")
+            raise ValueError(
+                f"until must return one boolean or an array of shape ({len(self._lanes)},), got shape {answer.shape}"
+            )
         ends = np.broadcast_to(answer.astype(bool), (len(self._lanes),))
         return [number for number in self._going if ends[number]]
 

@@ -70,7 +70,9 @@ class Directory:
         if not isinstance(name, str) or not name or not name.isprintable():
             raise ValueError(f"name of the {word} must be printable text, got {name!r:.80}")
         if name in self.parts:
-            raise ValueError(f"name of the {word} must be new: {name!r} is a {kind_of(self.parts[name]).noun}")
+            raise ValueError(
+                f"name of the {word} must be new: {name!r} is already the name of a {kind_of(self.parts[name]).noun}"
+            )
         if parse_place(name) is not None:
             raise ValueError(f"name of the {word} must not look like the name of a node or edge, got {name!r}")
         return name

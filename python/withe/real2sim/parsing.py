@@ -31,7 +31,9 @@ def parse_unknowns(
     seen: set[tuple[str, str]] = set()
     for item in unknowns:
         if not isinstance(item, tuple) or len(item) not in (2, 3) or not isinstance(item[1], str):
-            raise ValueError(f"{what} must be tuples (rod, word) or (rod, 'natural_curvature', basis), got {item!r}")
+            raise ValueError(
+                f"{what} must be tuples (part, word), or (rod, word, basis) for 'natural_curvature', 'natural_twist' and 'points', got {item!r}"
+            )
         rod, word, *basis = item
         if word in shapes:
             unknown: Unknown = shapes[word](simulation, rod, *basis)
