@@ -223,12 +223,14 @@ def _uncurled(flat: Measured, read: FloatArray, error: float) -> Measured:
         found = least_squares(lambda x: misfits(x[:, None])[:, 0], begin, slopes, method="lm", xtol=1e-10)
     except RuntimeError as none:
         raise ValueError(
-            "argument turned must be a reading of the same strip, turned over and clamped at the same distance from its tip"
+            "argument turned must be a reading of the same strip, turned over and clamped at the same distance from "
+            "its tip"
         ) from none
     lgb, length, curl = found.x * scales
     if not found.success or lgb <= 0.0 or np.abs(found.fun).max() > max(0.02, 10.0 * error / lgb):
         raise ValueError(
-            "argument turned must be a reading of the same strip, turned over and clamped at the same distance from its tip"
+            "argument turned must be a reading of the same strip, turned over and clamped at the same distance from "
+            "its tip"
         )
     spread = np.sqrt(np.diag(np.linalg.inv(found.jac.T @ found.jac))) * error / size * scales
     return Measured(float(lgb), float(spread[0]), float(length / lgb), float(curl), float(spread[2]))

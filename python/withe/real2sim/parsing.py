@@ -32,7 +32,7 @@ def parse_unknowns(
     for item in unknowns:
         if not isinstance(item, tuple) or len(item) not in (2, 3) or not isinstance(item[1], str):
             raise ValueError(
-                f"{what} must be tuples (part, word), or (rod, word, basis) for 'natural_curvature', 'natural_twist' and 'points', got {item!r}"
+                f"{what} must be tuples (part, word), or (rod, word, basis) for {', '.join(shapes)}, got {item!r}"
             )
         rod, word, *basis = item
         if word in shapes:
