@@ -50,14 +50,7 @@ class Chain {
     out.edge_turn = by.edge_turn;
     components_ = by.planar_components;
     out.loads = by.loads;
-    out.spring_stiffness = by.spring_stiffness;
-    out.spring_rest_length = by.spring_rest_length;
-    out.spring_damping = by.spring_damping;
-    out.joint_stiffness = by.joint_stiffness;
-    out.joint_rest_angle = by.joint_rest_angle;
-    out.joint_damping = by.joint_damping;
-    out.joint_moment = by.joint_moment;
-    out.tendon_tension = by.tendon_tension;
+    static_cast<PartNumbers&>(out) = by;
     out.fluid_viscosity = by.fluid_viscosity;
     out.friction = by.friction;
     out.slip_tolerance = by.slip_tolerance;

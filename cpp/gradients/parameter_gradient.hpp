@@ -6,7 +6,7 @@
 namespace withe {
 
 /// Derivatives of a scalar by `Parameters` and by the values of loads, shaped like them.
-struct ParameterGradient {
+struct ParameterGradient : PartNumbers {
   VectorX edge_stretch;
   MatrixX2 edge_bend;
   VectorX edge_twist, edge_density, edge_rotary, edge_viscous_time, edge_drag;
@@ -15,9 +15,6 @@ struct ParameterGradient {
   std::vector<MatrixX2> natural_curvature;
   std::vector<VectorX> natural_twist, natural_stretch;
   MatrixX3 loads;
-  VectorX spring_stiffness, spring_rest_length, spring_damping;
-  VectorX joint_stiffness, joint_rest_angle, joint_damping, joint_moment;  ///< per revolute joint
-  VectorX tendon_tension;                                                  ///< per tendon
   double fluid_viscosity = 0, friction = 0, slip_tolerance = 0;
   MatrixX3 obstacle_friction, pair_friction;
   VectorX obstacle_rolling;

@@ -290,6 +290,15 @@ struct SceneDescription {
   FluidDescription fluid;
 };
 
+/// Numbers that each part of a kind owns one of, or derivatives of a scalar by these numbers. parameter_index.hpp names
+/// them.
+struct PartNumbers {
+  VectorX spring_stiffness, spring_rest_length, spring_damping;  ///< per spring [N/m], [m], [N s/m]
+  /// Per revolute joint [N m/rad], [rad], [N m s/rad], [N m].
+  VectorX joint_stiffness, joint_rest_angle, joint_damping, joint_moment;
+  VectorX tendon_tension;  ///< per tendon [N]
+};
+
 /// First row of a load among the rows of all loads.
 inline Eigen::Index first_load_row(const SceneDescription& scene, std::size_t load) {
   Eigen::Index row = 0;

@@ -138,7 +138,7 @@ struct SurfaceParameters {
 
 /// Parameters that may change during a run, with one entry per edge, stencil or node. The parameters that users set
 /// have names in parameter_index.hpp.
-struct Parameters {
+struct Parameters : PartNumbers {
   VectorX edge_stretch;  ///< EA [N]
   MatrixX2 edge_bend;    ///< EI1, EI2 [N m^2]
   VectorX edge_twist;    ///< GJ [N m^2]
@@ -151,11 +151,7 @@ struct Parameters {
   std::vector<MatrixX2> natural_curvature;  ///< per rod and stencil, smooth [1/m]
   std::vector<VectorX> natural_twist;       ///< per rod and stencil [rad/m]
   SurfaceParameters surfaces;
-  VectorX spring_stiffness, spring_rest_length, spring_damping;  ///< per spring [N/m], [m], [N s/m]
-  /// Per revolute joint [N m/rad], [rad], [N m s/rad], [N m].
-  VectorX joint_stiffness, joint_rest_angle, joint_damping, joint_moment;
-  VectorX tendon_tension;  ///< per tendon [N]
-  MatrixX3 loads;          ///< rows of all loads, load by load; see `LoadDescription::values`
+  MatrixX3 loads;  ///< rows of all loads, load by load; see `LoadDescription::values`
   BendMeasure measure;
   bool lumped = false;       ///< true if all masses are at nodes; see mass_matrix.hpp
   bool held_lumped = false;  ///< true if masses of edges at held nodes are at nodes
@@ -246,8 +242,6 @@ Parameters initial_parameters(const Model& model);
 void set_contact(const ContactDescription& contact, Parameters& parameters);
 /// Stiffnesses, densities, viscous time and drag of one rod, from one value an edge; update_derived must follow.
 void set_rod(const Model& model, int rod, const RodDescription& description, Parameters& parameters);
-/// Stiffness, rest length and damping of one spring, which must be finite and not negative.
-void set_spring(int spring, const SpringDescription& description, Parameters& parameters);
 /// Masses, stencil stiffnesses and discrete natural strains from the rest.
 void update_derived(const Model& model, Parameters& parameters);
 /// Updates the discrete natural strains of one rod.

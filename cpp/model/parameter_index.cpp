@@ -1,11 +1,12 @@
 #include "model/parameter_index.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <iterator>
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "common/check.hpp"
 #include "common/text.hpp"
@@ -15,44 +16,122 @@ namespace {
 
 using enum ParameterKind;
 
-constexpr std::array<ParameterInfo, 33> kIndex{{
-    {stretch_stiffness, "stretch_stiffness", Extent::edge, 1, "N", Range::positive, Derived::nothing},
-    {bend_stiffness, "bend_stiffness", Extent::edge, 2, "N m^2", Range::positive, Derived::stiffness},
-    {twist_stiffness, "twist_stiffness", Extent::edge, 1, "N m^2", Range::positive, Derived::stiffness},
-    {line_density, "line_density", Extent::edge, 1, "kg/m", Range::positive, Derived::masses},
-    {rotary_inertia, "rotary_inertia", Extent::edge, 1, "kg m", Range::non_negative, Derived::masses},
-    {viscous_time, "viscous_time", Extent::edge, 1, "s", Range::non_negative, Derived::viscous_times},
-    {drag, "drag", Extent::edge, 1, "Pa s", Range::non_negative, Derived::masses},
-    {natural_curvature, "natural_curvature", Extent::stencil, 2, "1/m", Range::any, Derived::natural_strains},
-    {natural_twist, "natural_twist", Extent::stencil, 1, "rad/m", Range::any, Derived::natural_strains},
-    {natural_stretch, "natural_stretch", Extent::edge, 1, "-", Range::positive, Derived::natural_strains},
-    {added_mass, "added_mass", Extent::node, 1, "kg", Range::non_negative, Derived::masses},
-    {gravity, "gravity", Extent::scene, 3, "m/s^2", Range::any, Derived::nothing},
-    {fluid_viscosity, "fluid_viscosity", Extent::scene, 1, "Pa s", Range::positive, Derived::nothing},
-    {fluid_regularization, "fluid_regularization", Extent::scene, 1, "m", Range::positive, Derived::nothing},
-    {ParameterKind::load, "load", Extent::load, 3, "N, N m or N/m", Range::any, Derived::nothing},
-    {spring_stiffness, "spring_stiffness", Extent::spring, 1, "N/m", Range::non_negative, Derived::nothing},
-    {spring_rest_length, "spring_rest_length", Extent::spring, 1, "m", Range::non_negative, Derived::nothing},
-    {spring_damping, "spring_damping", Extent::spring, 1, "N s/m", Range::non_negative, Derived::nothing},
-    {joint_stiffness, "joint_stiffness", Extent::joint, 1, "N m/rad", Range::non_negative, Derived::nothing},
-    {joint_rest_angle, "joint_rest_angle", Extent::joint, 1, "rad", Range::any, Derived::nothing},
-    {joint_damping, "joint_damping", Extent::joint, 1, "N m s/rad", Range::non_negative, Derived::nothing},
-    {joint_moment, "joint_moment", Extent::joint, 1, "N m", Range::any, Derived::nothing},
-    {tendon_tension, "tendon_tension", Extent::tendon, 1, "N", Range::non_negative, Derived::nothing},
-    {friction, "friction", Extent::scene, 1, "-", Range::non_negative, Derived::nothing},
-    {slip_tolerance, "slip_tolerance", Extent::scene, 1, "m/s", Range::positive, Derived::nothing},
-    {restitution, "restitution", Extent::scene, 1, "-", Range::non_negative, Derived::nothing},
-    {contact_stiffness, "contact_stiffness", Extent::scene, 1, "N/m", Range::non_negative, Derived::nothing},
-    {obstacle_friction, "obstacle_friction", Extent::obstacle, 3, "-", Range::non_negative, Derived::nothing},
-    {obstacle_rolling, "obstacle_rolling", Extent::obstacle, 1, "-", Range::non_negative, Derived::nothing},
-    {obstacle_restitution, "obstacle_restitution", Extent::obstacle, 1, "-", Range::non_negative, Derived::nothing},
-    {pair_friction, "pair_friction", Extent::pair, 3, "-", Range::any, Derived::nothing},
-    {pair_restitution, "pair_restitution", Extent::pair, 1, "-", Range::any, Derived::nothing},
-    {pair_contact_stiffness, "pair_contact_stiffness", Extent::pair, 1, "N/m", Range::non_negative, Derived::nothing},
-}};
+/// Address of the first number: that of a table, or of the table of one rod where each rod has its own.
+double* begin_of(double& number, int) { return &number; }
+template <class Table>
+double* begin_of(Table& table, int) {
+  return table.data();
+}
+template <class Table>
+double* begin_of(std::vector<Table>& tables, int rod) {
+  return tables[at(rod)].data();
+}
+
+template <auto member>
+double* number_of_part(Parameters& p, int part) {
+  return &(p.*member)[part];
+}
+
+template <auto member>
+double* number(Parameters& p, int rod) {
+  return begin_of(p.*member, rod);
+}
+template <auto member>
+double* surface(Parameters& p, int rod) {
+  return begin_of(p.surfaces.*member, rod);
+}
+
+/// Number of a part as a scene describes it.
+template <auto parts, auto member>
+double drawn(const SceneDescription& scene, int part) {
+  return (scene.*parts)[at(part)].*member;
+}
+template <auto member>
+double drawn_joint(const SceneDescription& scene, int joint) {
+  for (const JointDescription& d : scene.joints) {
+    const auto links = static_cast<int>(d.links.size());
+    if (joint < links) return d.links[at(joint)].*member;
+    joint -= links;
+  }
+  return 0.0;
+}
+
+template <auto member, auto described>
+constexpr ParameterInfo number_of_parts(ParameterKind kind, std::string_view name, Extent extent, std::string_view unit,
+                                        Range range) {
+  return {kind, name, extent, 1, unit, range, Derived::nothing, number_of_part<member>, member, described};
+}
+
+constexpr ParameterInfo kIndex[]{
+    {stretch_stiffness, "stretch_stiffness", Extent::edge, 1, "N", Range::positive, Derived::nothing,
+     number<&Parameters::edge_stretch>},
+    {bend_stiffness, "bend_stiffness", Extent::edge, 2, "N m^2", Range::positive, Derived::stiffness,
+     number<&Parameters::edge_bend>},
+    {twist_stiffness, "twist_stiffness", Extent::edge, 1, "N m^2", Range::positive, Derived::stiffness,
+     number<&Parameters::edge_twist>},
+    {line_density, "line_density", Extent::edge, 1, "kg/m", Range::positive, Derived::masses,
+     number<&Parameters::edge_density>},
+    {rotary_inertia, "rotary_inertia", Extent::edge, 1, "kg m", Range::non_negative, Derived::masses,
+     number<&Parameters::edge_rotary>},
+    {viscous_time, "viscous_time", Extent::edge, 1, "s", Range::non_negative, Derived::viscous_times,
+     number<&Parameters::edge_viscous_time>},
+    {drag, "drag", Extent::edge, 1, "Pa s", Range::non_negative, Derived::masses, number<&Parameters::edge_drag>},
+    {natural_curvature, "natural_curvature", Extent::stencil, 2, "1/m", Range::any, Derived::natural_strains,
+     number<&Parameters::natural_curvature>},
+    {natural_twist, "natural_twist", Extent::stencil, 1, "rad/m", Range::any, Derived::natural_strains,
+     number<&Parameters::natural_twist>},
+    {natural_stretch, "natural_stretch", Extent::edge, 1, "-", Range::positive, Derived::natural_strains,
+     number<&Parameters::edge_natural_stretch>},
+    {added_mass, "added_mass", Extent::node, 1, "kg", Range::non_negative, Derived::masses,
+     number<&Parameters::added_mass>},
+    {gravity, "gravity", Extent::scene, 3, "m/s^2", Range::any, Derived::nothing, number<&Parameters::gravity>},
+    {fluid_viscosity, "fluid_viscosity", Extent::scene, 1, "Pa s", Range::positive, Derived::nothing,
+     number<&Parameters::fluid_viscosity>},
+    {fluid_regularization, "fluid_regularization", Extent::scene, 1, "m", Range::positive, Derived::nothing,
+     number<&Parameters::fluid_regularization>},
+    {ParameterKind::load, "load", Extent::load, 3, "N, N m or N/m", Range::any, Derived::nothing,
+     number<&Parameters::loads>},
+    number_of_parts<&PartNumbers::spring_stiffness, drawn<&SceneDescription::springs, &SpringDescription::stiffness>>(
+        spring_stiffness, "spring_stiffness", Extent::spring, "N/m", Range::non_negative),
+    number_of_parts<&PartNumbers::spring_rest_length,
+                    drawn<&SceneDescription::springs, &SpringDescription::rest_length>>(
+        spring_rest_length, "spring_rest_length", Extent::spring, "m", Range::non_negative),
+    number_of_parts<&PartNumbers::spring_damping, drawn<&SceneDescription::springs, &SpringDescription::damping>>(
+        spring_damping, "spring_damping", Extent::spring, "N s/m", Range::non_negative),
+    number_of_parts<&PartNumbers::joint_stiffness, drawn_joint<&RevoluteLink::stiffness>>(
+        joint_stiffness, "joint_stiffness", Extent::joint, "N m/rad", Range::non_negative),
+    number_of_parts<&PartNumbers::joint_rest_angle, drawn_joint<&RevoluteLink::rest_angle>>(
+        joint_rest_angle, "joint_rest_angle", Extent::joint, "rad", Range::any),
+    number_of_parts<&PartNumbers::joint_damping, drawn_joint<&RevoluteLink::damping>>(
+        joint_damping, "joint_damping", Extent::joint, "N m s/rad", Range::non_negative),
+    number_of_parts<&PartNumbers::joint_moment, drawn_joint<&RevoluteLink::moment>>(joint_moment, "joint_moment",
+                                                                                    Extent::joint, "N m", Range::any),
+    number_of_parts<&PartNumbers::tendon_tension, drawn<&SceneDescription::tendons, &TendonDescription::tension>>(
+        tendon_tension, "tendon_tension", Extent::tendon, "N", Range::non_negative),
+    {friction, "friction", Extent::scene, 1, "-", Range::non_negative, Derived::nothing,
+     surface<&SurfaceParameters::friction>},
+    {slip_tolerance, "slip_tolerance", Extent::scene, 1, "m/s", Range::positive, Derived::nothing,
+     surface<&SurfaceParameters::slip_tolerance>},
+    {restitution, "restitution", Extent::scene, 1, "-", Range::non_negative, Derived::nothing,
+     surface<&SurfaceParameters::restitution>},
+    {contact_stiffness, "contact_stiffness", Extent::scene, 1, "N/m", Range::non_negative, Derived::nothing,
+     surface<&SurfaceParameters::contact_stiffness>},
+    {obstacle_friction, "obstacle_friction", Extent::obstacle, 3, "-", Range::non_negative, Derived::nothing,
+     surface<&SurfaceParameters::obstacle_friction>},
+    {obstacle_rolling, "obstacle_rolling", Extent::obstacle, 1, "-", Range::non_negative, Derived::nothing,
+     surface<&SurfaceParameters::obstacle_rolling>},
+    {obstacle_restitution, "obstacle_restitution", Extent::obstacle, 1, "-", Range::non_negative, Derived::nothing,
+     surface<&SurfaceParameters::obstacle_restitution>},
+    {pair_friction, "pair_friction", Extent::pair, 3, "-", Range::any, Derived::nothing,
+     surface<&SurfaceParameters::pair_friction>},
+    {pair_restitution, "pair_restitution", Extent::pair, 1, "-", Range::any, Derived::nothing,
+     surface<&SurfaceParameters::pair_restitution>},
+    {pair_contact_stiffness, "pair_contact_stiffness", Extent::pair, 1, "N/m", Range::non_negative, Derived::nothing,
+     surface<&SurfaceParameters::pair_contact_stiffness>},
+};
 
 constexpr bool in_order() {
-  for (std::size_t i = 0; i < kIndex.size(); ++i)
+  for (std::size_t i = 0; i < std::size(kIndex); ++i)
     if (static_cast<std::size_t>(kIndex[i].kind) != i) return false;
   return true;
 }
@@ -78,18 +157,15 @@ Eigen::Index rows_of(const Model& model, const ParameterInfo& info, int rod) {
       return model.rod_first_edge[at(rod) + 1] - model.rod_first_edge[at(rod)];
     case Extent::stencil:
       return model.rod_voronoi[at(rod)].size();
-    case Extent::spring:
-      return static_cast<Eigen::Index>(model.description.springs.size());
-    case Extent::joint:
-      return static_cast<Eigen::Index>(model.joint_angles.size());
-    case Extent::tendon:
-      return static_cast<Eigen::Index>(model.description.tendons.size());
     case Extent::load:
       return first_load_row(model.description, model.description.loads.size());
     case Extent::obstacle:
       return static_cast<Eigen::Index>(model.description.contact.obstacles.size());
     case Extent::pair:
       return static_cast<Eigen::Index>(model.description.contact.pairs.size());
+    case Extent::spring:
+    case Extent::joint:
+    case Extent::tendon:
     case Extent::scene:
       break;
   }
@@ -105,7 +181,39 @@ const double* out_of_range(const ParameterValues& values, Range range) {
   return found == values.data() + values.size() ? nullptr : found;
 }
 
+/// Refuses numbers that are out of range.
+void check_range(const Model& model, const ParameterInfo& info, int rod, const ParameterValues& values) {
+  if (const double* bad = out_of_range(values, info.range))
+    require(false, owned(model, info, rod) + " must be " +
+                       (info.range == Range::any            ? "finite"
+                        : info.range == Range::non_negative ? "finite and not negative"
+                                                            : "positive and finite") +
+                       ", got " + text(*bad, 6));
+}
+
 }  // namespace
+
+int owners_of(const Model& model, const ParameterInfo& info) {
+  const SceneDescription& scene = model.description;
+  switch (info.extent) {
+    case Extent::edge:
+    case Extent::stencil:
+      return static_cast<int>(scene.rods.size());
+    case Extent::spring:
+      return static_cast<int>(scene.springs.size());
+    case Extent::joint:
+      return static_cast<int>(model.joint_angles.size());
+    case Extent::tendon:
+      return static_cast<int>(scene.tendons.size());
+    default:
+      return 1;
+  }
+}
+
+void check_owner(const Model& model, const ParameterInfo& info, int owner) {
+  if (!(owner >= 0 && owner < owners_of(model, info)))
+    require(false, "no such " + std::string(info.of_rod() ? "rod: " : "part: ") + std::to_string(owner));
+}
 
 std::span<const ParameterInfo> parameter_index() { return kIndex; }
 
@@ -113,105 +221,50 @@ const ParameterInfo& info_of(ParameterKind kind) { return kIndex[static_cast<std
 
 const ParameterInfo& parameter_named(std::string_view name) {
   const auto* const found =
-      std::find_if(kIndex.begin(), kIndex.end(), [&](const auto& info) { return info.name == name; });
-  if (found == kIndex.end()) require(false, "no such parameter: " + std::string(name));
+      std::find_if(std::begin(kIndex), std::end(kIndex), [&](const auto& info) { return info.name == name; });
+  if (found == std::end(kIndex)) require(false, "no such parameter: " + std::string(name));
   return *found;
 }
 
-ParameterView parameter_view(const Model& model, Parameters& p, ParameterKind kind, int rod) {
+ParameterView parameter_view(const Model& model, Parameters& p, ParameterKind kind, int owner) {
   const ParameterInfo& info = info_of(kind);
-  const auto all = [&]() -> double* {
-    switch (kind) {
-      case stretch_stiffness:
-        return p.edge_stretch.data();
-      case bend_stiffness:
-        return p.edge_bend.data();
-      case twist_stiffness:
-        return p.edge_twist.data();
-      case line_density:
-        return p.edge_density.data();
-      case rotary_inertia:
-        return p.edge_rotary.data();
-      case viscous_time:
-        return p.edge_viscous_time.data();
-      case ParameterKind::drag:
-        return p.edge_drag.data();
-      case natural_curvature:
-        return p.natural_curvature[at(rod)].data();
-      case natural_twist:
-        return p.natural_twist[at(rod)].data();
-      case natural_stretch:
-        return p.edge_natural_stretch.data();
-      case added_mass:
-        return p.added_mass.data();
-      case gravity:
-        return p.gravity.data();
-      case ParameterKind::load:
-        return p.loads.data();
-      case spring_stiffness:
-        return p.spring_stiffness.data();
-      case spring_rest_length:
-        return p.spring_rest_length.data();
-      case spring_damping:
-        return p.spring_damping.data();
-      case joint_stiffness:
-        return p.joint_stiffness.data();
-      case joint_rest_angle:
-        return p.joint_rest_angle.data();
-      case joint_damping:
-        return p.joint_damping.data();
-      case joint_moment:
-        return p.joint_moment.data();
-      case tendon_tension:
-        return p.tendon_tension.data();
-      case friction:
-        return &p.surfaces.friction;
-      case slip_tolerance:
-        return &p.surfaces.slip_tolerance;
-      case restitution:
-        return &p.surfaces.restitution;
-      case contact_stiffness:
-        return &p.surfaces.contact_stiffness;
-      case obstacle_friction:
-        return p.surfaces.obstacle_friction.data();
-      case obstacle_rolling:
-        return p.surfaces.obstacle_rolling.data();
-      case obstacle_restitution:
-        return p.surfaces.obstacle_restitution.data();
-      case pair_friction:
-        return p.surfaces.pair_friction.data();
-      case pair_restitution:
-        return p.surfaces.pair_restitution.data();
-      case pair_contact_stiffness:
-        return p.surfaces.pair_contact_stiffness.data();
-      case fluid_regularization:
-        return &p.fluid_regularization;
-      case fluid_viscosity:
-        break;
-    }
-    return &p.fluid_viscosity;
-  };
-  const Eigen::Index before = info.extent == Extent::edge ? model.rod_first_edge[at(rod)] : 0;
-  return {all() + before * info.columns, rows_of(model, info, rod), info.columns};
+  const Eigen::Index before = info.extent == Extent::edge ? model.rod_first_edge[at(owner)] : 0;
+  return {info.first(p, owner) + before * info.columns, rows_of(model, info, owner), info.columns};
+}
+
+bool in_range(const VectorX& values, Range range) {
+  return out_of_range({values.data(), values.size(), 1}, range) == nullptr;
+}
+
+PartNumbers described_numbers(const Model& model) {
+  PartNumbers out = zero_numbers(model);
+  for (const ParameterInfo& info : kIndex) {
+    if (!info.number) continue;
+    VectorX& values = out.*info.number;
+    for (Eigen::Index i = 0; i < values.size(); ++i) values[i] = info.described(model.description, static_cast<int>(i));
+    check_range(model, info, 0, {values.data(), values.size(), 1});
+  }
+  return out;
+}
+
+PartNumbers zero_numbers(const Model& model) {
+  PartNumbers out;
+  for (const ParameterInfo& info : kIndex)
+    if (info.number) (out.*info.number).setZero(owners_of(model, info));
+  return out;
 }
 
 void check_setting(const Model& model, const ParameterSetting& setting) {
-  const auto& [kind, rod, values] = setting;
+  const auto& [kind, owner, values] = setting;
   const ParameterInfo& info = info_of(kind);
-  if (info.of_rod() && !(rod >= 0 && rod < static_cast<int>(model.place.size())))
-    require(false, "no such rod: " + std::to_string(rod));
-  const Eigen::Index rows = rows_of(model, info, rod);
+  check_owner(model, info, owner);
+  const Eigen::Index rows = rows_of(model, info, owner);
   if ((values.rows() != rows && values.rows() != 1) || values.cols() != info.columns)
-    require(false, owned(model, info, rod) + " must have shape " + shape(rows, info.columns) + ", got " +
+    require(false, owned(model, info, owner) + " must have shape " + shape(rows, info.columns) + ", got " +
                        shape(values.rows(), values.cols()));
-  if (const double* bad = out_of_range(values, info.range))
-    require(false, owned(model, info, rod) + " must be " +
-                       (info.range == Range::any            ? "finite"
-                        : info.range == Range::non_negative ? "finite and not negative"
-                                                            : "positive and finite") +
-                       ", got " + text(*bad, 6));
+  check_range(model, info, owner, values);
   if (kind == natural_curvature)
-    check_turns(values, model.rod_voronoi[at(rod)], [&] { return owned(model, info, rod); });
+    check_turns(values, model.rod_voronoi[at(owner)], [&] { return owned(model, info, owner); });
 }
 
 namespace {
@@ -231,11 +284,11 @@ bool set_parameters(const Model& model, std::span<const ParameterSetting> settin
     if (pending && pending != next) update_derived(model, pending->first, pending->second, p);
     pending = next;
   };
-  for (const auto& [kind, rod, values] : settings) {
-    ParameterView now = parameter_view(model, p, kind, rod);
+  for (const auto& [kind, owner, values] : settings) {
+    ParameterView now = parameter_view(model, p, kind, owner);
     if (!changes(now, values)) continue;
     changed = true;
-    derive(std::pair(info_of(kind).derived, rod));
+    derive(std::pair(info_of(kind).derived, owner));
     if (values.rows() == now.rows())
       now = values;
     else

@@ -44,9 +44,9 @@ enum class ParameterKind {
   pair_contact_stiffness,
 };
 
-/// Extent of a parameter: the objects that have one row of numbers each. `joint` stands for every revolute joint,
-/// `load` for every load or each of its edges, and `pair` for every pair of bodies with values of its own. Edges and
-/// stencils are those of a rod.
+/// Extent of a parameter: the objects that have one row of numbers each. `load` stands for every load or each of its
+/// edges, and `pair` for every pair of bodies with values of its own. Edges and stencils are those of a rod. A spring,
+/// a revolute joint and a tendon own one number each.
 enum class Extent { scene, node, edge, stencil, spring, joint, tendon, load, obstacle, pair };
 
 enum class Range { any, non_negative, positive };
@@ -62,11 +62,19 @@ struct ParameterInfo {
   std::string_view unit;
   Range range;
   Derived derived;
+  double* (*first)(Parameters& parameters, int owner);  ///< first number of all rods, or of one owner
+  VectorX PartNumbers::* number = nullptr;              ///< numbers of all parts, where a part owns one number
+  double (*described)(const SceneDescription& scene, int part) = nullptr;  ///< number of such a part as drawn
 
   /// Set through `World::set_contact`: they decide about the form of the equations.
   bool of_contact() const { return kind >= ParameterKind::friction; }
   bool of_rod() const { return extent == Extent::edge || extent == Extent::stencil; }
 };
+
+/// Number of owners of a parameter: rods, parts that own one number each, or the scene alone.
+int owners_of(const Model& model, const ParameterInfo& info);
+/// Raises std::invalid_argument unless a parameter has such an owner.
+void check_owner(const Model& model, const ParameterInfo& info, int owner);
 
 /// All of them, in the order of their kinds.
 std::span<const ParameterInfo> parameter_index();
@@ -77,14 +85,14 @@ const ParameterInfo& parameter_named(std::string_view name);
 using ParameterView = Eigen::Map<MatrixX>;
 using ParameterValues = Eigen::Map<const MatrixX>;
 
-/// The numbers themselves: rows as `Extent` says, of rod `rod` where they belong to one. Change them through
-/// `set_parameter`, or follow with `update_derived`.
-ParameterView parameter_view(const Model& model, Parameters& parameters, ParameterKind kind, int rod);
+/// The numbers of one owner: rows as `Extent` says. Change them through `set_parameter`, or follow with
+/// `update_derived`.
+ParameterView parameter_view(const Model& model, Parameters& parameters, ParameterKind kind, int owner);
 
 /// Wanted numbers: all rows, or one that holds for every one of them.
 struct ParameterSetting {
   ParameterKind kind;
-  int rod = 0;  ///< where the parameter belongs to one
+  int owner = 0;  ///< rod or part that the numbers belong to
   ParameterValues values;
 };
 
@@ -93,6 +101,14 @@ void check_setting(const Model& model, const ParameterSetting& setting);
 /// Sets those of the settings, which fit, that are not what already holds, and what derives from them; whether there
 /// were any.
 bool set_parameters(const Model& model, std::span<const ParameterSetting> settings, Parameters& parameters);
+
+/// True if all numbers are finite and within a range.
+bool in_range(const VectorX& values, Range range);
+
+/// Numbers of parts as drawn. A number out of range raises std::invalid_argument.
+PartNumbers described_numbers(const Model& model);
+/// A zero for each number of a part.
+PartNumbers zero_numbers(const Model& model);
 
 /// Update the quantities that derive from parameters, for one rod if the parameters belong to it.
 void update_derived(const Model& model, Derived derived, int rod, Parameters& parameters);

@@ -92,15 +92,6 @@ void set_rod(const Model& model, int rod, const RodDescription& description, Par
   p.edge_drag.segment(first, count) = description.drag;
 }
 
-void set_spring(int spring, const SpringDescription& d, Parameters& p) {
-  for (double x : {d.stiffness, d.rest_length, d.damping})
-    require(std::isfinite(x) && x >= 0.0,
-            "stiffness, rest length and damping of a spring must be finite and not negative, got " + std::to_string(x));
-  p.spring_stiffness[spring] = d.stiffness;
-  p.spring_rest_length[spring] = d.rest_length;
-  p.spring_damping[spring] = d.damping;
-}
-
 void set_contact(const ContactDescription& contact, Parameters& parameters) {
   SurfaceParameters& p = parameters.surfaces;
   p.friction = contact.friction;
@@ -151,6 +142,7 @@ void check_load(const SceneDescription& scene, const LoadDescription& load) {
 Parameters initial_parameters(const Model& model) {
   const SceneDescription& scene = model.description;
   Parameters p;
+  static_cast<PartNumbers&>(p) = described_numbers(model);
   const Eigen::Index edges = model.edge_count;
   p.edge_stretch.resize(edges);
   p.edge_bend.resize(edges, 2);
@@ -163,23 +155,6 @@ Parameters initial_parameters(const Model& model) {
     p.natural_curvature.push_back(rod.natural_curvature);
     p.natural_twist.push_back(rod.natural_twist);
   }
-  for (VectorX* v : {&p.spring_stiffness, &p.spring_rest_length, &p.spring_damping})
-    v->resize(static_cast<Eigen::Index>(scene.springs.size()));
-  for (std::size_t s = 0; s < scene.springs.size(); ++s) set_spring(static_cast<int>(s), scene.springs[s], p);
-  for (VectorX* v : {&p.joint_stiffness, &p.joint_rest_angle, &p.joint_damping, &p.joint_moment})
-    v->resize(static_cast<Eigen::Index>(model.joint_angles.size()));
-  Eigen::Index j = 0;
-  for (const JointDescription& joint : scene.joints)
-    for (const RevoluteLink& link : joint.links) {
-      p.joint_stiffness[j] = link.stiffness;
-      p.joint_rest_angle[j] = link.rest_angle;
-      p.joint_damping[j] = link.damping;
-      p.joint_moment[j] = link.moment;
-      ++j;
-    }
-  p.tendon_tension.resize(static_cast<Eigen::Index>(scene.tendons.size()));
-  for (std::size_t t = 0; t < scene.tendons.size(); ++t)
-    p.tendon_tension[static_cast<Eigen::Index>(t)] = scene.tendons[t].tension;
   p.added_mass = scene.added_mass;
   p.gravity = scene.gravity;
   p.loads.resize(first_load_row(scene, scene.loads.size()), 3);

@@ -180,23 +180,21 @@ bool leaves_plane(const Model& model, LoadKind kind, const Eigen::Ref<const Matr
 
 std::string leaving_plane(const Model& model, const ParameterSetting& setting) {
   if (!model.planar()) return "";
-  const auto& [kind, rod, values] = setting;
-  const auto name = [&, r = rod] { return " of rod '" + model.description.rods[at(r)].name + "'"; };
+  const auto& [kind, owner, values] = setting;
+  const auto name = [&, rod = owner] { return " of rod '" + model.description.rods[at(rod)].name + "'"; };
   if (kind == ParameterKind::natural_curvature) {
-    const Vector2 p = model.planar_components[at(rod)];
+    const Vector2 p = model.planar_components[at(owner)];
     for (Eigen::Index i = 0; i < values.rows(); ++i)
       if (std::abs(values(i, 0) * p(1) - values(i, 1) * p(0)) > 1e-8 * values.row(i).norm())
         return "natural curvature" + name();
   } else if (kind == ParameterKind::natural_twist) {
     if ((values.array() != 0.0).any()) return "natural twist" + name();
   } else if (kind == ParameterKind::bend_stiffness) {
-    const Vector2 p = model.planar_components[at(rod)];
+    const Vector2 p = model.planar_components[at(owner)];
     const bool isotropic = (values.col(0).array() == values.col(1).array()).all();
     if (!isotropic && p.cwiseAbs().minCoeff() > 1e-9) return "the section" + name() + ", at an angle to it,";
   } else if (kind == ParameterKind::joint_moment || kind == ParameterKind::joint_rest_angle) {
-    for (std::size_t j = 0; j < model.joint_angles.size(); ++j)
-      if (!model.joint_angles[j].turns() && values(values.rows() == 1 ? 0 : static_cast<Eigen::Index>(j), 0) != 0.0)
-        return "a revolute joint";
+    if (!model.joint_angles[at(owner)].turns() && values(0, 0) != 0.0) return "a revolute joint";
   } else if (kind == ParameterKind::gravity) {
     const Vector3 gravity = values.row(0);
     if (std::abs(gravity.dot(model.plane->normal)) > 1e-8 * gravity.norm()) return "gravity";

@@ -5,8 +5,7 @@
 #include <limits>
 
 #include "steps/hand_forces.hpp"
-#include "steps/joint_forces.hpp"
-#include "steps/spring_forces.hpp"
+#include "steps/terms.hpp"
 
 namespace withe {
 namespace {
@@ -50,8 +49,7 @@ Energy mechanical_energy(const Model& model, const EnergyCoefficients& k, const 
   e.bend = turned.bend;
   e.twist = turned.twist;
   e.gravity = gravity_energy(model, k, state.q, [](int) { return 1.0; });
-  e.spring = spring_energy(model, k.spring_stiffness, k.spring_rest_length, state.q) +
-             joint_energy(model, k.elastic, state.q) + hand_energy(model, k.elastic.measure, state, c);
+  e.spring = stored_energy(model, k.numbers, state.q) + hand_energy(model, k.elastic.measure, state, c);
   return e;
 }
 
@@ -74,8 +72,7 @@ void EnergyCoefficients::set(const Model& model, const Parameters& p) {
   set_mass(model, p, mass);
   node_mass = p.node_mass;
   gravity = p.gravity;
-  spring_stiffness = p.spring_stiffness;
-  spring_rest_length = p.spring_rest_length;
+  numbers = p;
 }
 
 double change_by_settings(const Model& model, const EnergyCoefficients& before, const Parameters& parameters,
@@ -93,7 +90,8 @@ double elastic_energy(const Model& model, const Parameters& parameters, const St
   compute_configuration(model, state, state.q, c);
   now.set(model, parameters);
   const BendTwistEnergy turned = bend_twist_energy(model, now.elastic, c);
-  return stretch_energy(model, now.elastic, c) + turned.bend + turned.twist + joint_energy(model, now.elastic, state.q);
+  return stretch_energy(model, now.elastic, c) + turned.bend + turned.twist +
+         stored_energy(model, now.numbers, state.q);
 }
 
 Energy energy_of(const Model& model, const Parameters& parameters, const Contact* contact, const State& state,
@@ -189,12 +187,8 @@ void find_component_energies(const Model& model, const Parameters& parameters, c
     add(model.bend[b].edge[0], bend_energy_of(k.elastic, c, static_cast<int>(b)));
   for (std::size_t h = 0; h < model.half.size(); ++h)
     add(model.half[h].edge, half_energy_of(k.elastic, c, static_cast<int>(h)));
-  for (std::size_t s = 0; s < model.description.springs.size(); ++s)
-    out.elastic[model.component_of_node(model.description.springs[s].nodes[0])] +=
-        spring_energy(model, k.spring_stiffness, k.spring_rest_length, state.q, static_cast<int>(s));
-  for (std::size_t j = 0; j < model.joint_angles.size(); ++j)
-    out.elastic[model.component_of_node(model.joint_angles[j].node)] +=
-        joint_energy(model, k.elastic, state.q, static_cast<int>(j));
+  for_each_stored(model, k.numbers, state.q,
+                  [&](int node, double stored) { out.elastic[model.component_of_node(node)] += stored; });
   // In a frame that goes with the nodes that supports hold, else with the centre of mass.
   MatrixX3& frame = out.frame;
   VectorX& nodes = out.held_nodes;

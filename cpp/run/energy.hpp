@@ -29,10 +29,10 @@ struct Ledger {
 struct EnergyCoefficients {
   ElasticCoefficients elastic;
   MassMatrix mass;
-  VectorX node_mass;                             ///< [kg]
-  Vector3 gravity;                               ///< [m/s^2]
-  VectorX spring_stiffness, spring_rest_length;  ///< [N/m], [m]
-  long version = -1, natural_version = -1;       ///< of the parameters
+  VectorX node_mass;                        ///< [kg]
+  Vector3 gravity;                          ///< [m/s^2]
+  PartNumbers numbers;                      ///< numbers of parts, such as springs
+  long version = -1, natural_version = -1;  ///< of the parameters
 
   void set(const Model& model, const Parameters& parameters);
 };

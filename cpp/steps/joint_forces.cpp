@@ -141,14 +141,8 @@ void JointForces::add_applied(const StepProblem& problem, const StepData& data, 
   }
 }
 
-double joint_energy(const Model& model, const ElasticCoefficients& elastic, const VectorX& q) {
-  double energy = 0.0;
-  for (int j = 0; j < static_cast<int>(model.joint_angles.size()); ++j) energy += joint_energy(model, elastic, q, j);
-  return energy;
-}
-
-double joint_energy(const Model& model, const ElasticCoefficients& elastic, const VectorX& q, int joint) {
-  const JointTorque torque{.stiffness = elastic.joint_stiffness[joint], .rest_angle = elastic.joint_natural[joint]};
+double joint_energy(const Model& model, const PartNumbers& numbers, const VectorX& q, int joint) {
+  const JointTorque torque{.stiffness = numbers.joint_stiffness[joint], .rest_angle = numbers.joint_rest_angle[joint]};
   return torque.energy(model.joint_angles[at(joint)].angle(q));
 }
 

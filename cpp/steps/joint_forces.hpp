@@ -28,9 +28,7 @@ class JointForces final : public Term {
 
 /// Torque of the motor, spring and damper of a joint.
 JointTorque joint_torque(const Parameters& parameters, const ElasticCoefficients& elastic, int joint);
-/// Energy of the springs of all joints at a configuration [J].
-double joint_energy(const Model& model, const ElasticCoefficients& elastic, const VectorX& q);
-/// Energy of the spring of one joint [J].
-double joint_energy(const Model& model, const ElasticCoefficients& elastic, const VectorX& q, int joint);
+/// Energy of the spring of one joint at q [J].
+double joint_energy(const Model& model, const PartNumbers& numbers, const VectorX& q, int joint);
 
 }  // namespace withe

@@ -8,7 +8,7 @@
 namespace withe {
 namespace {
 
-Spring spring_of(const Parameters& p, int spring) {
+Spring spring_of(const PartNumbers& p, int spring) {
   return {p.spring_stiffness[spring], p.spring_rest_length[spring], p.spring_damping[spring]};
 }
 
@@ -134,16 +134,8 @@ double SpringForces::dissipated(const StepProblem& problem, const StepData& data
   return work;
 }
 
-double spring_energy(const Model& model, const VectorX& stiffness, const VectorX& rest_length, const VectorX& q) {
-  double energy = 0.0;
-  for (int s = 0; s < static_cast<int>(stiffness.size()); ++s)
-    energy += spring_energy(model, stiffness, rest_length, q, s);
-  return energy;
-}
-
-double spring_energy(const Model& model, const VectorX& stiffness, const VectorX& rest_length, const VectorX& q,
-                     int spring) {
-  return spring_energy(Spring{stiffness[spring], rest_length[spring], 0.0}, length_of(between(model, q, spring)));
+double spring_energy(const Model& model, const PartNumbers& numbers, const VectorX& q, int spring) {
+  return spring_energy(spring_of(numbers, spring), length_of(between(model, q, spring)));
 }
 
 double spring_tension(const Model& model, const Parameters& parameters, const VectorX& q, const VectorX& v,

@@ -25,11 +25,8 @@ class SpringForces final : public Term {
   ElementTable table_;
 };
 
-/// Energy of all springs at a configuration [J].
-double spring_energy(const Model& model, const VectorX& stiffness, const VectorX& rest_length, const VectorX& q);
-/// Energy of one spring [J].
-double spring_energy(const Model& model, const VectorX& stiffness, const VectorX& rest_length, const VectorX& q,
-                     int spring);
+/// Energy of one spring at q [J].
+double spring_energy(const Model& model, const PartNumbers& numbers, const VectorX& q, int spring);
 /// n of one spring, with velocities v [N].
 double spring_tension(const Model& model, const Parameters& parameters, const VectorX& q, const VectorX& v, int spring);
 

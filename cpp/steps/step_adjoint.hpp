@@ -3,6 +3,7 @@
 
 #include <map>
 
+#include "model/parameter_index.hpp"
 #include "model/state.hpp"
 
 namespace withe {
@@ -11,28 +12,25 @@ namespace withe {
 using MatrixX6 = Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::RowMajor>;
 
 /// Derivatives of a scalar by the coefficients of a step's equations.
-struct CoefficientAdjoint {
+struct CoefficientAdjoint : PartNumbers {
   VectorX stretch_stiffness, stretch_time;  ///< per edge: by EA [1/N] and by viscous time [1/s]
   VectorX stretch_natural;                  ///< per edge, by the natural strain
   Columns3 bend_stiffness, bend_natural;    ///< per stencil: by stiffnesses [1/(N m)], by natural strains
   Columns3 half_stiffness, half_natural;
-  VectorX bend_time, half_time;                                            ///< by viscous times [1/s]
-  VectorX mass, mass_coupling, drag, drag_coupling;                        ///< by `MassMatrix`
-  VectorX gravity;                                                         ///< per unknown, by its force [1/N]
-  MatrixX3 loads;                                                          ///< by `Parameters::loads`
-  VectorX spring_stiffness, spring_rest_length, spring_damping;            ///< per spring
-  VectorX joint_stiffness, joint_rest_angle, joint_damping, joint_moment;  ///< per revolute joint
-  VectorX tendon_tension;                                                  ///< per tendon
-  VectorX edge_mass;                          ///< by line density times length, only through contacts
-  double gravity_size = 0;                    ///< by the magnitude of gravity, only through contacts [s^2/m]
-  double fluid_viscosity = 0;                 ///< [1/(Pa s)]
-  double friction = 0, slip_tolerance = 0;    ///< by the values of the scene [-], [s/m]
-  MatrixX3 obstacle_friction, pair_friction;  ///< per obstacle, per pair of bodies [-]
-  VectorX obstacle_rolling;                   ///< per obstacle [-]
-  MatrixX6 hand_stiffness;                    ///< per support, see `HandDescription` [m/N], [rad/(N m)]
-  VectorX hand_limit;                         ///< per support [1/N]
-  std::vector<MatrixX2> natural_curvature;    ///< per rod and stencil, by the smooth curvature, through read-outs [m]
-  VectorX rest_length;                        ///< per edge, through axial strain, loads along rods and read-outs [1/m]
+  VectorX bend_time, half_time;                      ///< by viscous times [1/s]
+  VectorX mass, mass_coupling, drag, drag_coupling;  ///< by `MassMatrix`
+  VectorX gravity;                                   ///< per unknown, by its force [1/N]
+  MatrixX3 loads;                                    ///< by `Parameters::loads`
+  VectorX edge_mass;                                 ///< by line density times length, only through contacts
+  double gravity_size = 0;                           ///< by the magnitude of gravity, only through contacts [s^2/m]
+  double fluid_viscosity = 0;                        ///< [1/(Pa s)]
+  double friction = 0, slip_tolerance = 0;           ///< by the values of the scene [-], [s/m]
+  MatrixX3 obstacle_friction, pair_friction;         ///< per obstacle, per pair of bodies [-]
+  VectorX obstacle_rolling;                          ///< per obstacle [-]
+  MatrixX6 hand_stiffness;                           ///< per support, see `HandDescription` [m/N], [rad/(N m)]
+  VectorX hand_limit;                                ///< per support [1/N]
+  std::vector<MatrixX2> natural_curvature;  ///< per rod and stencil, by the smooth curvature, through read-outs [m]
+  VectorX rest_length;                      ///< per edge, through axial strain, loads along rods and read-outs [1/m]
   /// Derivatives by rotation vectors in the axes of the drawn scene [1/rad]. `attachment` is per half stencil, by the
   /// rotation of the part that is attached to its frame. `edge_turn` is per edge, by its frame in the drawing, without
   /// the effects through the members above.
@@ -40,7 +38,8 @@ struct CoefficientAdjoint {
   MatrixX2 planar_components;  ///< per rod, by `Model::planar_components`
 
   explicit CoefficientAdjoint(const Model& model, Eigen::Index load_rows)
-      : stretch_stiffness(VectorX::Zero(model.edge_count)),
+      : PartNumbers(zero_numbers(model)),
+        stretch_stiffness(VectorX::Zero(model.edge_count)),
         stretch_time(stretch_stiffness),
         stretch_natural(stretch_stiffness),
         bend_stiffness(Columns3::Zero(static_cast<Eigen::Index>(model.bend.size()), 3)),
@@ -55,14 +54,6 @@ struct CoefficientAdjoint {
         drag_coupling(mass_coupling),
         gravity(mass),
         loads(MatrixX3::Zero(load_rows, 3)),
-        spring_stiffness(VectorX::Zero(static_cast<Eigen::Index>(model.description.springs.size()))),
-        spring_rest_length(spring_stiffness),
-        spring_damping(spring_stiffness),
-        joint_stiffness(VectorX::Zero(static_cast<Eigen::Index>(model.joint_angles.size()))),
-        joint_rest_angle(joint_stiffness),
-        joint_damping(joint_stiffness),
-        joint_moment(joint_stiffness),
-        tendon_tension(VectorX::Zero(static_cast<Eigen::Index>(model.description.tendons.size()))),
         edge_mass(stretch_stiffness),
         obstacle_friction(rows_of_three(model.description.contact.obstacles.size())),
         pair_friction(rows_of_three(model.description.contact.pairs.size())),

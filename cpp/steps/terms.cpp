@@ -43,6 +43,20 @@ Terms make_terms(const Model& model, const Loads& loads, StepRule rule, bool exa
   return terms;
 }
 
+void for_each_stored(const Model& model, const PartNumbers& numbers, const VectorX& q,
+                     const std::function<void(int, double)>& add) {
+  for (std::size_t s = 0; s < model.description.springs.size(); ++s)
+    add(model.description.springs[s].nodes[0], spring_energy(model, numbers, q, static_cast<int>(s)));
+  for (std::size_t j = 0; j < model.joint_angles.size(); ++j)
+    add(model.joint_angles[j].node, joint_energy(model, numbers, q, static_cast<int>(j)));
+}
+
+double stored_energy(const Model& model, const PartNumbers& numbers, const VectorX& q) {
+  double energy = 0.0;
+  for_each_stored(model, numbers, q, [&](int, double stored) { energy += stored; });
+  return energy;
+}
+
 namespace {
 
 void add_asymmetries(const ContactForces* term, StepRule rule, std::vector<std::string>& found) {

@@ -1,6 +1,7 @@
 #pragma once
 /// The table of forces.
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -24,6 +25,12 @@ struct Terms {
 
 /// `rule`: in statics there is no fluid. `exact`: the Jacobian has every derivative.
 Terms make_terms(const Model& model, const Loads& loads, StepRule rule, bool exact);
+
+/// Call add(node, energy [J]) with the energy that each spring and revolute joint stores at q, and a node of its.
+void for_each_stored(const Model& model, const PartNumbers& numbers, const VectorX& q,
+                     const std::function<void(int, double)>& add);
+/// Energy that all springs and revolute joints store at q [J].
+double stored_energy(const Model& model, const PartNumbers& numbers, const VectorX& q);
 
 /// Causes that make the Jacobian unsymmetric, in words.
 std::vector<std::string> asymmetries_of(const Model& model, const Loads& loads, const Terms& terms, StepRule rule,

@@ -62,8 +62,8 @@ template <class Archive>
 void exchange(Archive& io, const Model& model, Parameters& p) {
   for (const ParameterInfo& info : parameter_index()) {
     if (info.of_contact()) continue;
-    for (int rod = 0; rod < (info.of_rod() ? static_cast<int>(model.place.size()) : 1); ++rod) {
-      ParameterView values = parameter_view(model, p, info.kind, rod);
+    for (int owner = 0; owner < owners_of(model, info); ++owner) {
+      ParameterView values = parameter_view(model, p, info.kind, owner);
       io(values);
     }
   }

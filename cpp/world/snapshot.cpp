@@ -308,14 +308,8 @@ void restore_loads(const std::vector<LoadDescription>& added, World::Implementat
 }
 
 void check_parts(const Parameters& p) {
-  for (const VectorX* v : {&p.spring_stiffness, &p.spring_rest_length, &p.spring_damping})
-    require(v->allFinite() && (v->array() >= 0.0).all(), "snapshot is damaged: impossible spring");
-  for (const VectorX* v : {&p.joint_stiffness, &p.joint_damping})
-    require(v->allFinite() && (v->array() >= 0.0).all(), "snapshot is damaged: impossible joint");
-  for (const VectorX* v : {&p.joint_rest_angle, &p.joint_moment})
-    require(v->allFinite(), "snapshot is damaged: impossible joint");
-  require(p.tendon_tension.allFinite() && (p.tendon_tension.array() >= 0.0).all(),
-          "snapshot is damaged: impossible tendon");
+  for (const ParameterInfo& info : parameter_index())
+    require(!info.number || in_range(p.*info.number, info.range), "snapshot is damaged: impossible ", info.name);
 }
 
 /// Refuses values that no simulation would have left.

@@ -10,19 +10,9 @@
 #include "run/checks.hpp"
 #include "run/drive.hpp"
 #include "run/frames.hpp"
-#include "steps/spring_forces.hpp"
 #include "world/implementation.hpp"
 
 namespace withe {
-namespace {
-
-int checked_spring(const Parameters& parameters, int spring) {
-  require(spring >= 0 && spring < parameters.spring_stiffness.size(), "no such spring: ", spring);
-  return spring;
-}
-
-}  // namespace
-
 World::World(SceneDescription description, Options options)
     : implementation_(std::make_unique<Implementation>(std::move(description), options)) {}
 World::World(const World& other) : implementation_(std::make_unique<Implementation>(other.accounted())) {
@@ -308,9 +298,9 @@ void World::Implementation::set(std::span<const ParameterSetting> settings) {
                twist = setting.kind == ParameterKind::natural_twist,
                stretch = setting.kind == ParameterKind::natural_stretch;
     if (curvature || twist || stretch || setting.kind == ParameterKind::tendon_tension) note_actuation();
-    if (curvature) ramps[at(setting.rod)].curvature.active = false;
-    if (twist) ramps[at(setting.rod)].twist.active = false;
-    if (stretch) ramps[at(setting.rod)].stretch.active = false;
+    if (curvature) ramps[at(setting.owner)].curvature.active = false;
+    if (twist) ramps[at(setting.owner)].twist.active = false;
+    if (stretch) ramps[at(setting.owner)].stretch.active = false;
   }
   const bool set_before = newly_set;
   begin_setting();
@@ -334,10 +324,10 @@ ParameterValues rows_of(const Matrix& m) {
 
 }  // namespace
 
-MatrixX World::parameter(ParameterKind kind, int rod) const {
+MatrixX World::parameter(ParameterKind kind, int owner) const {
   Implementation& self = *implementation_;
-  require(!info_of(kind).of_rod() || (rod >= 0 && rod < static_cast<int>(self.ramps.size())), "no such rod: ", rod);
-  return parameter_view(self.model, self.parameters, kind, rod);
+  check_owner(self.model, info_of(kind), owner);
+  return parameter_view(self.model, self.parameters, kind, owner);
 }
 
 void World::set_natural_curvature(int rod, const MatrixX2& curvature, double over) {
@@ -393,29 +383,6 @@ void World::set_added_mass(const VectorX& mass) {
 void World::set_gravity(const Vector3& gravity) {
   const ParameterSetting setting{ParameterKind::gravity, 0, {gravity.data(), 1, 3}};
   set({&setting, 1});
-}
-
-void World::set_spring(int spring, const SpringDescription& description) {
-  const Parameters& p = implementation_->parameters;
-  const int s = checked_spring(p, spring);
-  VectorX stiffness = p.spring_stiffness, rest_length = p.spring_rest_length, damping = p.spring_damping;
-  stiffness[s] = description.stiffness;
-  rest_length[s] = description.rest_length;
-  damping[s] = description.damping;
-  const auto all = [](ParameterKind kind, const VectorX& values) -> ParameterSetting {
-    return {kind, 0, ParameterValues(values.data(), values.size(), 1)};
-  };
-  const ParameterSetting settings[] = {all(ParameterKind::spring_stiffness, stiffness),
-                                       all(ParameterKind::spring_rest_length, rest_length),
-                                       all(ParameterKind::spring_damping, damping)};
-  implementation_->set(settings);
-}
-
-SpringDescription World::spring(int spring) const {
-  const Implementation& self = *implementation_;
-  const Parameters& p = self.parameters;
-  const int s = checked_spring(p, spring);
-  return {self.description.springs[at(s)].nodes, p.spring_stiffness[s], p.spring_rest_length[s], p.spring_damping[s]};
 }
 
 void World::set_velocities(const MatrixX3& velocities) {

@@ -180,7 +180,7 @@ class World {
   /// Sets parameters by their index, all or, where one is refused, none. What this does to the energy at the present
   /// state is work of actuation.
   void set(std::span<const ParameterSetting> settings);
-  MatrixX parameter(ParameterKind kind, int rod = 0) const;  ///< present values
+  MatrixX parameter(ParameterKind kind, int owner = 0) const;  ///< present values of a rod, a part or the scene
   /// Ramped linearly over `over` seconds from now (0: at once); a row a stencil, or one for all.
   void set_natural_curvature(int rod, const MatrixX2& curvature, double over);
   void set_natural_twist(int rod, const VectorX& twist, double over);
@@ -192,9 +192,6 @@ class World {
   std::optional<double> natural_shape_due(ParameterKind kind, int rod) const;
   void set_added_mass(const VectorX& mass);
   void set_gravity(const Vector3& gravity);
-  /// Stiffness, rest length and damping; its nodes stay.
-  void set_spring(int spring, const SpringDescription& parameters);
-  SpringDescription spring(int spring) const;  ///< as it is now
 
   // Supports; indices are rows of description().supports.
   int add_support(const SupportDescription& support);  ///< holds the present position and orientation

@@ -10,8 +10,14 @@ namespace withe::bindings {
 namespace {
 
 void register_gradients(py::module_& module) {
-  py::class_<ParameterGradient>(module, "ParameterGradient", "Derivatives of a scalar by the numbers that act.")
-      .def_readonly("stretch_stiffness", &ParameterGradient::edge_stretch)
+  py::class_<ParameterGradient> parameters(module, "ParameterGradient",
+                                           "Derivatives of a scalar by the numbers that act.");
+  for (const ParameterInfo& info : parameter_index())
+    if (info.number)
+      parameters.def_property_readonly(
+          std::string(info.name).c_str(),
+          [number = info.number](const ParameterGradient& g) -> VectorX { return g.*number; });
+  parameters.def_readonly("stretch_stiffness", &ParameterGradient::edge_stretch)
       .def_readonly("bend_stiffness", &ParameterGradient::edge_bend)
       .def_readonly("twist_stiffness", &ParameterGradient::edge_twist)
       .def_readonly("line_density", &ParameterGradient::edge_density)
@@ -26,14 +32,6 @@ void register_gradients(py::module_& module) {
       .def_readonly("natural_twist", &ParameterGradient::natural_twist)
       .def_readonly("natural_stretch", &ParameterGradient::natural_stretch)
       .def_readonly("loads", &ParameterGradient::loads)
-      .def_readonly("spring_stiffness", &ParameterGradient::spring_stiffness)
-      .def_readonly("spring_rest_length", &ParameterGradient::spring_rest_length)
-      .def_readonly("spring_damping", &ParameterGradient::spring_damping)
-      .def_readonly("joint_stiffness", &ParameterGradient::joint_stiffness)
-      .def_readonly("joint_rest_angle", &ParameterGradient::joint_rest_angle)
-      .def_readonly("joint_damping", &ParameterGradient::joint_damping)
-      .def_readonly("joint_moment", &ParameterGradient::joint_moment)
-      .def_readonly("tendon_tension", &ParameterGradient::tendon_tension)
       .def_readonly("fluid_viscosity", &ParameterGradient::fluid_viscosity)
       .def_readonly("friction", &ParameterGradient::friction)
       .def_readonly("slip_tolerance", &ParameterGradient::slip_tolerance)
@@ -214,7 +212,7 @@ void register_exceptions(py::module_& module) {
 
 using WorldClass = py::class_<GuardedWorld>;
 
-void set_parameters(World& world, int rod, const py::dict& values) {
+void set_parameters(World& world, int owner, const py::dict& values) {
   using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
   std::vector<Array> arrays;
   std::vector<ParameterSetting> settings;
@@ -226,7 +224,7 @@ void set_parameters(World& world, int rod, const py::dict& values) {
     const bool table = array.ndim() == 2, list = array.ndim() == 1 && info.columns == 1;
     const Eigen::Index rows = table || list ? size(0) : 1;
     const Eigen::Index columns = table ? size(1) : list ? 1 : static_cast<Eigen::Index>(array.size());
-    settings.push_back({info.kind, rod, {array.data(), rows, columns}});
+    settings.push_back({info.kind, owner, {array.data(), rows, columns}});
   }
   world.set(settings);
 }
@@ -312,26 +310,20 @@ void define_parameters(WorldClass& world) {
       py::arg("name"), py::arg("rod"),
       "When a natural shape is where it goes to [s]; None where it is not on its way.");
   world.def(
-      "set", [](GuardedWorld& self, int rod, const py::dict& values) { set_parameters(self.changing(), rod, values); },
-      py::arg("rod"), py::arg("values"),
-      "Set parameters by their names, those of edges and stencils of a rod: all, or where one is refused none.");
+      "set",
+      [](GuardedWorld& self, int owner, const py::dict& values) { set_parameters(self.changing(), owner, values); },
+      py::arg("owner"), py::arg("values"),
+      "Set parameters of a rod, a part or the scene by their names: all, or where one is refused none.");
   world.def(
       "parameter",
-      [](const GuardedWorld& self, const std::string& name, int rod) {
-        return self.reading().parameter(parameter_named(name).kind, rod);
+      [](const GuardedWorld& self, const std::string& name, int owner) {
+        return self.reading().parameter(parameter_named(name).kind, owner);
       },
-      py::arg("name"), py::arg("rod") = 0, "Present values, a row an edge, stencil or node.");
+      py::arg("name"), py::arg("owner") = 0,
+      "Return the present values of a parameter of a rod, a part or the scene: a row an edge, stencil or node.");
   world.def(
       "set_added_mass", [](GuardedWorld& self, const VectorX& mass) { self.changing().set_added_mass(mass); },
       py::arg("mass"));
-  world.def(
-      "set_spring",
-      [](GuardedWorld& self, int spring, const SpringDescription& parameters) {
-        self.changing().set_spring(spring, parameters);
-      },
-      py::arg("spring"), py::arg("parameters"));
-  world.def(
-      "spring", [](const GuardedWorld& self, int spring) { return self.reading().spring(spring); }, py::arg("spring"));
   world.def(
       "set_gravity", [](GuardedWorld& self, const Vector3& gravity) { self.changing().set_gravity(gravity); },
       py::arg("gravity"));

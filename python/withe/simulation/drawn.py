@@ -11,6 +11,7 @@ import numpy.typing as npt
 from withe import _core
 from withe.parts.kinds import FluidPart, RodPart, SpringPart
 from withe.parts.rods import redrawn
+from withe.simulation.numbers import number_value
 from withe.simulation.session import Session
 
 __all__ = ["DrawnNodes", "Moment", "points_reader"]
@@ -60,7 +61,7 @@ class Moment:
                 index: (np.array(world.support_position(index)), np.array(world.support_rotation(index)))
                 for index, _ in session.settings.supports.values()
             },
-            [float(length) for length in world.parameter("spring_rest_length")[:, 0]],
+            [number_value(session, spring, "rest_length") for spring in session.directory.all(SpringPart)],
             world.frames_as_drawn,
         )
 

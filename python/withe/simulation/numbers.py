@@ -10,27 +10,23 @@ from withe.parts.table import checked, kind_of
 from withe.simulation.readers import Reader
 from withe.simulation.session import Session
 
-__all__ = ["number_of", "number_reader", "number_value", "set_numbers"]
+__all__ = ["number_of", "number_reader", "number_value", "parameter_of", "set_numbers"]
 
 
 def set_numbers(session: Session, part: Part, values: dict[str, Any]) -> None:
     """Change numbers of a part, all or none."""
-    index, settings = number_of(session, part), {}
-    for word, value in values.items():
-        name = _parameter(part, word)
-        settings[name] = session.world.parameter(name)
-        settings[name][index] = checked(type(part), word, value, part.name)
-    session.world.set(0, settings)
+    settings = {parameter_of(part, word): checked(type(part), word, value, part.name) for word, value in values.items()}
+    session.world.set(number_of(session, part), settings)
 
 
 def number_value(session: Session, part: Part, word: str) -> float:
     """Return the present value of a number."""
-    return float(session.world.parameter(_parameter(part, word))[number_of(session, part), 0])
+    return float(session.world.parameter(parameter_of(part, word), number_of(session, part))[0, 0])
 
 
 def number_reader(session: Session, part: Part, word: str) -> Reader:
     """Return the reader of the derivative by a number."""
-    index, name = number_of(session, part), _parameter(part, word)
+    index, name = number_of(session, part), parameter_of(part, word)
     return lambda g: float(getattr(g.parameters, name)[index])
 
 
@@ -41,5 +37,6 @@ def number_of(session: Session, part: Part) -> int:
     return session.scene.all(type(part)).index(part)
 
 
-def _parameter(part: Part, word: str) -> str:
+def parameter_of(part: Part, word: str) -> str:
+    """Return the name of a number in the engine."""
     return f"{kind_of(part).numbers}_{word}"
