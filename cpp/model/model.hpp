@@ -240,6 +240,8 @@ void add_offsets(Model& model, std::size_t uncorrected_end, const Vector3& at_fr
 Parameters initial_parameters(const Model& model);
 /// Set the coefficients of contact and friction from the description; update_derived must follow.
 void set_contact(const ContactDescription& contact, Parameters& parameters);
+/// Write the numbers of surfaces back to the description of their scene.
+void describe_contact(const SurfaceParameters& surfaces, ContactDescription& contact);
 /// Stiffnesses, densities, viscous time and drag of one rod, from one value an edge; update_derived must follow.
 void set_rod(const Model& model, int rod, const RodDescription& description, Parameters& parameters);
 /// Masses, stencil stiffnesses and discrete natural strains from the rest.

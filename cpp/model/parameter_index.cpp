@@ -37,8 +37,12 @@ double* number(Parameters& p, int rod) {
   return begin_of(p.*member, rod);
 }
 template <auto member>
-double* surface(Parameters& p, int rod) {
-  return begin_of(p.surfaces.*member, rod);
+double* surface(Parameters& p, int) {
+  return &(p.surfaces.*member);
+}
+template <auto member>
+double* surface_row(Parameters& p, int row) {
+  return (p.surfaces.*member).row(row).data();
 }
 
 /// Number of a part as a scene describes it.
@@ -112,22 +116,22 @@ constexpr ParameterInfo kIndex[]{
      surface<&SurfaceParameters::friction>},
     {slip_tolerance, "slip_tolerance", Extent::scene, 1, "m/s", Range::positive, Derived::nothing,
      surface<&SurfaceParameters::slip_tolerance>},
-    {restitution, "restitution", Extent::scene, 1, "-", Range::non_negative, Derived::nothing,
+    {restitution, "restitution", Extent::scene, 1, "-", Range::share, Derived::nothing,
      surface<&SurfaceParameters::restitution>},
     {contact_stiffness, "contact_stiffness", Extent::scene, 1, "N/m", Range::non_negative, Derived::nothing,
      surface<&SurfaceParameters::contact_stiffness>},
     {obstacle_friction, "obstacle_friction", Extent::obstacle, 3, "-", Range::non_negative, Derived::nothing,
-     surface<&SurfaceParameters::obstacle_friction>},
+     surface_row<&SurfaceParameters::obstacle_friction>},
     {obstacle_rolling, "obstacle_rolling", Extent::obstacle, 1, "-", Range::non_negative, Derived::nothing,
-     surface<&SurfaceParameters::obstacle_rolling>},
-    {obstacle_restitution, "obstacle_restitution", Extent::obstacle, 1, "-", Range::non_negative, Derived::nothing,
-     surface<&SurfaceParameters::obstacle_restitution>},
+     surface_row<&SurfaceParameters::obstacle_rolling>},
+    {obstacle_restitution, "obstacle_restitution", Extent::obstacle, 1, "-", Range::share, Derived::nothing,
+     surface_row<&SurfaceParameters::obstacle_restitution>},
     {pair_friction, "pair_friction", Extent::pair, 3, "-", Range::any, Derived::nothing,
-     surface<&SurfaceParameters::pair_friction>},
+     surface_row<&SurfaceParameters::pair_friction>},
     {pair_restitution, "pair_restitution", Extent::pair, 1, "-", Range::any, Derived::nothing,
-     surface<&SurfaceParameters::pair_restitution>},
+     surface_row<&SurfaceParameters::pair_restitution>},
     {pair_contact_stiffness, "pair_contact_stiffness", Extent::pair, 1, "N/m", Range::non_negative, Derived::nothing,
-     surface<&SurfaceParameters::pair_contact_stiffness>},
+     surface_row<&SurfaceParameters::pair_contact_stiffness>},
 };
 
 constexpr bool in_order() {
@@ -159,23 +163,16 @@ Eigen::Index rows_of(const Model& model, const ParameterInfo& info, int rod) {
       return model.rod_voronoi[at(rod)].size();
     case Extent::load:
       return first_load_row(model.description, model.description.loads.size());
-    case Extent::obstacle:
-      return static_cast<Eigen::Index>(model.description.contact.obstacles.size());
-    case Extent::pair:
-      return static_cast<Eigen::Index>(model.description.contact.pairs.size());
-    case Extent::spring:
-    case Extent::joint:
-    case Extent::tendon:
-    case Extent::scene:
-      break;
+    default:
+      return 1;
   }
-  return 1;
 }
 
 /// The first number that is out of range, or nothing.
 const double* out_of_range(const ParameterValues& values, Range range) {
   const auto bad = [range](double x) {
-    return !std::isfinite(x) || (range == Range::positive && !(x > 0.0)) || (range == Range::non_negative && x < 0.0);
+    return !std::isfinite(x) || (range == Range::positive && x <= 0.0) ||
+           ((range == Range::non_negative || range == Range::share) && x < 0.0) || (range == Range::share && x > 1.0);
   };
   const double* found = std::find_if(values.data(), values.data() + values.size(), bad);
   return found == values.data() + values.size() ? nullptr : found;
@@ -186,6 +183,7 @@ void check_range(const Model& model, const ParameterInfo& info, int rod, const P
   if (const double* bad = out_of_range(values, info.range))
     require(false, owned(model, info, rod) + " must be " +
                        (info.range == Range::any            ? "finite"
+                        : info.range == Range::share        ? "from 0 to 1"
                         : info.range == Range::non_negative ? "finite and not negative"
                                                             : "positive and finite") +
                        ", got " + text(*bad, 6));
@@ -205,6 +203,10 @@ int owners_of(const Model& model, const ParameterInfo& info) {
       return static_cast<int>(model.joint_angles.size());
     case Extent::tendon:
       return static_cast<int>(scene.tendons.size());
+    case Extent::obstacle:
+      return static_cast<int>(scene.contact.obstacles.size());
+    case Extent::pair:
+      return static_cast<int>(scene.contact.pairs.size());
     default:
       return 1;
   }

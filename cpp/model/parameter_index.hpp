@@ -49,7 +49,7 @@ enum class ParameterKind {
 /// a revolute joint and a tendon own one number each.
 enum class Extent { scene, node, edge, stencil, spring, joint, tendon, load, obstacle, pair };
 
-enum class Range { any, non_negative, positive };
+enum class Range { any, non_negative, positive, share };  ///< share: from 0 to 1
 
 /// Quantities that derive from a parameter.
 enum class Derived { nothing, masses, stiffness, viscous_times, natural_strains };
@@ -66,7 +66,7 @@ struct ParameterInfo {
   VectorX PartNumbers::* number = nullptr;              ///< numbers of all parts, where a part owns one number
   double (*described)(const SceneDescription& scene, int part) = nullptr;  ///< number of such a part as drawn
 
-  /// Set through `World::set_contact`: they decide about the form of the equations.
+  /// True if it belongs to surfaces, whose numbers decide about the form of the equations.
   bool of_contact() const { return kind >= ParameterKind::friction; }
   bool of_rod() const { return extent == Extent::edge || extent == Extent::stencil; }
 };

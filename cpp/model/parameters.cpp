@@ -118,6 +118,22 @@ void set_contact(const ContactDescription& contact, Parameters& parameters) {
   }
 }
 
+void describe_contact(const SurfaceParameters& p, ContactDescription& contact) {
+  contact.friction = p.friction;
+  contact.slip_tolerance = p.slip_tolerance;
+  contact.restitution = p.restitution;
+  contact.stiffness = p.contact_stiffness;
+  contact.obstacle_friction = p.obstacle_friction;
+  contact.obstacle_rolling = p.obstacle_rolling;
+  contact.obstacle_restitution = p.obstacle_restitution;
+  for (std::size_t i = 0; i < contact.pairs.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    contact.pairs[i].friction = p.pair_friction.row(row);
+    contact.pairs[i].restitution = p.pair_restitution(row);
+    contact.pairs[i].stiffness = p.pair_contact_stiffness(row);
+  }
+}
+
 bool SurfaceParameters::operator==(const SurfaceParameters& other) const {
   const auto same = [](const auto& a, const auto& b) { return a.rows() == b.rows() && a == b; };
   return friction == other.friction && slip_tolerance == other.slip_tolerance && restitution == other.restitution &&

@@ -68,24 +68,6 @@ void check_reversible(const Model& model, const Options& options, const Paramete
                 std::to_string(p.node_mass(i) / p.node_drag(i)) + " s at node " + std::to_string(i) + instead);
 }
 
-void check_contact(const ContactDescription& contact, const ContactDescription& own) {
-  const auto valid = [](const auto& v) { return v.size() == 0 || (v.allFinite() && v.minCoeff() >= 0.0); };
-  const auto share = [](double x) { return x >= 0.0 && x <= 1.0; };
-  require(contact.obstacle_friction.rows() == own.obstacle_friction.rows() &&
-              (contact.obstacle_rolling.size() == 0 || contact.obstacle_rolling.size() == own.obstacle_friction.rows()),
-          "friction needs three coefficients per obstacle, and rolling friction one");
-  require(std::isfinite(contact.friction) && contact.friction >= 0.0 && valid(contact.obstacle_friction) &&
-              valid(contact.obstacle_rolling),
-          "friction must not be negative");
-  require(std::isfinite(contact.slip_tolerance) && contact.slip_tolerance > 0.0, "slip_tolerance must be positive");
-  require(contact.obstacle_restitution.size() == own.obstacle_restitution.size(),
-          "restitution needs one coefficient per obstacle");
-  require(share(contact.restitution) &&
-              std::all_of(contact.obstacle_restitution.begin(), contact.obstacle_restitution.end(), share),
-          "restitution must be from 0 to 1");
-  require(std::isfinite(contact.stiffness) && contact.stiffness >= 0.0, "stiffness of contact must not be negative");
-}
-
 void check_shares(const Model& model, const ContactPairDescription& pair) {
   if (pair.shares.size() == 0) return;
   require((pair.first < 0) != (pair.second < 0), "friction varies between a rod and an obstacle only");

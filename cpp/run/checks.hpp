@@ -15,8 +15,6 @@ namespace withe {
 void check_impacts(const Options& options, const ContactDescription& contact);
 /// Refuses forces that cannot be run backwards under a scheme that steps back in time.
 void check_reversible(const Model& model, const Options& options, const Parameters& p);
-/// Refuses coefficients of contact that are out of bounds, or too many for the scene's `own`.
-void check_contact(const ContactDescription& contact, const ContactDescription& own);
 /// Refuses friction of a pair that has not one share for each node and edge of the rod.
 void check_shares(const Model& model, const ContactPairDescription& pair);
 /// Refuses a turn that moves the shape of an obstacle.

@@ -81,6 +81,7 @@ struct World::Implementation : Built, Running {
   template <class Value>
   void begin_ramp(Ramp<Value>& ramp, const Value& now, const Value& value, double over);
   void take_contact();
+  void set_contact(ContactDescription wanted);
   /// Leaves the plane of a planar scene where a parameter of the kind does.
   void leave_plane_for(const ParameterSetting& setting);
   void set(std::span<const ParameterSetting> settings);

@@ -174,43 +174,44 @@ std::pair<Eigen::Index, Eigen::Index> World::Implementation::load_rows(int load)
   return {first_load_row(description, at(load)), description.loads[at(load)].values.rows()};
 }
 
-void World::set_contact(const ContactDescription& contact) {
-  Implementation& self = *implementation_;
-  ContactDescription& own = self.description.contact;
-  check_contact(contact, own);
-  for (const ContactPairDescription& pair : contact.pairs) check_shares(self.model, pair);
-  ContactDescription wanted = own;
-  wanted.friction = contact.friction;
-  wanted.slip_tolerance = contact.slip_tolerance;
-  wanted.obstacle_friction = contact.obstacle_friction;
-  wanted.obstacle_rolling = contact.obstacle_rolling;
-  wanted.restitution = contact.restitution;
-  wanted.obstacle_restitution = contact.obstacle_restitution;
-  wanted.stiffness = contact.stiffness;
-  wanted.pairs = contact.pairs;
-  check_impacts(self.options, wanted);
+/// Takes over a description of the same bodies. The change of the energy at the present state is work of actuation.
+void World::Implementation::set_contact(ContactDescription wanted) {
+  check_impacts(options, wanted);
   const auto energy = [&] {
-    const Contact* touching = self.systems.scheme().contact();
-    return touching ? touching->energy_of(self.state, self.parameters, self.energy_scratch.contact) : 0.0;
+    const Contact* touching = systems.scheme().contact();
+    return touching ? touching->energy_of(state, parameters, energy_scratch.contact) : 0.0;
   };
   const double before = energy();
-  const double stiffness = self.parameters.surfaces.contact_stiffness;
-  const VectorX of_pairs = self.parameters.surfaces.pair_contact_stiffness;
-  own = std::move(wanted);
-  self.take_contact();
-  const SurfaceParameters& now = self.parameters.surfaces;
-  const bool stiffer = now.contact_stiffness != stiffness || now.pair_contact_stiffness.size() != of_pairs.size() ||
-                       now.pair_contact_stiffness != of_pairs;
-  if (const Contact* touching = self.systems.scheme().contact(); touching && stiffer) {
-    touching->take_given_stiffness(self.state, self.parameters);
-    VectorX before_of_pairs = VectorX::Zero(now.pair_contact_stiffness.size());
-    const Eigen::Index known = std::min(of_pairs.size(), before_of_pairs.size());
-    before_of_pairs.head(known) = of_pairs.head(known);
-    if (self.tape && (now.contact_stiffness != stiffness || now.pair_contact_stiffness != before_of_pairs))
-      self.tape->refuse("the contact stiffness was set during the run; begin a new run at the change");
+  const double stiffness = parameters.surfaces.contact_stiffness;
+  const VectorX of_pairs = parameters.surfaces.pair_contact_stiffness;
+  description.contact = std::move(wanted);
+  take_contact();
+  const SurfaceParameters& now = parameters.surfaces;
+  const bool stiffer = now.contact_stiffness != stiffness || now.pair_contact_stiffness != of_pairs;
+  if (const Contact* touching = systems.scheme().contact(); touching && stiffer) {
+    touching->take_given_stiffness(state, parameters);
+    if (tape) tape->refuse("the contact stiffness was set during the run; begin a new run at the change");
   }
   // Energy stored in surfaces and anchors changes with their coefficients.
-  self.ledger.actuation_work += energy() - before;
+  ledger.actuation_work += energy() - before;
+}
+
+int World::own_contact(int first, int second) {
+  Implementation& self = *implementation_;
+  auto& pairs = self.description.contact.pairs;
+  const auto found =
+      std::find_if(pairs.begin(), pairs.end(), [&](const auto& pair) { return pair.is_of(first, second); });
+  if (found != pairs.end()) return static_cast<int>(found - pairs.begin());
+  const auto exists = [&](int body) {
+    return body < static_cast<int>(self.description.rods.size()) &&
+           -1 - body < static_cast<int>(self.description.contact.obstacles.size());
+  };
+  require(exists(first) && exists(second), "no such pair of bodies: ", first, ", ", second);
+  ContactPairDescription pair;
+  pair.first = first, pair.second = second;
+  pairs.push_back(pair);
+  self.take_contact();
+  return static_cast<int>(pairs.size()) - 1;
 }
 
 void World::set_friction_shares(int pair, const VectorX& shares) {
@@ -280,7 +281,6 @@ void World::Implementation::leave_plane_for(const ParameterSetting& setting) {
 void World::Implementation::set(std::span<const ParameterSetting> settings) {
   for (const ParameterSetting& setting : settings) {
     check_setting(model, setting);
-    require(!info_of(setting.kind).of_contact(), "how surfaces press and rub is set by set_contact");
     require(setting.kind != ParameterKind::fluid_viscosity || description.fluid.model != FluidModel::none,
             "the scene has no fluid");
     if (setting.kind != ParameterKind::fluid_regularization) continue;
@@ -293,6 +293,18 @@ void World::Implementation::set(std::span<const ParameterSetting> settings) {
     check_reversible(model, options, wanted);
   }
   for (const ParameterSetting& setting : settings) leave_plane_for(setting);
+  const auto of_surfaces = [](const ParameterSetting& setting) { return info_of(setting.kind).of_contact(); };
+  if (std::any_of(settings.begin(), settings.end(), of_surfaces)) {
+    std::vector<ParameterSetting> own, others;
+    for (const ParameterSetting& setting : settings) (of_surfaces(setting) ? own : others).push_back(setting);
+    Parameters wanted = parameters;
+    set_parameters(model, own, wanted);
+    ContactDescription contact = description.contact;
+    describe_contact(wanted.surfaces, contact);
+    set_contact(std::move(contact));
+    if (!others.empty()) set(others);
+    return;
+  }
   for (const ParameterSetting& setting : settings) {
     const bool curvature = setting.kind == ParameterKind::natural_curvature,
                twist = setting.kind == ParameterKind::natural_twist,

@@ -226,9 +226,9 @@ class World {
   void prescribe_obstacle(int obstacle, const std::optional<Vector3>& position, const std::optional<Vector3>& turn);
   Vector3 obstacle_position(int obstacle) const;  ///< [m]
   Vector3 obstacle_turn(int obstacle) const;      ///< [rad]
-  /// Takes over friction, slip tolerance, restitution and stiffness of a description of the same bodies, and pairs that
-  /// it has besides. What this does to the energy at the present state is work of actuation.
-  void set_contact(const ContactDescription& contact);
+  /// Index of the pair of two bodies that owns contact parameters; a new pair has those of the obstacle or the scene.
+  /// A body is a rod, or -1 - index of an obstacle.
+  int own_contact(int first, int second);
   /// Friction of the nodes, then of the edges, of a rod on an obstacle, over the coefficients of their pair. The pair
   /// is one of the description's.
   void set_friction_shares(int pair, const VectorX& shares);

@@ -367,9 +367,10 @@ void define_supports(WorldClass& world) {
       "obstacle_turn", [](const GuardedWorld& self, int obstacle) { return self.reading().obstacle_turn(obstacle); },
       py::arg("obstacle"));
   world.def(
-      "set_contact",
-      [](GuardedWorld& self, const ContactDescription& contact) { self.changing().set_contact(contact); },
-      py::arg("contact"));
+      "own_contact",
+      [](GuardedWorld& self, int first, int second) { return self.changing().own_contact(first, second); },
+      py::arg("first"), py::arg("second"),
+      "Return the index of the pair of two bodies that owns contact parameters, added where there is none.");
   world.def(
       "set_friction_shares",
       [](GuardedWorld& self, int pair, const VectorX& shares) { self.steering().set_friction_shares(pair, shares); },

@@ -1110,6 +1110,12 @@ class World:
     def obstacle_turn(
         self, obstacle: typing.SupportsInt | typing.SupportsIndex
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...
+    def own_contact(
+        self, first: typing.SupportsInt | typing.SupportsIndex, second: typing.SupportsInt | typing.SupportsIndex
+    ) -> int:
+        """
+        Return the index of the pair of two bodies that owns contact parameters, added where there is none.
+        """
     def parameter(
         self, name: str, owner: typing.SupportsInt | typing.SupportsIndex = 0
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
@@ -1143,7 +1149,6 @@ class World:
         Set parameters of a rod, a part or the scene by their names: all, or where one is refused none.
         """
     def set_added_mass(self, mass: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None: ...
-    def set_contact(self, contact: ContactDescription) -> None: ...
     def set_friction_shares(
         self,
         pair: typing.SupportsInt | typing.SupportsIndex,

@@ -372,3 +372,44 @@ def test_what_is_not_ramped_must_be_set_at_once():
         simulation.set(arm, youngs_modulus=1e6, over=0.1)
     with pytest.raises(ValueError, match="gravity of the scene must be set without over="):
         simulation.set(gravity=(0, 0, -1), over=0.1)
+
+
+@pytest.mark.parametrize("word", ["friction", "restitution"])
+@pytest.mark.parametrize("seed", range(4))
+def test_setting_the_value_that_a_pair_has_changes_no_motion(word, seed):
+    """The first value of its own that a pair is given leaves the stiffness of its contacts alone."""
+    scene = withe.Scene()
+    height = 0.012 + 0.02 * np.random.default_rng(seed).random()
+    arm = scene.add_rod(start=(0, 0, 0.012), end=(0.2, 0, height), nodes=9, radius=0.01, material=RUBBER, name="arm")
+    floor = scene.add_floor(0.0, friction=0.3)
+    scene.add_force(arm.end, (0, 0, -5.0))
+    simulation = scene.build(time_step=2e-3)
+    simulation.step(60)
+    other = simulation.copy()
+    other.set((arm, floor), **{word: other.get((arm, floor), word)})
+    for each in (simulation, other):
+        each.step(60)
+    assert np.array_equal(simulation.positions(), other.positions())
+    assert simulation.energy().work == other.energy().work
+
+
+def test_the_engine_refuses_numbers_of_surfaces_out_of_range():
+    scene = withe.Scene()
+    scene.add_rod(start=(0, 0, 0.1), end=(0.1, 0, 0.1), nodes=3, radius=0.01, material=RUBBER)
+    scene.add_floor(0.0, friction=0.3)
+    scene.enable_contact(friction=0.2)
+    world = scene.build()._session.world
+    index = world.own_contact(0, -1)
+    for owner, settings, message in (
+        (0, {"friction": 0.1, "restitution": 1.5}, "restitution must be from 0 to 1, got 1.5"),
+        (0, {"slip_tolerance": 0.0}, "slip tolerance must be positive and finite"),
+        (0, {"obstacle_friction": (0.1, -0.1, 0.1)}, "obstacle friction must be finite and not negative"),
+        (1, {"obstacle_rolling": 0.1}, "no such part: 1"),
+        (index, {"pair_friction": (0.1, np.nan, 0.1)}, "pair friction must be finite"),
+        (index + 1, {"pair_restitution": 0.1}, "no such part: 1"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            world.set(owner, settings)
+    assert world.contact.friction == 0.2
+    with pytest.raises(ValueError, match="no such pair of bodies: 0, -2"):
+        world.own_contact(0, -2)

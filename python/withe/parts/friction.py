@@ -24,9 +24,6 @@ __all__ = [
     "obstacle_friction",
     "own_friction",
     "pair_between",
-    "pair_in",
-    "with_obstacle",
-    "with_pair",
 ]
 
 Friction = float | tuple[float, float] | tuple[float, float, float] | npt.NDArray[np.float64] | FrictionField
@@ -177,43 +174,6 @@ def own_friction(pair: _core.ContactPairDescription | None) -> Directions | None
     if pair is None or pair.friction[0] < 0.0:
         return None
     return _numbers(pair.friction)
-
-
-def with_obstacle(contact: _core.ContactDescription, index: int, directions: Directions) -> _core.ContactDescription:
-    """The same with other coefficients of an obstacle."""
-    rows = np.array(contact.obstacle_friction)
-    rows[index] = directions
-    contact.obstacle_friction = rows
-    return contact
-
-
-def with_pair(
-    contact: _core.ContactDescription,
-    bodies: tuple[int, int],
-    directions: Directions | None,
-    shares: npt.NDArray[np.float64] | None = None,
-) -> _core.ContactDescription:
-    """The same with other coefficients of two bodies.
-
-    Bodies are rods by their index and obstacles by -1 - index; without directions they have those of the obstacle;
-    `shares` are what nodes and edges have of the coefficients.
-    """
-    pairs = list(contact.pairs)
-    found = pair_in(pairs, bodies)
-    found.friction = np.full(3, -1.0) if directions is None else np.array(directions)
-    found.shares = np.zeros(0) if shares is None else shares
-    contact.pairs = pairs
-    return contact
-
-
-def pair_in(pairs: list[_core.ContactPairDescription], bodies: tuple[int, int]) -> _core.ContactPairDescription:
-    """What two bodies have of their own; where that is nothing, a new one behind the others."""
-    found = pair_between(pairs, bodies)
-    if found is None:
-        found = _core.ContactPairDescription()
-        found.first, found.second = bodies
-        pairs.append(found)
-    return found
 
 
 def pair_between(

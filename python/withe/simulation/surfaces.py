@@ -20,9 +20,6 @@ from withe.parts.friction import (
     obstacle_friction,
     own_friction,
     pair_between,
-    pair_in,
-    with_obstacle,
-    with_pair,
 )
 from withe.parts.kinds import ObstaclePart, RodPart
 from withe.simulation.readers import Reader, of_equilibrium
@@ -49,33 +46,31 @@ Touching = RodPart | ObstaclePart
 
 def set_scene(session: Session, part: None, values: dict[str, Any]) -> None:
     """Change gravity, the coefficients between all rods, and the slip tolerance and stiffness of all contacts."""
-    gravity = validation.vector(values["gravity"], "gravity") if "gravity" in values else None
-    if values.keys() - {"gravity"}:
-        _set_contact(session, values)
-    if gravity is not None:
-        session.world.set_gravity(gravity)
-        session.settings.gravity = gravity
-
-
-def _set_contact(session: Session, values: dict[str, Any]) -> None:
     contact = session.world.contact
-    for word in ("friction", "restitution"):
+    settings: dict[str, Any] = {}
+    for word, check in (("friction", validation.non_negative), ("restitution", validation.share)):
         if word in values:
-            check = validation.non_negative if word == "friction" else validation.share
-            setattr(contact, word, check(values[word], word))
+            settings[word] = check(values[word], word)
             if not contact.rods:
                 raise ValueError(
                     f"{word} of the scene applies to contact between rods, which is off: call Scene.enable_contact "
                     "before build"
                 )
     if "slip_tolerance" in values:
-        contact.slip_tolerance = validation.positive(values["slip_tolerance"], "slip_tolerance")
+        settings["slip_tolerance"] = validation.positive(values["slip_tolerance"], "slip_tolerance")
     if "contact_stiffness" in values:
         stiffness = values["contact_stiffness"]
         if not (contact.rods or contact.obstacles):
             raise ValueError("contact_stiffness cannot be set, because this scene has no contact")
-        contact.stiffness = 0.0 if stiffness is None else validation.positive(stiffness, "contact_stiffness")
-    session.world.set_contact(contact)
+        settings["contact_stiffness"] = (
+            0.0 if stiffness is None else validation.positive(stiffness, "contact_stiffness")
+        )
+    gravity = validation.vector(values["gravity"], "gravity") if "gravity" in values else None
+    if gravity is not None:
+        settings["gravity"] = gravity
+    session.world.set(0, settings)
+    if gravity is not None:
+        session.settings.gravity = gravity
 
 
 def scene_value(session: Session, part: None, word: str) -> Any:
@@ -90,42 +85,38 @@ def scene_value(session: Session, part: None, word: str) -> Any:
 
 def set_obstacle(session: Session, part: ObstaclePart, values: dict[str, Any]) -> None:
     """Change friction, rolling friction and restitution of an obstacle, all or none."""
-    contact = session.world.contact
+    law, owner = session.world.contact.friction_law, repr(part.name)
+    settings: dict[str, Any] = {}
     index = session.directory.all(ObstaclePart).index(part)
-    given = None
+    given: Coefficients | None = None
+    shares: dict[tuple[int, int], FloatArray] = {}
     if "friction" in values:
-        given = coefficients(values["friction"], f"friction of {part.name!r}")
-        contact = _with_obstacle_friction(session, part, given, contact)
+        given = coefficients(values["friction"], f"friction of {owner}")
+        check_law(given.directions, law, f"friction of {owner}")
+        settings["obstacle_friction"] = given.directions
+        shares = _shares_of_obstacle(session, part, given)
     if "restitution" in values:
-        restitution = np.array(contact.obstacle_restitution)
-        share = validation.share(values["restitution"], f"restitution of {part.name!r}")
-        restitution[index] = share
-        contact.obstacle_restitution = restitution
+        settings["obstacle_restitution"] = validation.share(values["restitution"], f"restitution of {owner}")
     if "rolling_friction" in values:
-        rolling = np.array(contact.obstacle_rolling)
-        rolling[index] = validation.non_negative(values["rolling_friction"], f"rolling_friction of {part.name!r}")
-        check_rolling(rolling[index], contact.friction_law, part.name)
-        contact.obstacle_rolling = rolling
-    session.world.set_contact(contact)
+        rolling = validation.non_negative(values["rolling_friction"], f"rolling_friction of {owner}")
+        check_rolling(rolling, law, part.name)
+        settings["obstacle_rolling"] = rolling
+    session.world.set(index, settings)
+    for bodies, of_rod in shares.items():
+        session.world.set_friction_shares(session.world.own_contact(*bodies), of_rod)
     if given is not None:
         _note_field(session, (part.name,), given)
 
 
-def _with_obstacle_friction(
-    session: Session, part: ObstaclePart, given: Coefficients, contact: _core.ContactDescription
-) -> _core.ContactDescription:
-    """The same with other friction of an obstacle, and of rods that have none of their own with it."""
-    check_law(given.directions, contact.friction_law, f"friction of {part.name!r}")
-    index = session.directory.all(ObstaclePart).index(part)
-    contact = with_obstacle(contact, index, given.directions)
+def _shares_of_obstacle(session: Session, part: ObstaclePart, given: Coefficients) -> dict[tuple[int, int], FloatArray]:
+    """Return the shares of an obstacle's friction for the rods that have none of their own with the obstacle."""
+    index, out = session.directory.all(ObstaclePart).index(part), {}
     for rod in session.directory.all(RodPart):
-        bodies = rod.index, -1 - index
-        own = pair_between(contact.pairs, bodies)
+        own = pair_between(session.world.contact.pairs, (rod.index, -1 - index))
         shares = _shares_now(session, rod, part, given)
-        if (own is None and shares is None) or own_friction(own) is not None:
-            continue
-        contact = with_pair(contact, bodies, None, shares)
-    return contact
+        if own_friction(own) is None and not (own is None and shares is None):
+            out[rod.index, -1 - index] = np.zeros(0) if shares is None else shares
+    return out
 
 
 def obstacle_value(session: Session, part: ObstaclePart, word: str) -> Any:
@@ -148,29 +139,25 @@ def obstacle_value(session: Session, part: ObstaclePart, word: str) -> Any:
 def set_pair(session: Session, pair: BodyPair, values: dict[str, Any]) -> None:
     """Give two bodies friction, restitution or a contact stiffness of their own, all or none."""
     first, second = pair.first, pair.second
-    directory, contact, given = session.directory, session.world.contact, None
-    bodies = body_of(directory, first), body_of(directory, second)
+    directory, world, names = session.directory, session.world, f"{first.name!r} and {second.name!r}"
+    given, shares = None, None
+    settings: dict[str, Any] = {}
     for word in values:
-        _check_pair(first, second, contact, word.replace("_", " "))
+        _check_pair(first, second, world.contact, word.replace("_", " "))
     if "friction" in values:
         given = pair_friction(directory, first.name, second.name, values["friction"])
-        check_law(given.directions, contact.friction_law, f"friction of {first.name!r} and {second.name!r}")
+        check_law(given.directions, world.contact.friction_law, f"friction of {names}")
+        settings["pair_friction"] = given.directions
         rod, obstacle = (first, second) if isinstance(first, RodPart) else (second, first)
-        shares = None
         if isinstance(rod, RodPart) and isinstance(obstacle, ObstaclePart):
             shares = _shares_now(session, rod, obstacle, given)
-        contact = with_pair(contact, bodies, given.directions, shares)
-    for word, attribute, check in (
-        ("restitution", "restitution", validation.share),
-        ("contact_stiffness", "stiffness", validation.positive),
-    ):
+    for word, check in (("restitution", validation.share), ("contact_stiffness", validation.positive)):
         if word in values:
-            number = check(values[word], f"{word.replace('_', ' ')} of {first.name!r} and {second.name!r}")
-            pairs = list(contact.pairs)
-            setattr(pair_in(pairs, bodies), attribute, number)
-            contact.pairs = pairs
-    session.world.set_contact(contact)
+            settings[f"pair_{word}"] = check(values[word], f"{word.replace('_', ' ')} of {names}")
+    index = world.own_contact(body_of(directory, first), body_of(directory, second))
+    world.set(index, settings)
     if given is not None:
+        world.set_friction_shares(index, np.zeros(0) if shares is None else shares)
         _note_field(session, pair_of(directory, first.name, second.name), given)
 
 
