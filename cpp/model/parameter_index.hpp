@@ -68,6 +68,8 @@ struct ParameterInfo {
 
   /// True if it belongs to surfaces, whose numbers decide about the form of the equations.
   bool of_contact() const { return kind >= ParameterKind::friction; }
+  /// True if `World::set` may ramp it to its value.
+  bool is_ramped() const { return derived == Derived::natural_strains || number != nullptr; }
   bool of_rod() const { return extent == Extent::edge || extent == Extent::stencil; }
 };
 

@@ -68,7 +68,7 @@ void begin_as_drawn(const Built& built, Running& running, Configuration& c) {
   running.parameters = initial_parameters(model);
   running.parameters.lumped = options.integrator == Integrator::verlet;
   state = initial_state(model);
-  running.ramps.assign(description.rods.size(), NaturalRamp{});
+  running.ramps.natural.assign(description.rods.size(), NaturalRamp{});
   running.motions.assign(description.supports.size(), SupportMotion{});
   running.custom_force = MatrixX3::Zero(model.node_count, 3);
   running.custom_moments = MatrixX3::Zero(description.custom_moments ? model.node_count : 0, 3);

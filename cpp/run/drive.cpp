@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "run/hold.hpp"
+#include "steps/terms.hpp"
 
 namespace withe {
 
@@ -12,27 +13,35 @@ Eigen::VectorBlock<VectorX> natural_stretch(const Model& model, Parameters& para
   return parameters.edge_natural_stretch.segment(first, model.rod_first_edge[at(rod) + 1] - first);
 }
 
-bool are_active(const std::vector<NaturalRamp>& ramps) {
-  for (const NaturalRamp& ramp : ramps)
+bool are_active(const Ramps& ramps) {
+  for (const NaturalRamp& ramp : ramps.natural)
     if (ramp.curvature.active || ramp.twist.active || ramp.stretch.active) return true;
-  return false;
+  return !ramps.numbers.empty();
 }
 
-void apply_ramps(const Model& model, const std::vector<NaturalRamp>& ramps, double time, Parameters& parameters) {
-  for (std::size_t r = 0; r < ramps.size(); ++r) {
-    const bool bent = ramps[r].curvature.apply(time, parameters.natural_curvature[r]),
-               twisted = ramps[r].twist.apply(time, parameters.natural_twist[r]),
-               stretched = ramps[r].stretch.apply(time, natural_stretch(model, parameters, static_cast<int>(r)));
+void apply_ramps(const Model& model, const Ramps& ramps, double time, Parameters& parameters) {
+  for (std::size_t r = 0; r < ramps.natural.size(); ++r) {
+    const auto& [curvature, twist, stretch] = ramps.natural[r];
+    const bool bent = curvature.apply(time, parameters.natural_curvature[r]),
+               twisted = twist.apply(time, parameters.natural_twist[r]),
+               stretched = stretch.apply(time, natural_stretch(model, parameters, static_cast<int>(r)));
     if (bent || twisted || stretched) update_natural(model, parameters, static_cast<int>(r));
+  }
+  for (const NumberRamp& ramp : ramps.numbers) {
+    const double s = ramp.span.fraction(time);
+    parameter_view(model, parameters, ramp.kind, ramp.part)(0, 0) = (1.0 - s) * ramp.from + s * ramp.to;
+    update_derived(model, Derived::nothing, 0, parameters);
   }
 }
 
-double apply_ramps(const Model& model, const std::vector<NaturalRamp>& ramps, double time, const Configuration& c,
+double apply_ramps(const Model& model, const Ramps& ramps, double time, const VectorX& q, const Configuration& c,
                    Parameters& parameters, EnergyScratch& scratch) {
   EnergyCoefficients& before = scratch.coefficients;
   before.set(model, parameters);
   apply_ramps(model, ramps, time, parameters);
-  return natural_change_energy(model, before.elastic, parameters, c);
+  const double work = natural_change_energy(model, before.elastic, parameters, c);
+  if (ramps.numbers.empty()) return work;
+  return work + (stored_energy(model, parameters, q) - stored_energy(model, before.numbers, q));
 }
 
 ObstacleWay obstacle_way(const Model& model, const State& state, int obstacle) {

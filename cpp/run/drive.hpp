@@ -9,11 +9,11 @@
 namespace withe {
 
 Eigen::VectorBlock<VectorX> natural_stretch(const Model& model, Parameters& parameters, int rod);
-bool are_active(const std::vector<NaturalRamp>& ramps);
-/// Sets natural shapes that are on a ramp to their values at a time.
-void apply_ramps(const Model& model, const std::vector<NaturalRamp>& ramps, double time, Parameters& parameters);
-/// Does the same in a configuration that stays, and returns by how much the elastic energy changes [J].
-double apply_ramps(const Model& model, const std::vector<NaturalRamp>& ramps, double time, const Configuration& c,
+bool are_active(const Ramps& ramps);
+/// Sets the parameters that are on a ramp to their values at a time.
+void apply_ramps(const Model& model, const Ramps& ramps, double time, Parameters& parameters);
+/// Does the same in a configuration at q that stays, and returns by how much the elastic energy changes [J].
+double apply_ramps(const Model& model, const Ramps& ramps, double time, const VectorX& q, const Configuration& c,
                    Parameters& parameters, EnergyScratch& scratch);
 
 /// Supports and obstacles that are to be elsewhere at once move there evenly in the course of a time step. Each part of

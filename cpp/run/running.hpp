@@ -9,6 +9,7 @@
 
 #include "integrators/dynamics.hpp"
 #include "model/actuation.hpp"
+#include "model/parameter_index.hpp"
 #include "run/energy.hpp"
 #include "run/step_control.hpp"
 
@@ -83,6 +84,19 @@ struct NaturalRamp {
   Ramp<VectorX> twist, stretch;
 };
 
+/// Linear ramp of the number of one part.
+struct NumberRamp {
+  ParameterKind kind{};
+  int part = 0;
+  double from = 0, to = 0;
+  Span span;
+};
+
+struct Ramps {
+  std::vector<NaturalRamp> natural;  ///< per rod
+  std::vector<NumberRamp> numbers;   ///< of parts, in the order in which they began
+};
+
 /// Energy balance of the watch over what contact puts in where surfaces slide by much within a step.
 struct ContactGuard {
   double scale = 0;   ///< greatest energy so far, as it was looked at [J]
@@ -104,7 +118,7 @@ struct StepWatch {
 /// Values that a user sets, and the ramps that lead to them.
 struct Settings {
   Parameters parameters;
-  std::vector<NaturalRamp> ramps;
+  Ramps ramps;
   std::vector<ObstacleMotion> obstacle_motions;  ///< none until one moves
   Actuation actuation_before;                    ///< with which the state last moved
   bool actuation_changed = false;                ///< since then, or since the scene was drawn, which is free of stress

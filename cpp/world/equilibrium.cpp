@@ -47,7 +47,7 @@ EquilibriumResult World::Implementation::equilibrium(double dt, Saddles saddles)
   const bool actuation_changed_before = actuation_changed;
   if (are_active(ramps)) {
     note_actuation();
-    ledger.actuation_work += apply_ramps(model, ramps, time, configuration(), parameters, energy_scratch);
+    ledger.actuation_work += apply_ramps(model, ramps, time, state.q, configuration(), parameters, energy_scratch);
   }
   const Actuation wanted = actuation_changed ? actuation_of(parameters) : Actuation{};
   prescribe(model, *this, *this, time, prescribed);

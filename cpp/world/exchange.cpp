@@ -83,8 +83,19 @@ void exchange(Archive& io, const Model& model, Settings& settings) {
     auto& [from, to, start, end, active] = ramp;
     io(from), io(to), io(start), io(end), io(active);
   };
-  for (auto& [curvature, twist, stretch] : ramps)
+  for (auto& [curvature, twist, stretch] : ramps.natural)
     exchange_ramp(curvature), exchange_ramp(twist), exchange_ramp(stretch);
+  exchange_size(io, ramps.numbers, 1 << 20, "snapshot is damaged: impossible ramp");
+  for (auto& [kind, part, from, to, span] : ramps.numbers) {
+    int number = static_cast<int>(kind);
+    io(number), io(part), io(from), io(to);
+    exchange(io, span);
+    const auto index = parameter_index();
+    require(number >= 0 && number < static_cast<int>(index.size()) && index[at(number)].number && part >= 0 &&
+                part < owners_of(model, index[at(number)]) && std::isfinite(from) && std::isfinite(to),
+            "snapshot is damaged: impossible ramp");
+    kind = static_cast<ParameterKind>(number);
+  }
   for (auto& [from, to, shift, turn] : obstacle_motions) {
     for (ObstacleWay* way : {&from, &to}) io(way->shift), io(way->turn);
     exchange(io, shift), exchange(io, turn);

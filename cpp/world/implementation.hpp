@@ -84,7 +84,9 @@ struct World::Implementation : Built, Running {
   void set_contact(ContactDescription wanted);
   /// Leaves the plane of a planar scene where a parameter of the kind does.
   void leave_plane_for(const ParameterSetting& setting);
-  void set(std::span<const ParameterSetting> settings);
+  void set(std::span<const ParameterSetting> settings, double over);
+  void begin_ramp(const ParameterSetting& setting, double over);
+  void end_ramp(const ParameterSetting& setting);
   /// Configuration of the present state.
   const Configuration& configuration() const;
   /// Contact in time steps; none where nothing can touch.

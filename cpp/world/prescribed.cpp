@@ -14,11 +14,12 @@ void World::Implementation::note_actuation() {
 /// The state has moved with the present shapes; those that have come to their end are at rest from now on.
 void World::Implementation::retire_ramps() {
   actuation_changed = false;
-  for (NaturalRamp& ramp : ramps) {
+  for (NaturalRamp& ramp : ramps.natural) {
     ramp.curvature.retire(state.time);
     ramp.twist.retire(state.time);
     ramp.stretch.retire(state.time);
   }
+  std::erase_if(ramps.numbers, [this](const NumberRamp& ramp) { return state.time >= ramp.span.end; });
 }
 
 /// Custom forces of a step of dt are those where the scheme's own forces act.

@@ -186,8 +186,8 @@ void check_lagged(const Lagged& lagged, const Model& model) {
 
 /// Ramps have no size until they are used, nor has the shape before one was set.
 void give_sizes(World::Implementation& self) {
-  for (std::size_t r = 0; r < self.ramps.size(); ++r) {
-    NaturalRamp& ramp = self.ramps[r];
+  for (std::size_t r = 0; r < self.ramps.natural.size(); ++r) {
+    NaturalRamp& ramp = self.ramps.natural[r];
     const auto& rod = self.description.rods[r];
     for (MatrixX2* m : {&ramp.curvature.from, &ramp.curvature.to})
       if (m->rows() != rod.natural_curvature.rows()) *m = rod.natural_curvature;

@@ -252,7 +252,7 @@ bool World::Implementation::inner_step(double dt, int slot, PartResult& part) {
   call_before_step(middle, end);
   const bool ramped = are_active(ramps);
   double actuation = 0.0;
-  if (ramped) actuation += apply_ramps(model, ramps, middle, configuration(), parameters, energy_scratch);
+  if (ramped) actuation += apply_ramps(model, ramps, middle, state.q, configuration(), parameters, energy_scratch);
   prescribe(model, *this, *this, end, prescribed);
   Equations& system = systems.scheme();
   const auto undo = [&] {
@@ -292,7 +292,7 @@ bool World::Implementation::inner_step(double dt, int slot, PartResult& part) {
   keep_reactions(dt, begins);
   if (ramped) {
     const Configuration& there = model.planar() ? configuration() : systems.work.after;
-    actuation += apply_ramps(model, ramps, end, there, parameters, energy_scratch);
+    actuation += apply_ramps(model, ramps, end, state.q, there, parameters, energy_scratch);
     ledger.actuation_work += actuation;
   }
   return true;

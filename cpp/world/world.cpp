@@ -278,9 +278,12 @@ void World::Implementation::leave_plane_for(const ParameterSetting& setting) {
 }
 
 /// All of them or, where one is refused, none.
-void World::Implementation::set(std::span<const ParameterSetting> settings) {
+void World::Implementation::set(std::span<const ParameterSetting> settings, double over) {
+  require(std::isfinite(over) && over >= 0.0, "over must be finite and not negative");
   for (const ParameterSetting& setting : settings) {
     check_setting(model, setting);
+    const ParameterInfo& info = info_of(setting.kind);
+    require(over == 0.0 || info.is_ramped(), info.name, " must be set without over");
     require(setting.kind != ParameterKind::fluid_viscosity || description.fluid.model != FluidModel::none,
             "the scene has no fluid");
     if (setting.kind != ParameterKind::fluid_regularization) continue;
@@ -302,18 +305,15 @@ void World::Implementation::set(std::span<const ParameterSetting> settings) {
     ContactDescription contact = description.contact;
     describe_contact(wanted.surfaces, contact);
     set_contact(std::move(contact));
-    if (!others.empty()) set(others);
+    if (!others.empty()) set(others, over);
     return;
   }
-  for (const ParameterSetting& setting : settings) {
-    const bool curvature = setting.kind == ParameterKind::natural_curvature,
-               twist = setting.kind == ParameterKind::natural_twist,
-               stretch = setting.kind == ParameterKind::natural_stretch;
-    if (curvature || twist || stretch || setting.kind == ParameterKind::tendon_tension) note_actuation();
-    if (curvature) ramps[at(setting.owner)].curvature.active = false;
-    if (twist) ramps[at(setting.owner)].twist.active = false;
-    if (stretch) ramps[at(setting.owner)].stretch.active = false;
-  }
+  for (const ParameterSetting& setting : settings)
+    if (over > 0.0)
+      begin_ramp(setting, over);
+    else
+      end_ramp(setting);
+  if (over > 0.0) return;
   const bool set_before = newly_set;
   begin_setting();
   if (!set_parameters(model, settings, parameters)) {
@@ -325,7 +325,36 @@ void World::Implementation::set(std::span<const ParameterSetting> settings) {
   plan_current = false;
 }
 
-void World::set(std::span<const ParameterSetting> settings) { implementation_->set(settings); }
+/// Start a ramp from the present value.
+void World::Implementation::begin_ramp(const ParameterSetting& setting, double over) {
+  const auto& [kind, owner, values] = setting;
+  ParameterView now = parameter_view(model, parameters, kind, owner);
+  const MatrixX target = values.rows() == now.rows() ? MatrixX(values) : MatrixX(values.replicate(now.rows(), 1));
+  if (info_of(kind).number) {
+    end_ramp(setting);
+    ramps.numbers.push_back({kind, owner, now(0, 0), target(0, 0), {state.time, state.time + over}});
+  } else if (kind == ParameterKind::natural_curvature)
+    begin_ramp(ramps.natural[at(owner)].curvature, MatrixX2(now), MatrixX2(target), over);
+  else
+    begin_ramp(kind == ParameterKind::natural_twist ? ramps.natural[at(owner)].twist : ramps.natural[at(owner)].stretch,
+               VectorX(now.col(0)), VectorX(target.col(0)), over);
+  reaction_current = false;
+  state.acceleration_current = false;
+}
+
+/// A parameter that is set at once leaves its ramp.
+void World::Implementation::end_ramp(const ParameterSetting& setting) {
+  const auto& [kind, owner, values] = setting;
+  const ParameterInfo& info = info_of(kind);
+  if (info.derived == Derived::natural_strains || kind == ParameterKind::tendon_tension) note_actuation();
+  if (info.number)
+    std::erase_if(ramps.numbers, [&, k = kind, o = owner](const NumberRamp& r) { return r.kind == k && r.part == o; });
+  if (kind == ParameterKind::natural_curvature) ramps.natural[at(owner)].curvature.active = false;
+  if (kind == ParameterKind::natural_twist) ramps.natural[at(owner)].twist.active = false;
+  if (kind == ParameterKind::natural_stretch) ramps.natural[at(owner)].stretch.active = false;
+}
+
+void World::set(std::span<const ParameterSetting> settings, double over) { implementation_->set(settings, over); }
 
 namespace {
 
@@ -343,48 +372,35 @@ MatrixX World::parameter(ParameterKind kind, int owner) const {
 }
 
 void World::set_natural_curvature(int rod, const MatrixX2& curvature, double over) {
-  Implementation& self = *implementation_;
-  require(std::isfinite(over) && over >= 0.0, "over must be finite and not negative");
   const ParameterSetting setting{ParameterKind::natural_curvature, rod, rows_of(curvature)};
-  if (over == 0.0) return self.set({&setting, 1});
-  check_setting(self.model, setting);
-  self.leave_plane_for(setting);
-  const MatrixX2& now = self.parameters.natural_curvature[at(rod)];
-  const MatrixX2 target = curvature.rows() == now.rows() ? curvature : MatrixX2(curvature.replicate(now.rows(), 1));
-  self.begin_ramp(self.ramps[at(rod)].curvature, now, target, over);
+  set({&setting, 1}, over);
 }
 
 void World::set_natural_twist(int rod, const VectorX& twist, double over) {
-  Implementation& self = *implementation_;
-  require(std::isfinite(over) && over >= 0.0, "over must be finite and not negative");
   const ParameterSetting setting{ParameterKind::natural_twist, rod, rows_of(twist)};
-  if (over == 0.0) return self.set({&setting, 1});
-  check_setting(self.model, setting);
-  self.leave_plane_for(setting);
-  self.begin_ramp(self.ramps[at(rod)].twist, self.parameters.natural_twist[at(rod)], twist, over);
+  set({&setting, 1}, over);
 }
 
 void World::set_natural_stretch(int rod, const VectorX& stretch, double over) {
-  Implementation& self = *implementation_;
-  require(std::isfinite(over) && over >= 0.0, "over must be finite and not negative");
   const ParameterSetting setting{ParameterKind::natural_stretch, rod, rows_of(stretch)};
-  if (over == 0.0) return self.set({&setting, 1});
-  check_setting(self.model, setting);
-  const VectorX now = natural_stretch(self.model, self.parameters, rod);
-  const VectorX target = stretch.size() == now.size() ? stretch : VectorX(VectorX::Constant(now.size(), stretch(0)));
-  self.begin_ramp(self.ramps[at(rod)].stretch, now, target, over);
+  set({&setting, 1}, over);
 }
 
 MatrixX2 World::natural_curvature(int rod) const { return implementation_->parameters.natural_curvature.at(at(rod)); }
 VectorX World::natural_twist(int rod) const { return implementation_->parameters.natural_twist.at(at(rod)); }
 
-std::optional<double> World::natural_shape_due(ParameterKind kind, int rod) const {
-  const NaturalRamp& ramp = implementation_->ramps.at(at(rod));
+std::optional<double> World::due(ParameterKind kind, int owner) const {
+  const Implementation& self = *implementation_;
+  const ParameterInfo& info = info_of(kind);
+  require(info.is_ramped(), info.name, " has no ramps");
+  check_owner(self.model, info, owner);
+  for (const NumberRamp& ramp : self.ramps.numbers)
+    if (ramp.kind == kind && ramp.part == owner) return ramp.span.end;
+  if (info.number) return std::nullopt;
+  const NaturalRamp& ramp = self.ramps.natural.at(at(owner));
   const auto due = [](const auto& way) { return way.active ? std::optional(way.end) : std::nullopt; };
   if (kind == ParameterKind::natural_curvature) return due(ramp.curvature);
-  if (kind == ParameterKind::natural_twist) return due(ramp.twist);
-  require(kind == ParameterKind::natural_stretch, "no natural shape");
-  return due(ramp.stretch);
+  return kind == ParameterKind::natural_twist ? due(ramp.twist) : due(ramp.stretch);
 }
 
 void World::set_added_mass(const VectorX& mass) {

@@ -179,7 +179,7 @@ class World {
   void remove_load(int load);                 ///< one put on while running; those after it move up by one
   /// Sets parameters by their index, all or, where one is refused, none. What this does to the energy at the present
   /// state is work of actuation.
-  void set(std::span<const ParameterSetting> settings);
+  void set(std::span<const ParameterSetting> settings, double over = 0.0);
   MatrixX parameter(ParameterKind kind, int owner = 0) const;  ///< present values of a rod, a part or the scene
   /// Ramped linearly over `over` seconds from now (0: at once); a row a stencil, or one for all.
   void set_natural_curvature(int rod, const MatrixX2& curvature, double over);
@@ -188,8 +188,8 @@ class World {
   void set_natural_stretch(int rod, const VectorX& stretch, double over);
   MatrixX2 natural_curvature(int rod) const;  ///< present value, of the smooth rod [1/m]
   VectorX natural_twist(int rod) const;       ///< [rad/m]
-  /// When a natural shape of a rod is where it goes to [s]; nothing where it is not on its way.
-  std::optional<double> natural_shape_due(ParameterKind kind, int rod) const;
+  /// Time at which the ramp of a parameter ends [s]; nothing without a ramp.
+  std::optional<double> due(ParameterKind kind, int owner) const;
   void set_added_mass(const VectorX& mass);
   void set_gravity(const Vector3& gravity);
 

@@ -212,7 +212,7 @@ void register_exceptions(py::module_& module) {
 
 using WorldClass = py::class_<GuardedWorld>;
 
-void set_parameters(World& world, int owner, const py::dict& values) {
+void set_parameters(World& world, int owner, const py::dict& values, double over) {
   using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
   std::vector<Array> arrays;
   std::vector<ParameterSetting> settings;
@@ -226,7 +226,7 @@ void set_parameters(World& world, int owner, const py::dict& values) {
     const Eigen::Index columns = table ? size(1) : list ? 1 : static_cast<Eigen::Index>(array.size());
     settings.push_back({info.kind, owner, {array.data(), rows, columns}});
   }
-  world.set(settings);
+  world.set(settings, over);
 }
 
 void define_steps(WorldClass& world) {
@@ -303,17 +303,19 @@ void define_parameters(WorldClass& world) {
       "natural_twist", [](const GuardedWorld& self, int rod) { return self.reading().natural_twist(rod); },
       py::arg("rod"));
   world.def(
-      "natural_shape_due",
-      [](const GuardedWorld& self, const std::string& name, int rod) {
-        return self.reading().natural_shape_due(parameter_named(name).kind, rod);
+      "due",
+      [](const GuardedWorld& self, const std::string& name, int owner) {
+        return self.reading().due(parameter_named(name).kind, owner);
       },
-      py::arg("name"), py::arg("rod"),
-      "When a natural shape is where it goes to [s]; None where it is not on its way.");
+      py::arg("name"), py::arg("owner"), "Return the time at which the ramp of a parameter ends [s], or None.");
   world.def(
       "set",
-      [](GuardedWorld& self, int owner, const py::dict& values) { set_parameters(self.changing(), owner, values); },
-      py::arg("owner"), py::arg("values"),
-      "Set parameters of a rod, a part or the scene by their names: all, or where one is refused none.");
+      [](GuardedWorld& self, int owner, const py::dict& values, double over) {
+        set_parameters(self.changing(), owner, values, over);
+      },
+      py::arg("owner"), py::arg("values"), py::arg("over") = 0.0,
+      "Set parameters of a rod, a part or the scene by their names, over a duration [s]: all, or where one is refused "
+      "none.");
   world.def(
       "parameter",
       [](const GuardedWorld& self, const std::string& name, int owner) {

@@ -1040,6 +1040,10 @@ class World:
         self, rod: typing.SupportsInt | typing.SupportsIndex
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 9]"]: ...
     def displace_state(self, by: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None: ...
+    def due(self, name: str, owner: typing.SupportsInt | typing.SupportsIndex) -> float | None:
+        """
+        Return the time at which the ramp of a parameter ends [s], or None.
+        """
     def energy(self) -> Energy: ...
     def equilibrium(self, stable: bool, callback: typing.Any, forces: typing.Any) -> EquilibriumResult:
         """
@@ -1096,10 +1100,6 @@ class World:
     def natural_curvature(
         self, rod: typing.SupportsInt | typing.SupportsIndex
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]"]: ...
-    def natural_shape_due(self, name: str, rod: typing.SupportsInt | typing.SupportsIndex) -> float | None:
-        """
-        When a natural shape is where it goes to [s]; None where it is not on its way.
-        """
     def natural_twist(
         self, rod: typing.SupportsInt | typing.SupportsIndex
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
@@ -1144,9 +1144,14 @@ class World:
         Go back to a snapshot.
         """
     def rod_energy(self, rod: typing.SupportsInt | typing.SupportsIndex) -> Energy: ...
-    def set(self, owner: typing.SupportsInt | typing.SupportsIndex, values: dict) -> None:
+    def set(
+        self,
+        owner: typing.SupportsInt | typing.SupportsIndex,
+        values: dict,
+        over: typing.SupportsFloat | typing.SupportsIndex = 0.0,
+    ) -> None:
         """
-        Set parameters of a rod, a part or the scene by their names: all, or where one is refused none.
+        Set parameters of a rod, a part or the scene by their names, over a duration [s]: all, or where one is refused none.
         """
     def set_added_mass(self, mass: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None: ...
     def set_friction_shares(

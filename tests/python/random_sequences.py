@@ -85,7 +85,8 @@ def set_part(simulation, r):
          ("tendon", "tension", r.uniform(0, 0.3)),
          ("joint", r.choice(["stiffness", "damping", "rest_angle", "moment"]), r.uniform(0, 0.01))]
     )  # fmt: skip
-    simulation.set(part, **{word: value})
+    over = r.choice([0.0, 0.0, 0.02]) if part in ("tendon", "joint") else 0.0
+    simulation.set(part, over=over, **{word: value})
 
 
 def gravity(simulation, r):

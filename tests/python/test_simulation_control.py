@@ -364,6 +364,28 @@ def test_words_are_set_together_or_not_at_all():
     with pytest.raises(ValueError, match="restitution of"):
         simulation.set((arm, floor), friction=0.1, restitution=2.0)
     assert simulation.get((arm, floor), "friction") == 0.3
+    with pytest.raises(ValueError, match="planar=False"):
+        simulation.set(arm, natural_stretch=1.1, natural_twist=1.0, over=0.01)
+    simulation.step(5)
+    assert np.all(simulation.get(arm, "natural_stretch") == 1.0)
+
+
+@pytest.mark.parametrize("word", ["stiffness", "rest_length", "damping"])
+def test_numbers_of_springs_are_led_to_their_values(word):
+    scene = withe.Scene(gravity=(0, 0, 0))
+    arm = scene.add_rod(start=(0, 0, 0), end=(0.1, 0, 0), nodes=3, radius=0.01, material=RUBBER)
+    post = scene.add_rod(start=(0.2, 0, 0), end=(0.3, 0, 0), nodes=3, radius=0.01, material=RUBBER)
+    spring = scene.add_spring(arm.end, post.start, stiffness=10.0, damping=0.1)
+    simulation = scene.build(time_step=1e-3)
+    first = simulation.get(spring, word)
+    simulation.set(spring, **{word: 2.0 * first}, over=0.01)
+    assert simulation.get(spring, word) == first
+    simulation.step(5)
+    assert simulation.get(spring, word) == pytest.approx(1.5 * first)
+    simulation.step(10)
+    assert simulation.get(spring, word) == 2.0 * first
+    energy = simulation.energy()
+    assert energy.total - energy.work + energy.dissipated == pytest.approx(0.0, abs=1e-12)
 
 
 def test_what_is_not_ramped_must_be_set_at_once():

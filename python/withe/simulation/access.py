@@ -54,7 +54,7 @@ def _whatever_shape(
     return lambda session, part, word, shape: reader(session, part, word)
 
 
-_NUMBERS = _Access(_at_once(numbers.set_numbers), numbers.number_value, _whatever_shape(numbers.number_reader))
+_NUMBERS = _Access(numbers.set_numbers, numbers.number_value, _whatever_shape(numbers.number_reader))
 _ACCESS: dict[type[Any], _Access] = {
     **{kind.part: _NUMBERS for kind in KINDS if kind.numbers is not None},
     RodPart: _Access(rods.set_rod, rods.rod_value, _whatever_shape(rods.rod_reader)),

@@ -13,10 +13,12 @@ from withe import _core
 from withe.parts.contacts import BodyPair
 from withe.parts.kinds import DragPart, LoadPart, Part, RodPart
 from withe.parts.parameters import ACTING_WORDS, NATURAL_WORDS
-from withe.simulation.access import reader_of, word_of
+from withe.parts.table import kind_of
+from withe.simulation.access import reader_of, word_of, words_of
 from withe.simulation.drawn import DrawnNodes
 from withe.simulation.motion import POSE_WORDS
 from withe.simulation.moves import Way
+from withe.simulation.numbers import number_of, parameter_of
 from withe.simulation.obstacles import find_obstacle
 from withe.simulation.overlaps import OF_DRAGS, made_by
 from withe.simulation.readers import OfRun, Reader
@@ -122,19 +124,27 @@ class _Ramp:
 
 
 def _ramps_on_their_way(session: Session) -> dict[_Key, _Ramp]:
-    """Return natural shapes that ramp at the start of a run to values that were set before it."""
+    """Return numbers that ramp at the start of a run to values that were set before it."""
     out, now = {}, session.world.time
-    for rod in session.directory.rods:
-        for word in NATURAL_WORDS:
-            due = session.world.natural_shape_due(word, rod.index)
+    for part in session.directory.parts.values():
+        for word in words_of(part):
+            if not _is_ramp(part, word.name):
+                continue
+            if isinstance(part, RodPart):
+                due = session.world.due(word.name, part.index)
+            else:
+                due = session.world.due(parameter_of(part, word.name), number_of(session, part))
             if due is not None and due > now:
-                out[rod.name, word] = _Ramp({_START: 1.0}, _BEFORE, now, due - now)
+                out[part.name, word.name] = _Ramp({_START: 1.0}, _BEFORE, now, due - now)
     return out
 
 
 def _is_ramp(part: Part | BodyPair | None, word: str) -> bool:
     """True of numbers that the engine leads to their values."""
-    return isinstance(part, RodPart) and word in NATURAL_WORDS
+    if isinstance(part, RodPart):
+        return word in NATURAL_WORDS
+    known = word_of(part, word)
+    return isinstance(part, Part) and kind_of(part).numbers is not None and known is not None and known.is_ramped
 
 
 @dataclass

@@ -13,10 +13,10 @@ from withe.simulation.session import Session
 __all__ = ["number_of", "number_reader", "number_value", "parameter_of", "set_numbers"]
 
 
-def set_numbers(session: Session, part: Part, values: dict[str, Any]) -> None:
-    """Change numbers of a part, all or none."""
+def set_numbers(session: Session, part: Part, values: dict[str, Any], over: float) -> None:
+    """Change numbers of a part, all or none, over a duration [s]."""
     settings = {parameter_of(part, word): checked(type(part), word, value, part.name) for word, value in values.items()}
-    session.world.set(number_of(session, part), settings)
+    session.world.set(number_of(session, part), settings, over)
 
 
 def number_value(session: Session, part: Part, word: str) -> float:

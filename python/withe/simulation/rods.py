@@ -35,22 +35,8 @@ def set_rod(session: Session, part: RodPart, values: dict[str, Any], over: float
         else:
             parameters = parameters.with_value(word, value, part.section, part.owner)
     acting = {} if parameters is before else parameters.acting(before)
-    if over > 0.0:
-        _lead(session, part, natural, over)
-    else:
-        session.world.set(part.index, acting | natural)
+    session.world.set(part.index, acting | natural, over)
     session.settings.rods[part.index] = parameters
-
-
-def _lead(session: Session, part: RodPart, natural: dict[str, Any], over: float) -> None:
-    """Let natural shapes go evenly to their values."""
-    world = session.world
-    if "natural_curvature" in natural:
-        world.set_natural_curvature(part.index, np.reshape(natural["natural_curvature"], (-1, 2)), over)
-    if "natural_twist" in natural:
-        world.set_natural_twist(part.index, natural["natural_twist"], over)
-    if "natural_stretch" in natural:
-        world.set_natural_stretch(part.index, natural["natural_stretch"], over)
 
 
 def in_order(part: RodPart, values: Mapping[str, Any]) -> dict[str, Any]:
