@@ -27,7 +27,7 @@ from withe.parts.options import Bending
 from withe.parts.parameters import RodParameters
 from withe.parts.springs import describe_springs
 from withe.parts.supports import held_rows
-from withe.parts.tendons import describe_tendons
+from withe.parts.table import KINDS
 
 __all__ = ["added_mass", "describe", "describe_load", "describe_support", "drag", "parameters_of"]
 
@@ -59,7 +59,10 @@ def describe(directory: Directory, gravity: FloatArray, bending: Bending = "angl
     scene.supports = _describe_supports(directory)
     scene.loads = [describe_load(load) for load in directory.all(LoadPart)]
     scene.springs = describe_springs(directory)
-    scene.tendons = describe_tendons(directory)
+    for kind in KINDS:
+        if kind.described is not None:
+            word, describe_part = kind.described
+            setattr(scene, word, [describe_part(part) for part in directory.all(kind.part)])
     custom = directory.all(CustomForcePart)
     scene.has_custom_force = bool(custom)
     scene.custom_implicit = any(part.jacobian is not None for part in custom)

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from withe import _core
 from withe.common import validation
 from withe.common.outlines import SpringOutline, TendonOutline
 from withe.parts.handles import (
@@ -70,6 +71,10 @@ def _zigzag(part: SpringPart, row_of: RowOf) -> SpringOutline:
 
 def _line(part: TendonPart, row_of: RowOf) -> TendonOutline:
     return tendon_outline(part)
+
+
+def _describe_tendon(part: TendonPart) -> _core.TendonDescription:
+    return _core.TendonDescription(list(part.guides), part.offsets, part.tension)
 
 
 _SHARES: dict[GuidePlace, float] = {"start": 0.0, "middle": 0.5, "end": 1.0}
@@ -166,6 +171,7 @@ KINDS: tuple[PartKind, ...] = (
         (Word("tension", "N", validation.non_negative, is_linear=True, is_ramped=True),),
         numbers="tendon",
         outline=_line,
+        described=("tendons", _describe_tendon),
     ),
     PartKind(
         JoinPart,

@@ -7,7 +7,6 @@ from collections.abc import Iterable
 import numpy as np
 import numpy.typing as npt
 
-from withe import _core
 from withe.common import validation
 from withe.parts.directory import Directory
 from withe.parts.handles import EdgeHandle, Handle, NodeHandle, Rod, parse_place
@@ -15,7 +14,7 @@ from withe.parts.kinds import Guide, RodPart, TendonPart
 from withe.parts.plausibility import check_offset
 from withe.parts.table import checked, tendon_outline
 
-__all__ = ["Guides", "describe_tendons", "make_tendon"]
+__all__ = ["Guides", "make_tendon"]
 
 FloatArray = npt.NDArray[np.float64]
 Guides = Rod | str | Iterable[EdgeHandle | NodeHandle | str]
@@ -43,13 +42,6 @@ def make_tendon(
     along = len(places) > 2 and isinstance(guides, Rod | str) and not rods[places[0][0]].closed
     check_offset(part.offsets, radii, pulls_all_along=along and part.tension > 0.0, owner=f"tendon {name!r}")
     return part
-
-
-def describe_tendons(directory: Directory) -> list[_core.TendonDescription]:
-    """The tendons of a scene as the engine takes them."""
-    return [
-        _core.TendonDescription(list(part.guides), part.offsets, part.tension) for part in directory.all(TendonPart)
-    ]
 
 
 def _places(directory: Directory, guides: Guides, name: str) -> tuple[Guide, ...]:

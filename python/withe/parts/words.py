@@ -6,16 +6,20 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
 from withe.common import validation
 from withe.common.outlines import SpringOutline, TendonOutline
 from withe.parts.handles import Handle
 from withe.parts.kinds import Part, Pass
 from withe.parts.plausibility import check_angle
 
-__all__ = ["Outline", "PartKind", "RowOf", "Word", "angle"]
+__all__ = ["DirectorsOf", "Outline", "PartKind", "RowOf", "Word", "angle"]
 
 Check = Callable[[Any, str], Any]
 RowOf = Callable[[Pass], int]
+DirectorsOf = Callable[[int], npt.NDArray[np.float64]]
 Outline = SpringOutline | TendonOutline
 
 
@@ -46,6 +50,9 @@ class Word:
         True if ``set(..., over=)`` leads it evenly to its value.
     is_positive : bool
         True if it is looked for as a logarithm when a model is fitted.
+    measure : callable or None
+        Value of a word that is read out and not set, as a function of the part and of a function that returns the
+        directors of a rod, of shape (edges, 3, 3).
     """
 
     name: str
@@ -59,6 +66,7 @@ class Word:
     is_linear: bool = False
     is_ramped: bool = False
     is_positive: bool = False
+    measure: Callable[[Any, DirectorsOf], Any] | None = None
 
 
 @dataclass(frozen=True)
@@ -76,6 +84,8 @@ class PartKind:
     outline : callable or None
         What records and pictures keep of a part besides the motion of rods, by the part and a function that returns
         the row of a node.
+    described : (str, callable) or None
+        Attribute of `_core.SceneDescription` that lists the parts, and the function that describes one of them.
     """
 
     part: type[Part]
@@ -85,6 +95,7 @@ class PartKind:
     words: tuple[Word, ...] = ()
     numbers: str | None = None
     outline: Callable[[Any, RowOf], Outline] | None = None
+    described: tuple[str, Callable[[Any], Any]] | None = None
 
     def words_of(self, part: Part) -> Iterator[Word]:
         """Words that a part of this kind has."""

@@ -10,6 +10,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from withe.parts.contacts import BodyPair
 from withe.parts.kinds import (
     DragPart,
@@ -120,6 +122,9 @@ def set_words(session: Session, target: Target, values: dict[str, Any], over: fl
 
 def get_word(session: Session, target: Target, word: str) -> Any:
     """The present value of a word of a target that has it."""
+    known = word_of(target, word)
+    if known is not None and known.measure is not None:
+        return known.measure(target, lambda rod: np.array(session.world.directors(rod)).reshape(-1, 3, 3))
     return _ACCESS[type(target)].get(session, target, word)
 
 
