@@ -457,6 +457,9 @@ class Builder {
     const auto connect = [&](int a, int b) { parent[static_cast<std::size_t>(root(a))] = root(b); };
     for (std::size_t e = 0; e < model_.edge_tail.size(); ++e) connect(model_.edge_tail[e], model_.edge_head[e]);
     for (const SpringDescription& spring : scene_.springs) connect(spring.nodes[0], spring.nodes[1]);
+    for (const TorsionDescription& torsion : scene_.torsions)
+      connect(scene_.rods[static_cast<std::size_t>(torsion.rods[0])].nodes[0],
+              scene_.rods[static_cast<std::size_t>(torsion.rods[1])].nodes[0]);
     for (const TendonDescription& tendon : scene_.tendons)
       for (const TendonGuide& guide : tendon.guides)
         connect(scene_.rods[static_cast<std::size_t>(tendon.guides.front().rod)].nodes[0],
@@ -567,6 +570,22 @@ void check_tendon(const SceneDescription& scene, const TendonDescription& tendon
   }
 }
 
+void check_torsion(const SceneDescription& scene, const TorsionDescription& torsion) {
+  for (std::size_t k = 0; k < 2; ++k) {
+    const int rod = torsion.rods[k], edge = torsion.edges[k];
+    require(rod >= 0 && rod < static_cast<int>(scene.rods.size()) && edge >= 0 &&
+                edge < scene.rods[static_cast<std::size_t>(rod)].rest_lengths.size(),
+            "torsion spring on an edge that is not there");
+  }
+  require(torsion.rods[0] != torsion.rods[1] || torsion.edges[0] != torsion.edges[1],
+          "a torsion spring must act between two different edges");
+  constexpr double kRounding = 1e-12;
+  const Vector3 &n = torsion.axis, &u = torsion.reference;
+  require(
+      std::abs(n.norm() - 1.0) < kRounding && std::abs(u.norm() - 1.0) < kRounding && std::abs(n.dot(u)) < kRounding,
+      "axis and reference of a torsion spring must be normal to each other, and of unit length");
+}
+
 }  // namespace
 
 Model build_model(const SceneDescription& description, std::optional<bool> planar) {
@@ -577,6 +596,7 @@ Model build_model(const SceneDescription& description, std::optional<bool> plana
     require(spring.nodes[0] != spring.nodes[1], "a spring must act between two different nodes");
   }
   for (const TendonDescription& tendon : description.tendons) check_tendon(description, tendon);
+  for (const TorsionDescription& torsion : description.torsions) check_torsion(description, torsion);
   for (const LoadDescription& load : description.loads) check_load(description, load);
   Model model;
   model.description = description;

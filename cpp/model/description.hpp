@@ -143,6 +143,15 @@ struct SpringDescription {
   double damping = 0;          ///< c [N s/m]
 };
 
+/// A torsion spring between two edges; see forces/torsion_spring.hpp.
+struct TorsionDescription {
+  std::array<int, 2> rods{}, edges{};    ///< rod of each of the two edges, and index of the edge in its rod
+  Vector3 axis = Vector3::UnitZ();       ///< unit vector, as drawn
+  Vector3 reference = Vector3::UnitX();  ///< unit vector normal to the axis: u and w as drawn
+  double stiffness = 0;                  ///< k [N m/rad]
+  double rest_angle = 0;                 ///< phi0 [rad]
+};
+
 /// Place of a tendon's guide along an edge. At the start or the end of a rod that is rigid with a joint or a clamp
 /// there, it sits on that.
 enum class GuidePlace { start, middle, end };
@@ -283,6 +292,7 @@ struct SceneDescription {
   std::vector<LoadDescription> loads;
   std::vector<SpringDescription> springs;
   std::vector<TendonDescription> tendons;
+  std::vector<TorsionDescription> torsions;
   bool has_custom_force = false;  ///< nodal forces come from a callback
   bool custom_implicit = false;   ///< true if custom forces have derivatives, and are part of the residual
   bool custom_moments = false;    ///< and moments on nodes
@@ -296,7 +306,8 @@ struct PartNumbers {
   VectorX spring_stiffness, spring_rest_length, spring_damping;  ///< per spring [N/m], [m], [N s/m]
   /// Per revolute joint [N m/rad], [rad], [N m s/rad], [N m].
   VectorX joint_stiffness, joint_rest_angle, joint_damping, joint_moment;
-  VectorX tendon_tension;  ///< per tendon [N]
+  VectorX tendon_tension;                         ///< per tendon [N]
+  VectorX torsion_stiffness, torsion_rest_angle;  ///< per torsion spring [N m/rad], [rad]
 };
 
 /// First row of a load among the rows of all loads.

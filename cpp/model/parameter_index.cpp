@@ -112,6 +112,12 @@ constexpr ParameterInfo kIndex[]{
                                                                                     Extent::joint, "N m", Range::any),
     number_of_parts<&PartNumbers::tendon_tension, drawn<&SceneDescription::tendons, &TendonDescription::tension>>(
         tendon_tension, "tendon_tension", Extent::tendon, "N", Range::non_negative),
+    number_of_parts<&PartNumbers::torsion_stiffness,
+                    drawn<&SceneDescription::torsions, &TorsionDescription::stiffness>>(
+        torsion_stiffness, "torsion_stiffness", Extent::torsion, "N m/rad", Range::non_negative),
+    number_of_parts<&PartNumbers::torsion_rest_angle,
+                    drawn<&SceneDescription::torsions, &TorsionDescription::rest_angle>>(
+        torsion_rest_angle, "torsion_rest_angle", Extent::torsion, "rad", Range::any),
     {friction, "friction", Extent::scene, 1, "-", Range::non_negative, Derived::nothing,
      surface<&SurfaceParameters::friction>},
     {slip_tolerance, "slip_tolerance", Extent::scene, 1, "m/s", Range::positive, Derived::nothing,
@@ -203,6 +209,8 @@ int owners_of(const Model& model, const ParameterInfo& info) {
       return static_cast<int>(model.joint_angles.size());
     case Extent::tendon:
       return static_cast<int>(scene.tendons.size());
+    case Extent::torsion:
+      return static_cast<int>(scene.torsions.size());
     case Extent::obstacle:
       return static_cast<int>(scene.contact.obstacles.size());
     case Extent::pair:

@@ -32,6 +32,8 @@ enum class ParameterKind {
   joint_damping,
   joint_moment,
   tendon_tension,
+  torsion_stiffness,
+  torsion_rest_angle,
   friction,
   slip_tolerance,
   restitution,
@@ -46,8 +48,8 @@ enum class ParameterKind {
 
 /// Extent of a parameter: the objects that have one row of numbers each. `load` stands for every load or each of its
 /// edges, and `pair` for every pair of bodies with values of its own. Edges and stencils are those of a rod. A spring,
-/// a revolute joint and a tendon own one number each.
-enum class Extent { scene, node, edge, stencil, spring, joint, tendon, load, obstacle, pair };
+/// a revolute joint, a tendon and a torsion spring own one number each.
+enum class Extent { scene, node, edge, stencil, spring, joint, tendon, torsion, load, obstacle, pair };
 
 enum class Range { any, non_negative, positive, share };  ///< share: from 0 to 1
 

@@ -58,11 +58,14 @@ bool fits(const ObstacleDescription& o, const Vector3& corner, const Vector3& no
   return axis.cross(normal).norm() <= size && start * end < 0.0;
 }
 
-/// Plane across a line, for a straight scene whose revolute joints turn about an axis across it.
+/// Plane across a line, for a straight scene whose revolute joints or torsion springs turn about an axis across it.
 std::optional<Vector3> turning_across(const SceneDescription& scene, const Vector3& line) {
+  std::vector<Vector3> axes;
   for (const JointDescription& joint : scene.joints)
-    for (const RevoluteLink& link : joint.links)
-      if (const Vector3 across = link.axis.cross(line); across.norm() > 0.5) return across.normalized();
+    for (const RevoluteLink& link : joint.links) axes.push_back(link.axis);
+  for (const TorsionDescription& torsion : scene.torsions) axes.push_back(torsion.axis);
+  for (const Vector3& axis : axes)
+    if (const Vector3 across = axis.cross(line); across.norm() > 0.5) return across.normalized();
   return std::nullopt;
 }
 
@@ -74,7 +77,8 @@ std::optional<Vector3> normal_of(const SceneDescription& scene, bool asked, std:
   spread /= static_cast<double>(std::max<std::size_t>(directions.size(), 1));
   Eigen::JacobiSVD<Matrix3> svd(spread, Eigen::ComputeFullU);
   if (svd.singularValues()(1) < 1e-20 && asked) {
-    // A straight scene lies in many planes: the plane of its joints' rotation is chosen, or that of the first director.
+    // A straight scene lies in many planes: the plane in which joints or torsion springs turn is chosen, or that of the
+    // first director.
     directions.push_back(turning_across(scene, directions.front()).value_or(scene.rods.front().directors.row(0)));
     spread += directions.back() * directions.back().transpose();
     svd.compute(spread, Eigen::ComputeFullU);
@@ -175,6 +179,8 @@ std::string why_off_plane(const SceneDescription& scene, const Vector3& normal) 
         return "the axis of a revolute joint lies at an angle to the plane";
       else if (turns_out(link, normal))
         return "a revolute joint is driven out of the plane";
+  for (const TorsionDescription& torsion : scene.torsions)
+    if (across(torsion.axis)) return "the axis of a torsion spring lies at an angle to the plane";
   for (const LoadDescription& load : scene.loads)
     for (const auto& value : load.values.rowwise())
       if (!load.added && is_axial(load.kind) && across(value.transpose()))

@@ -41,7 +41,7 @@ double apply_ramps(const Model& model, const Ramps& ramps, double time, const Ve
   apply_ramps(model, ramps, time, parameters);
   const double work = natural_change_energy(model, before.elastic, parameters, c);
   if (ramps.numbers.empty()) return work;
-  return work + (stored_energy(model, parameters, q) - stored_energy(model, before.numbers, q));
+  return work + (stored_energy(model, parameters, q, c) - stored_energy(model, before.numbers, q, c));
 }
 
 ObstacleWay obstacle_way(const Model& model, const State& state, int obstacle) {

@@ -49,7 +49,7 @@ Energy mechanical_energy(const Model& model, const EnergyCoefficients& k, const 
   e.bend = turned.bend;
   e.twist = turned.twist;
   e.gravity = gravity_energy(model, k, state.q, [](int) { return 1.0; });
-  e.spring = stored_energy(model, k.numbers, state.q) + hand_energy(model, k.elastic.measure, state, c);
+  e.spring = stored_energy(model, k.numbers, state.q, c) + hand_energy(model, k.elastic.measure, state, c);
   return e;
 }
 
@@ -91,7 +91,7 @@ double elastic_energy(const Model& model, const Parameters& parameters, const St
   now.set(model, parameters);
   const BendTwistEnergy turned = bend_twist_energy(model, now.elastic, c);
   return stretch_energy(model, now.elastic, c) + turned.bend + turned.twist +
-         stored_energy(model, now.numbers, state.q);
+         stored_energy(model, now.numbers, state.q, c);
 }
 
 Energy energy_of(const Model& model, const Parameters& parameters, const Contact* contact, const State& state,
@@ -187,7 +187,7 @@ void find_component_energies(const Model& model, const Parameters& parameters, c
     add(model.bend[b].edge[0], bend_energy_of(k.elastic, c, static_cast<int>(b)));
   for (std::size_t h = 0; h < model.half.size(); ++h)
     add(model.half[h].edge, half_energy_of(k.elastic, c, static_cast<int>(h)));
-  for_each_stored(model, k.numbers, state.q,
+  for_each_stored(model, k.numbers, state.q, c,
                   [&](int node, double stored) { out.elastic[model.component_of_node(node)] += stored; });
   // In a frame that goes with the nodes that supports hold, else with the centre of mass.
   MatrixX3& frame = out.frame;

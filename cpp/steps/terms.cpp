@@ -10,6 +10,7 @@
 #include "steps/load_forces.hpp"
 #include "steps/spring_forces.hpp"
 #include "steps/tendon_forces.hpp"
+#include "steps/torsion_forces.hpp"
 
 namespace withe {
 
@@ -29,6 +30,7 @@ Terms make_terms(const Model& model, const Loads& loads, StepRule rule, bool exa
   if (!scene.springs.empty()) add(std::make_unique<SpringForces>(model));
   if (!model.joint_angles.empty()) add(std::make_unique<JointForces>(model));
   if (!scene.tendons.empty()) add(std::make_unique<TendonForces>(model));
+  if (!scene.torsions.empty()) add(std::make_unique<TorsionForces>(model));
   if (std::any_of(model.supports.begin(), model.supports.end(),
                   [](const Support& s) { return s.active && s.yields(); }))
     terms.hands = add(std::make_unique<HandForces>(model));
@@ -43,17 +45,22 @@ Terms make_terms(const Model& model, const Loads& loads, StepRule rule, bool exa
   return terms;
 }
 
-void for_each_stored(const Model& model, const PartNumbers& numbers, const VectorX& q,
+void for_each_stored(const Model& model, const PartNumbers& numbers, const VectorX& q, const Configuration& c,
                      const std::function<void(int, double)>& add) {
   for (std::size_t s = 0; s < model.description.springs.size(); ++s)
     add(model.description.springs[s].nodes[0], spring_energy(model, numbers, q, static_cast<int>(s)));
   for (std::size_t j = 0; j < model.joint_angles.size(); ++j)
     add(model.joint_angles[j].node, joint_energy(model, numbers, q, static_cast<int>(j)));
+  for (std::size_t s = 0; s < model.description.torsions.size(); ++s) {
+    const TorsionDescription& d = model.description.torsions[s];
+    add(model.edge_tail[at(model.rod_first_edge[at(d.rods[0])] + d.edges[0])],
+        torsion_energy(model, numbers, c, static_cast<int>(s)));
+  }
 }
 
-double stored_energy(const Model& model, const PartNumbers& numbers, const VectorX& q) {
+double stored_energy(const Model& model, const PartNumbers& numbers, const VectorX& q, const Configuration& c) {
   double energy = 0.0;
-  for_each_stored(model, numbers, q, [&](int, double stored) { energy += stored; });
+  for_each_stored(model, numbers, q, c, [&](int, double stored) { energy += stored; });
   return energy;
 }
 

@@ -26,11 +26,12 @@ struct Terms {
 /// `rule`: in statics there is no fluid. `exact`: the Jacobian has every derivative.
 Terms make_terms(const Model& model, const Loads& loads, StepRule rule, bool exact);
 
-/// Call add(node, energy [J]) with the energy that each spring and revolute joint stores at q, and a node of its.
-void for_each_stored(const Model& model, const PartNumbers& numbers, const VectorX& q,
+/// Call add(node, energy [J]) for each spring, revolute joint and torsion spring, with the energy that it stores at q
+/// and a node that it acts on. `c` is the configuration at q.
+void for_each_stored(const Model& model, const PartNumbers& numbers, const VectorX& q, const Configuration& c,
                      const std::function<void(int, double)>& add);
-/// Energy that all springs and revolute joints store at q [J].
-double stored_energy(const Model& model, const PartNumbers& numbers, const VectorX& q);
+/// Energy that all springs, revolute joints and torsion springs store at q [J].
+double stored_energy(const Model& model, const PartNumbers& numbers, const VectorX& q, const Configuration& c);
 
 /// Causes that make the Jacobian unsymmetric, in words.
 std::vector<std::string> asymmetries_of(const Model& model, const Loads& loads, const Terms& terms, StepRule rule,

@@ -161,6 +161,10 @@ std::uint64_t fingerprint(const SceneDescription& scene) {
     for (const auto& [rod, edge, place] : tendon.guides) w(rod), w(edge), w(static_cast<int>(place));
     w(tendon.offsets);
   }
+  for (const TorsionDescription& torsion : scene.torsions) {
+    for (std::size_t k = 0; k < 2; ++k) w(torsion.rods[k]), w(torsion.edges[k]);
+    w(torsion.axis), w(torsion.reference);
+  }
   w(static_cast<int>(scene.fluid.model));
   w(scene.fluid.regularization);
   w(scene.fluid.wavelength);

@@ -190,6 +190,16 @@ void register_tendons(py::module_& module) {
            py::arg("guides"), py::arg("offsets"), py::arg("tension"));
 }
 
+void register_torsions(py::module_& module) {
+  py::class_<TorsionDescription>(module, "TorsionDescription", "A torsion spring between two edges.")
+      .def(py::init([](const std::array<int, 2>& rods, const std::array<int, 2>& edges, const Vector3& axis,
+                       const Vector3& reference, double stiffness, double rest_angle) {
+             return TorsionDescription{rods, edges, axis, reference, stiffness, rest_angle};
+           }),
+           py::arg("rods"), py::arg("edges"), py::arg("axis"), py::arg("reference"), py::arg("stiffness"),
+           py::arg("rest_angle"));
+}
+
 }  // namespace
 
 void register_model(py::module_& module) {
@@ -198,6 +208,7 @@ void register_model(py::module_& module) {
   register_loads(module);
   register_springs(module);
   register_tendons(module);
+  register_torsions(module);
   register_contact(module);
   register_fluid(module);
   py::class_<SceneDescription> scene(module, "SceneDescription", "What the scene layer hands to the engine.");
@@ -212,6 +223,7 @@ void register_model(py::module_& module) {
       .def_readwrite("loads", &SceneDescription::loads)
       .def_readwrite("springs", &SceneDescription::springs)
       .def_readwrite("tendons", &SceneDescription::tendons)
+      .def_readwrite("torsions", &SceneDescription::torsions)
       .def_readwrite("has_custom_force", &SceneDescription::has_custom_force)
       .def_readwrite("custom_implicit", &SceneDescription::custom_implicit)
       .def_readwrite("custom_moments", &SceneDescription::custom_moments)

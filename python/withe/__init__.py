@@ -44,6 +44,7 @@ from withe.parts.handles import (
 )
 from withe.parts.materials import Circle, Material, Rectangle, Stiffness, Tube
 from withe.parts.options import Solver
+from withe.parts.torsion_springs import TorsionSpring
 from withe.recording.record import Record
 from withe.scene.scene import Scene
 from withe.simulation.linearisation import Linearisation
@@ -96,6 +97,7 @@ __all__ = [
     "Stiffness",
     "Support",
     "Tendon",
+    "TorsionSpring",
     "Tube",
     "__version__",
     "deployment",

@@ -53,6 +53,7 @@ __all__: list[str] = [
     "SupportDescription",
     "Tape",
     "TendonDescription",
+    "TorsionDescription",
     "Warnings",
     "World",
     "check_turns",
@@ -322,6 +323,20 @@ class TendonDescription:
         tension: typing.SupportsFloat | typing.SupportsIndex,
     ) -> None: ...
 
+class TorsionDescription:
+    """
+    A torsion spring between two edges.
+    """
+    def __init__(
+        self,
+        rods: typing.Annotated[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(2)"],
+        edges: typing.Annotated[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(2)"],
+        axis: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
+        reference: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
+        stiffness: typing.SupportsFloat | typing.SupportsIndex,
+        rest_angle: typing.SupportsFloat | typing.SupportsIndex,
+    ) -> None: ...
+
 class ObstacleDescription:
     """
     Something solid that does not move.
@@ -497,6 +512,10 @@ class SceneDescription:
     def tendons(self) -> list[TendonDescription]: ...
     @tendons.setter
     def tendons(self, arg0: collections.abc.Sequence[TendonDescription]) -> None: ...
+    @property
+    def torsions(self) -> list[TorsionDescription]: ...
+    @torsions.setter
+    def torsions(self, arg0: collections.abc.Sequence[TorsionDescription]) -> None: ...
 
 class Options:
     """
@@ -630,6 +649,10 @@ class ParameterGradient:
     def stretch_stiffness(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
     @property
     def tendon_tension(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    @property
+    def torsion_rest_angle(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    @property
+    def torsion_stiffness(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
     @property
     def twist_stiffness(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
     @property

@@ -217,6 +217,35 @@ TEST(Equations, MatrixIsExactWithTendonsAlongRodsAndStraightAcross) {
     }
 }
 
+/// Between the ends of every rod, and from the first rod's first edge to the last's last.
+void add_torsions(Model& model) {
+  SceneDescription& scene = model.description;
+  testing::RandomNumbers random(23);
+  const auto last_edge = [&](int rod) {
+    return static_cast<int>(scene.rods[static_cast<std::size_t>(rod)].rest_lengths.size()) - 1;
+  };
+  const auto add = [&](int rod, int edge, int other, int other_edge) {
+    if (rod == other && edge == other_edge) return;
+    const Vector3 axis = model.planar() ? model.plane->normal : Vector3(random.vector(3).normalized());
+    const auto index = static_cast<std::size_t>(model.rod_first_edge[static_cast<std::size_t>(other)] + other_edge);
+    const Vector3 along = model.planar() ? to_eigen(model.initial_tangent[index]) : Vector3(random.vector(3));
+    const Vector3 reference = (along - along.dot(axis) * axis).normalized();
+    scene.torsions.push_back({{rod, other}, {edge, other_edge}, axis, reference, 6.0, 0.4});
+  };
+  const int end = static_cast<int>(scene.rods.size()) - 1;
+  for (int r = 0; r <= end; ++r) add(r, 0, r, last_edge(r));
+  add(0, 0, end, last_edge(end));
+}
+
+TEST(Equations, MatrixIsExactWithTorsionSprings) {
+  for (Scheme scheme : kSchemes)
+    for (Case c : moving_cases({})) {
+      add_torsions(c.model);
+      expect_matrix_is_exact(c, scheme, 0.3);
+      expect_matrix_is_exact(c, scheme, 0.3, true);
+    }
+}
+
 void expect_exact_under_loads(bool planar) {
   for (Scheme scheme : kSchemes) {
     SceneBuilder builder;

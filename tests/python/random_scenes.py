@@ -134,6 +134,10 @@ def add_supports_and_loads(scene, r, flat, a, b, varying, clamped):
     if r.random() < 0.3:
         guides = r.choice([a, b, [a.start, a.edge(0), b.edge(-1), b.end]])
         scene.add_tendon(guides, offset=(2e-3, 0.0 if flat else 1e-3), tension=r.uniform(0.0, 0.2), name="tendon")
+    if r.random() < 0.3:
+        axis = (0, 1, 0) if flat else r.choice([(0, 1, 0), (0.3, 1, -0.2)])
+        angle = r.uniform(-0.5, 0.5)
+        scene.add_torsion_spring(a.edge(-1), b.edge(0), stiffness=0.01, rest_angle=angle, axis=axis, name="torsion")
     if varying and r.random() < 0.15:
         scene.add_custom_force(Wind())
     if varying and r.random() < 0.15:

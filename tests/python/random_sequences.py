@@ -82,10 +82,11 @@ def set_part(simulation, r):
     part, word, value = r.choice(
         [("mass", "mass", r.uniform(0, 0.01)), ("drag", "drag", r.uniform(0, 0.2)), ("force", "force", vector(r, 0.01)),
          ("fluid", "viscosity", r.uniform(0.1, 1)), ("force", "force", Wave(vector(r, 0.01), 40.0)),
-         ("tendon", "tension", r.uniform(0, 0.3)),
+         ("tendon", "tension", r.uniform(0, 0.3)), ("torsion", "stiffness", r.uniform(0, 0.02)),
+         ("torsion", "rest_angle", number(r, 1.0)),
          ("joint", r.choice(["stiffness", "damping", "rest_angle", "moment"]), r.uniform(0, 0.01))]
     )  # fmt: skip
-    over = r.choice([0.0, 0.0, 0.02]) if part in ("tendon", "joint") else 0.0
+    over = r.choice([0.0, 0.0, 0.02]) if part in ("tendon", "torsion", "joint") else 0.0
     simulation.set(part, over=over, **{word: value})
 
 

@@ -8,8 +8,9 @@ Most kinds have one number a part in the engine, `f"{numbers}_{word}"` of cpp/mo
 all that these need. What else a kind does when its words are set, read or differentiated is one row of
 `withe.simulation.access`.
 
-A new kind needs its part (a class that derives from `kinds.Part`), its row in `KINDS`, and the method of `Scene` that
-adds it. In the engine it needs its rows of the parameter index and a term (cpp/steps/terms.cpp).
+A new kind needs one module like `withe.parts.torsion_springs` (its part, handle, row and description), its row in
+`KINDS`, and the method of `Scene` that adds it. In the engine it needs its rows of the parameter index and a term
+(cpp/steps/terms.cpp).
 """
 
 from __future__ import annotations
@@ -52,6 +53,7 @@ from withe.parts.kinds import (
     TendonPart,
 )
 from withe.parts.parameters import NATURAL_WORDS, ROD_WORDS
+from withe.parts.torsion_springs import TORSION_SPRING
 from withe.parts.words import PartKind, RowOf, Word, angle
 
 __all__ = [
@@ -194,6 +196,7 @@ KINDS: tuple[PartKind, ...] = (
         ),
         numbers="joint",
     ),
+    TORSION_SPRING,
     PartKind(DragPart, Drag, "drag", "drags", (Word("drag", "Pa s", validation.non_negative),)),
     PartKind(
         FluidPart,

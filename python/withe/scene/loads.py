@@ -12,10 +12,11 @@ from withe.common import validation
 from withe.common.keywords import keyword_hints
 from withe.parts.directory import Directory
 from withe.parts.fluid import make_fluid
-from withe.parts.handles import CustomForce, Drag, Fluid, Mass, NodeHandle, Rod, Spring, Tendon
-from withe.parts.kinds import CustomForcePart, DragPart, FluidModel, MassPart
+from withe.parts.handles import CustomForce, Drag, EdgeHandle, Fluid, Mass, NodeHandle, Rod, Spring, Tendon
+from withe.parts.kinds import CustomForcePart, DragPart, FluidModel, MassPart, RodPart
 from withe.parts.springs import make_spring
 from withe.parts.tendons import Guides, make_tendon
+from withe.parts.torsion_springs import TorsionSpring, make_torsion_spring
 
 __all__ = ["Loads"]
 
@@ -88,6 +89,76 @@ class Loads:
         return cast(
             Spring, self._directory.add(make_spring(self._directory, a, b, stiffness, rest_length, damping, name))
         )
+
+    def add_torsion_spring(
+        self,
+        a: EdgeHandle | str,
+        b: EdgeHandle | str,
+        *,
+        stiffness: float,
+        rest_angle: float = 0.0,
+        axis: npt.ArrayLike | None = None,
+        name: str | None = None,
+    ) -> TorsionSpring:
+        """Add a torsion spring without mass between two edges, of one rod or of two.
+
+        The angle phi is the rotation of edge b against edge a since both were drawn, about an axis that edge a carries.
+        The spring stores the energy stiffness (phi - rest_angle)^2 / 2, part of `energy().spring`, and applies opposite
+        moments to both edges. It does not constrain their positions or rotations about other axes.
+
+        Parameters
+        ----------
+        a, b : EdgeHandle or str
+        stiffness : float [N m/rad]
+        rest_angle : float [rad]
+            Angle at which the spring is free of stress. The angle as drawn is 0.
+        axis : array_like of shape (3,), optional
+            Axis as drawn, in the axes of the scene; phi is positive by the right-hand rule. By default, the cross
+            product of the tangents of a and b.
+        name : str
+
+        Returns
+        -------
+        TorsionSpring
+            `Simulation.set` changes stiffness and rest_angle; ``simulation.get(spring, "angle")`` returns phi [rad].
+
+        Raises
+        ------
+        ValueError
+            If `a` and `b` are the same edge, if both lie along one line and `axis` is not given, or if a number is out
+            of range.
+
+        Notes
+        -----
+        Edge a carries the axis, a unit vector u normal to the axis, and v = axis x u. Edge b carries a unit vector w.
+        As drawn, w = u. Then phi = atan2(w . v, w . u), the angle of w in the plane normal to the axis. Where the edges
+        rotate about the axis alone, phi is the angle of a revolute joint. The deviation phi - rest_angle is taken from
+        -pi to pi, so the spring does not count full turns. phi is not defined where w is parallel to the axis. A planar
+        simulation needs an axis normal to its plane. An angle is that of the middle of an edge, so results of flexible
+        rods converge at first order in the length of the two edges.
+
+        The force is exact in the sense of the energy-momentum method: its work over a step is the change of the stored
+        energy [1]_.
+
+        References
+        ----------
+        .. [1] O. Gonzalez, "Time integration and discrete Hamiltonian systems", J. Nonlinear Sci. 6, 449-467 (1996).
+
+        Examples
+        --------
+        >>> stiff = withe.Stiffness(stretch=100.0, bend=1e-3, twist=1e-3)
+        >>> lid = scene.add_rod(points=[(0, 0, 0.1), (0.1, 0, 0.1)], radius=0.01, stiffness=stiff, line_density=1)
+        >>> scene.add_torsion_spring(arm.edge(0), lid.edge(0), axis=(0, 1, 0), stiffness=0.1, name="hinge")
+        TorsionSpring(name='hinge')
+        """
+        directory, rods = self._directory, self._directory.all(RodPart)
+        name = directory.new_name(name, "torsion spring")
+        (rod, edge), (other, other_edge) = (
+            directory.edge(each, f"{which} edge of torsion spring {name!r}")
+            for each, which in ((a, "first"), (b, "second"))
+        )
+        part = make_torsion_spring(name, (rods[rod], edge), (rods[other], other_edge), axis, stiffness, rest_angle)
+        return cast(TorsionSpring, directory.add(part))
 
     def add_tendon(
         self,

@@ -40,7 +40,7 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
 
     Methods and properties by purpose:
 
-    * describe: `add_rod`, `join`, `add_mass`, `add_spring`, `add_tendon`, `gravity`
+    * describe: `add_rod`, `join`, `add_mass`, `add_spring`, `add_torsion_spring`, `add_tendon`, `gravity`
     * hold: `clamp`, `pin`, `grasp`
     * load: `add_force`, `add_moment`, `add_load`, `add_pressure`, `add_drag`, `add_fluid`, `add_custom_force`
     * touch: `enable_contact`, `add_floor`, `add_plane`, `add_sphere`, `add_capsule`, `set_friction`,

@@ -83,8 +83,8 @@ class Control:
         target : handle or str
             Part to change. None for the scene; a pair such as ``(arm, floor)`` for the contact of two bodies.
         over : float [s]
-            Duration of a linear ramp to the values, of natural shapes, of parameters of springs, tendons and revolute
-            joints, and of poses of supports. By default the change is immediate.
+            Duration of a linear ramp to the values, of natural shapes, of parameters of springs, torsion springs,
+            tendons and revolute joints, and of poses of supports. By default the change is immediate.
         **values
             Parameters of the target:
 
@@ -99,6 +99,7 @@ class Control:
             * mass: mass
             * spring: stiffness, rest_length, damping
             * tendon: tension
+            * torsion spring: stiffness, rest_angle
             * revolute joint: stiffness, rest_angle, damping, moment; see `Scene.join`
             * drag: drag
             * fluid: viscosity, and the regularization [m] of Stokeslets

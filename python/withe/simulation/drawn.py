@@ -11,6 +11,7 @@ import numpy.typing as npt
 from withe import _core
 from withe.parts.kinds import FluidPart, RodPart, SpringPart
 from withe.parts.rods import redrawn
+from withe.parts.torsion_springs import TorsionPart
 from withe.simulation.numbers import number_value
 from withe.simulation.session import Session
 
@@ -90,6 +91,11 @@ class DrawnNodes:
 
     def __init__(self, session: Session, part: RodPart, begin: Moment, *, run: bool = False) -> None:
         """`begin` is the state of the equilibrium, or the state at the start of the run."""
+        if session.directory.all(TorsionPart):
+            raise ValueError(
+                f"gradients by points of {part.owner} are not available in a scene with torsion springs, whose angles "
+                "depend on the drawn edges"
+            )
         rows = session.directory.layout.rows
         self._session, self._part, self._rows = session, part, rows(part.index)
         self._shapes = []
