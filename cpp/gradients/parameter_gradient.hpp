@@ -20,13 +20,14 @@ struct ParameterGradient : PartNumbers {
   VectorX obstacle_rolling;
   MatrixX6 hand_stiffness;  ///< per support, see `HandDescription`
   VectorX hand_limit;
-  /// Per edge, of rods outside of fluids that are no chords of arcs: by its rest length, and so by lengths of stencils,
-  /// masses, drag and loads along it, at fixed natural curvature and twist [1/m].
+  /// Derivative by the rest length of each edge, at fixed natural curvature and twist [1/m]. The rest length changes
+  /// lengths of stencils, masses, drag and loads along the edge. Only for rods outside of fluids, and not for chords of
+  /// arcs.
   VectorX rest_length;
-  /// Per edge, by how its frame is turned in the drawing, a rotation vector: by what joints and clamps attach, strains
-  /// that a drawing has where rods meet, and loads that follow, at the same natural shape [1/rad].
+  /// Derivative by the turn of the frame of each edge in the drawing, a rotation vector, at the same natural shape [1/rad].
+  /// The frame changes the attachment of joints and clamps, the drawn strains where rods meet, and follower loads.
   MatrixX3 edge_turn;
-  /// By the natural shapes that were drawn, as far as what was drawn where rods meet is counted from them.
+  /// Derivatives by the drawn natural shapes, as far as drawn strains where rods meet are measured from them.
   std::vector<MatrixX2> drawn_curvature;
   std::vector<VectorX> drawn_twist;
 };

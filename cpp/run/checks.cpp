@@ -73,7 +73,8 @@ void check_shares(const Model& model, const ContactPairDescription& pair) {
   require((pair.first < 0) != (pair.second < 0), "friction varies between a rod and an obstacle only");
   const auto& rod = model.description.rods[at(std::max(pair.first, pair.second))];
   const auto size = static_cast<Eigen::Index>(rod.nodes.size()) + rod.rest_lengths.size();
-  require(pair.shares.size() == size, "friction of rod '" + rod.name + "' needs one number per node and per edge, ", size);
+  require(pair.shares.size() == size, "friction of rod '" + rod.name + "' needs one number per node and per edge, ",
+          size);
   require(pair.shares.allFinite() && pair.shares.minCoeff() >= 0.0, "friction must be finite and not negative");
 }
 

@@ -131,7 +131,7 @@ def body_of(directory: Directory, part: RodPart | ObstaclePart) -> int:
 
 
 def describe_contact(directory: Directory) -> _core.ContactDescription:
-    """What touches, for the engine.
+    """Return the description of contact for the engine.
 
     Raises
     ------

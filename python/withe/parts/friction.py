@@ -179,5 +179,5 @@ def own_friction(pair: _core.ContactPairDescription | None) -> Directions | None
 def pair_between(
     pairs: Iterable[_core.ContactPairDescription], bodies: Collection[int]
 ) -> _core.ContactPairDescription | None:
-    """What two bodies have of their own, if anything."""
+    """Return the coefficients that two bodies have of their own, if any."""
     return next((own for own in pairs if {own.first, own.second} == set(bodies)), None)

@@ -160,27 +160,27 @@ class RodParameters:
         return replace(self, **values)
 
     def acting(self, before: RodParameters) -> dict[str, FloatArray]:
-        """What the engine works with that is not what `before` has, by its names there."""
+        """Return the parameters of the engine that differ from those of `before`, by their names in the engine."""
         return {word: mine for word in ACTING_WORDS if (mine := getattr(self, word)) is not getattr(before, word)}
 
     def get(self, word: str) -> Any:
-        """The present value of a word: a copy."""
+        """Return a copy of the present value of a word."""
         value = getattr(self, word)
         return value.copy() if isinstance(value, np.ndarray) else value
 
     def arrays(self) -> dict[str, FloatArray]:
-        """Everything as arrays, for a file."""
+        """Return all values as arrays, for a file."""
         values = {field.name: getattr(self, field.name) for field in fields(self)}
         return {name: np.asarray(value, np.float64) for name, value in values.items() if value is not None}
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, FloatArray], edges: int, owner: str) -> RodParameters:
-        """What `arrays` gave.
+        """Return the parameters that `arrays` wrote.
 
         Raises
         ------
         ValueError
-            Something is missing, not finite or of another shape.
+            A value is missing, not finite or of another shape.
         """
         values: dict[str, Any] = {}
         for word in (*MATERIAL_WORDS, *(field.name for field in fields(cls)[4:])):
