@@ -87,7 +87,7 @@ def test_reset_undoes_everything():
     assert simulation.get(arm, "youngs_modulus") == 1e6
     assert simulation.get("lump", "mass") == 0.001
     assert np.array_equal(simulation.get("gravity"), (0, 0, -9.81))
-    with pytest.raises(ValueError, match="not in the scene"):
+    with pytest.raises(ValueError, match="no longer in the scene"):
         simulation.reaction(grip)
     simulation.step(5)
     fresh.step(5)

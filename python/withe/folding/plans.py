@@ -330,9 +330,8 @@ class FoldPlan(PlanFile):
             "frames": {
                 "world": "origin where the middle of the lifted edge lay in the flat sheet; x along the sheet to its "
                 "far edge, y across, z up; table at z = 0",
-                "pose": "pose of the sheet's outer edge. The x axis of its frame points into the sheet along the part "
-                "that the jaw holds. The z axis points away from the side that lay on the table. The frame is the "
-                "world's frame while the sheet is flat.",
+                "pose": "of the sheet's outer edge; x of its frame points into the sheet along the part that the jaw "
+                "holds, z away from the side that lay on the table; the world's frame while the sheet is flat",
             },
             "units": {"length": "m", "time": "s", "angle": "rad", "quaternion": "x, y, z, w", "curvature": "1/m"},
             "paper": dict(vars(self.paper)),

@@ -77,7 +77,7 @@ def find_support(session: Session, support: Handle | str) -> tuple[int, SupportP
         if part.name in session.settings.supports:
             return session.settings.supports[part.name]
     name = support if isinstance(support, str) else support.name
-    raise ValueError(f"support {name!r} was released and is no longer in the scene")
+    raise ValueError(f"support {name!r} is released and no longer in the scene")
 
 
 def move_support(
