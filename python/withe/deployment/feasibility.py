@@ -79,7 +79,7 @@ class Feasibility:
     lift_off : ndarray of shape (nodes,)
         Need while the place is the lift-off point: tangential over normal force of the floor. The tangential force
         carries the suspended part and the jump to the shear EI kappa' of the lying part. For a constant curvature the
-        ratio is |Fy| / Fz. Up to 3 Lgb of the cable behind the lift-off point help to carry a push along the cable.
+        ratio is ``|Fy| / Fz``. Up to 3 Lgb of the cable behind the lift-off point help to carry a push along the cable.
     free_end : ndarray of shape (nodes,)
         Need of the part between the place and the free end. Friction times weight must turn and shear this part. With s
         the distance from the free end, this takes 2 EI kappa / (w s^2) and EI kappa' / (w s). A pattern that begins

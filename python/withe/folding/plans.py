@@ -167,9 +167,9 @@ class FoldPlan(PlanFile):
     def slip_ratio(self) -> FloatArray:
         """Friction coefficient below which the sheet slides at a pose, of shape (n,).
 
-        It is the tangential force over the normal force below the lying part, |H| / (R + weight of the lying part). For
-        a method that does not prevent slides ("intuitive") it is that of the predicted motion, which is at most the
-        friction. NaN from the pose on at which the predicted motion has no equilibrium within reach.
+        It is the tangential force over the normal force below the lying part, ``|H| / (R + W)``, with the weight W of
+        that part. For a method that does not prevent slides ("intuitive") it is that of the predicted motion, which is
+        at most the friction. NaN from the pose on at which the predicted motion has no equilibrium within reach.
         """
         sheet = self.sheet
         lying = self._width.lying(sheet.suspended, self._length)

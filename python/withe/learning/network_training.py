@@ -106,7 +106,7 @@ def train_network(
     activation : {"relu", "silu", "tanh"}
         Activation function. "silu" and "tanh" make the network smooth.
     loss : {"squared", "absolute"}
-        Mean of weights * error^2, or of weights * |error|, with the errors of scaled outputs.
+        Mean of ``weights * error**2``, or of ``weights * abs(error)``, with the errors of scaled outputs.
     weights : array_like that broadcasts to the shape of y
         Weight of each number; not negative.
     scale_outputs : bool

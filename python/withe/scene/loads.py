@@ -138,11 +138,7 @@ class Loads:
         rods converge at first order in the length of the two edges.
 
         The force is exact in the sense of the energy-momentum method: its work over a step is the change of the stored
-        energy [1]_.
-
-        References
-        ----------
-        .. [1] O. Gonzalez, "Time integration and discrete Hamiltonian systems", J. Nonlinear Sci. 6, 449-467 (1996).
+        energy [Gonzalez 1996, J. Nonlinear Sci. 6].
 
         Examples
         --------

@@ -92,9 +92,9 @@ class Linearisation:
 
         For a scene that is solved in a plane, these are the frequencies of motions in the plane;
         ``build(planar=False)`` gives all. A negative frequency f means divergence: the mode grows with
-        exp(2 pi |f| t). Complex pairs of f and its conjugate mean flutter: the modes oscillate at the real part, and
-        grow with exp(2 pi |imaginary part| t). The order is by the real part of the square, so diverging modes come
-        first.
+        ``exp(2 pi |f| t)``. Complex pairs of f and its conjugate mean flutter: the modes oscillate at the real part,
+        and grow with the imaginary part in the place of f. The order is by the real part of the square, so diverging
+        modes come first.
 
         Raises
         ------
