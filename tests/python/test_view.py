@@ -216,6 +216,20 @@ def test_films_have_the_pictures_of_their_duration(record, renderer, tmp_path, s
     assert pictures[0] != pictures[-1]
 
 
+def test_a_film_of_high_quality_differs_in_smooth_edges_alone(record, renderer, tmp_path):
+    encoder = pytest.importorskip("imageio_ffmpeg")
+    films_of = {}
+    for quality in ("draft", "high"):
+        path = record.animate(tmp_path / f"{quality}.mp4", fps=10, size=(320, 240), quality=quality, progress=False)
+        reader = encoder.read_frames(str(path))
+        next(reader)
+        films_of[quality] = np.array([np.frombuffer(picture, np.uint8) for picture in reader], float)
+    change = np.abs(films_of["high"] - films_of["draft"])
+    assert 0.0 < change.mean() < 1.0
+    with pytest.raises(ValueError, match="quality must be 'draft' or 'high', got 'best'"):
+        record.animate(tmp_path / "arm.mp4", quality="best")
+
+
 def test_a_film_interpolates_between_frames_at_its_own_speed():
     times = np.array([0.0, 0.1, 0.3])
     np.testing.assert_allclose(films.film_places(times, 0.05), [0, 0.5, 1, 1.25, 1.5, 1.75, 2])

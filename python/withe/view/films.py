@@ -44,7 +44,18 @@ class Film:
             filters = "split[a][b];[a]palettegen=stats_mode=diff[p];[b][p]paletteuse=dither=none:diff_mode=rectangle"
             target = ["-filter_complex", filters, "-loop", "0"]
         else:
-            target = ["-c:v", "libx264", "-crf", "18", "-pix_fmt", "yuv420p", "-movflags", "+faststart"]
+            target = [
+                "-c:v",
+                "libx264",
+                "-preset",
+                "veryfast",
+                "-crf",
+                "18",
+                "-pix_fmt",
+                "yuv420p",
+                "-movflags",
+                "+faststart",
+            ]
         self._command = [encoder, "-y", "-loglevel", "error", *source, *target, os.fspath(path.absolute())]
 
     def __enter__(self) -> Film:

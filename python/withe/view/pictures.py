@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -114,6 +114,7 @@ def animate(
     color_by: ColorBy = "rod",
     camera: Pinhole | str | npt.ArrayLike | None = None,
     ground: float | None = None,
+    quality: Literal["draft", "high"] = "draft",
     progress: bool = True,
 ) -> Path:
     """Render a film: rods as tubes, with planes, spheres and capsules in motion.
@@ -130,6 +131,8 @@ def animate(
         Seconds of the simulation shown in one second of film.
     size, color_by, camera, ground
         As in `picture`. The camera stands still, with all frames in view.
+    quality : {"draft", "high"}
+        "high" smooths edges as `picture` does, and takes twice as long.
     progress : bool
         True to show a progress bar, as in `Simulation.run`.
 
@@ -153,8 +156,11 @@ def animate(
     for name, value in (("fps", fps), ("speed", speed)):
         if not (np.isfinite(value) and value > 0.0):
             raise ValueError(f"{name} must be positive, got {value!r}")
+    if quality not in ("draft", "high"):
+        raise ValueError(f"quality must be 'draft' or 'high', got {quality!r}")
     encoder = require("imageio_ffmpeg", "view").get_ffmpeg_exe()
-    stage = Stage(record, size=_even(size), color_by=color_by, camera=camera, ground=ground)
+    fine = quality == "high"
+    stage = Stage(record, size=_even(size), color_by=color_by, camera=camera, ground=ground, multisampling=fine)
     try:
         places = film_places(stage.times, speed / fps)
         with (

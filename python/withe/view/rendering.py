@@ -63,6 +63,8 @@ class Stage:
         True to render into memory, False into a window.
     supersampling : int
         Rendered pixels per shown pixel, along each side.
+    multisampling : bool
+        True to smooth edges within rendered pixels too, which takes twice as long.
 
     Raises
     ------
@@ -85,6 +87,7 @@ class Stage:
         ground: float | None = None,
         off_screen: bool = True,
         supersampling: int = 2,
+        multisampling: bool = True,
     ) -> None:
         if len(record) == 0:
             raise ValueError("record has no frames to show")
@@ -107,6 +110,8 @@ class Stage:
         window = [side * self._fineness for side in self.size]
         with render_window(off_screen):
             self.plotter = pyvista.Plotter(off_screen=off_screen, window_size=window, lighting="none")
+        if not multisampling:
+            self.plotter.render_window.SetMultiSamples(0)
         self.plotter.set_background("#f5f7f9")
         if ground is None:
             ground = self._floor(nodes)
