@@ -48,10 +48,10 @@ def train(
     threads : int
         Number of threads of torch.
     time_limit : float, optional [s]
-        Training stops there, and so it does at Ctrl-C, with the best network so far. ``network.network.training`` says
-        how it ended.
+        Time at which training stops, with the best network so far. Ctrl-C stops it too.
+        ``network.network.training`` reports the reason.
     progress : bool
-        Whether to show a progress bar.
+        True to show a progress bar.
 
     Returns
     -------
@@ -60,7 +60,7 @@ def train(
     Raises
     ------
     ValueError
-        Another name, a negative seed.
+        An unknown name or a negative seed.
     ImportError
         torch is not installed.
 
@@ -94,7 +94,7 @@ def train(
 
 
 def _even(random: np.random.Generator, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Questions spread evenly."""
+    """Return questions that are uniform over the range."""
     length, curvature, stretch = (random.uniform(*range_, count) for range_ in (LENGTHS, CURVATURES, STIFFNESSES))
     return length, curvature, stretch
 
