@@ -74,7 +74,7 @@ def coefficients(
     what : str
         Named in errors.
     directed : bool
-        Whether there is one rod, and an obstacle.
+        True for one rod and an obstacle.
     edges : int, optional
         Of that rod, where there is one.
 

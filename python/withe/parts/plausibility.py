@@ -35,7 +35,7 @@ def check_offset(offsets: FloatArray, radii: FloatArray, *, pulls_all_along: boo
     radii : ndarray of shape (guides,) [m]
         Of the rods at the guides.
     pulls_all_along : bool
-        Whether it has a tension and no stretch of its rod to buckle between two guides.
+        True if the tendon has a tension, and no stretch of its rod can buckle between two guides.
     owner : str
     """
     far = np.linalg.norm(offsets, axis=1)
