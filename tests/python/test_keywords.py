@@ -168,7 +168,10 @@ def public_functions():
     ]
     for module in modules:
         for name in module.__all__:
-            found = getattr(module, name)
+            try:
+                found = getattr(module, name)
+            except ImportError:  # it needs an extra that is not installed
+                continue
             if inspect.isclass(found):
                 own = {n: f for n, f in vars(found).items() if n == "__init__" or not n.startswith("_")}
                 yield from ((f"{module.__name__}.{name}.{n}", getattr(f, "__func__", f)) for n, f in own.items())
