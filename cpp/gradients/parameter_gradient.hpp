@@ -24,8 +24,9 @@ struct ParameterGradient : PartNumbers {
   /// lengths of stencils, masses, drag and loads along the edge. Only for rods outside of fluids, and not for chords of
   /// arcs.
   VectorX rest_length;
-  /// Derivative by the turn of the frame of each edge in the drawing, a rotation vector, at the same natural shape [1/rad].
-  /// The frame changes the attachment of joints and clamps, the drawn strains where rods meet, and follower loads.
+  /// Derivative by the turn of the frame of each edge in the drawing, a rotation vector, at the same natural shape
+  /// [1/rad]. The frame changes the attachment of joints and clamps, the drawn strains where rods meet, and follower
+  /// loads.
   MatrixX3 edge_turn;
   /// Derivatives by the drawn natural shapes, as far as drawn strains where rods meet are measured from them.
   std::vector<MatrixX2> drawn_curvature;
