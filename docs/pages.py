@@ -23,12 +23,9 @@ GENERATED = "generated"
 def public_names(module: str) -> list[str]:
     """Return the public names of a module that are not modules themselves, sorted."""
     found = importlib.import_module(module)
-    names = getattr(found, "__all__", None) or [
-        name
-        for name, value in vars(found).items()
-        if not name.startswith("_") and getattr(value, "__module__", "").startswith(module)
-    ]
-    return sorted(name for name in names if not name.startswith("_") and not inspect.ismodule(getattr(found, name)))
+    return sorted(
+        name for name in found.__all__ if not name.startswith("_") and not inspect.ismodule(getattr(found, name))
+    )
 
 
 def reference(folder: Path) -> None:
@@ -37,13 +34,14 @@ def reference(folder: Path) -> None:
     index += ["```{toctree}", ":maxdepth: 1", ""]
     for module, title in MODULES.items():
         index.append(f"{title} <{module}>")
+        names = public_names(module)
         lines = [f"# {title}", "", f"Module `{module}`.", "", "```{eval-rst}", ".. currentmodule:: " + module, ""]
         lines += [".. autosummary::", ""]
-        lines += [f"   {name}" for name in public_names(module)]
+        lines += [f"   {name}" for name in names]
         lines += ["```", "", "```{toctree}", ":hidden:", ""]
-        lines += [f"{module}.{name}" for name in public_names(module)]
+        lines += [f"{module}.{name}" for name in names]
         put(folder / f"{module}.md", [*lines, "```"])
-        for name in public_names(module):
+        for name in names:
             put(folder / f"{module}.{name}.md", name_page(module, name))
     put(folder / "index.md", [*index, "```"])
 
@@ -73,14 +71,13 @@ def rooms(folder: Path) -> None:
 
 def benchmarks(folder: Path) -> None:
     """Write a page for each benchmark, from the sections of benchmarks/README.md."""
-    head, *sections = (ROOT / "benchmarks/README.md").read_text().split("\n## ")
+    text = (ROOT / "benchmarks/README.md").read_text().replace("](pictures/", "](../../../benchmarks/pictures/")
+    head, *sections = text.split("\n## ")
     names = []
     for section in sections:
         title, _, body = section.partition("\n")
         names.append(title)
-        body = body.replace("](pictures/", "](../../../benchmarks/pictures/")
         put(folder / f"{title}.md", [f"# {title}", *body.replace("\n### ", "\n## ").splitlines()])
-    head = head.replace("](pictures/", "](../../../benchmarks/pictures/")
     put(folder / "index.md", [*head.splitlines(), "", "```{toctree}", ":maxdepth: 1", "", *names, "```"])
 
 

@@ -6,7 +6,7 @@
 /// the right-hand rule. The first edge carries the axis n, a unit vector u normal to n, and v = n x u. The second edge
 /// carries w. As drawn, w is u. Then
 ///   phi = atan2(s, c),   c = w . u,   s = w . v.
-/// Where the edges rotate about n alone, phi is the angle of a revolute joint with this axis. Its deviation is taken
+/// If the edges rotate about n alone, phi is the angle of a revolute joint with this axis. Its deviation is taken
 /// from -pi to pi, so that the spring does not count full turns. phi is not defined where w is parallel to n.
 ///
 /// Rotating the second edge by omega changes s by omega . (w x v) and c by omega . (w x u), and rotating the first edge

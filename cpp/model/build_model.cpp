@@ -10,6 +10,7 @@
 #include "geometry/curvature.hpp"
 #include "geometry/rotation.hpp"
 #include "model/drawn_frame.hpp"
+#include "model/edge_vectors.hpp"
 #include "model/hands.hpp"
 #include "model/layout.hpp"
 #include "model/model.hpp"
@@ -486,15 +487,7 @@ class Builder {
   /// Unknowns, strains and offsets of the drawn state.
   void draw() {
     model_.initial_q = VectorX::Zero(model_.dof_count);
-    for (int i = 0; i < model_.node_count; ++i) {
-      const Vector3 x = scene_.positions.row(i);
-      const int dof = model_.node_dof[static_cast<std::size_t>(i)];
-      if (model_.planar())
-        model_.initial_q.segment<2>(dof) << (x - model_.plane->origin).dot(model_.plane->first),
-            (x - model_.plane->origin).dot(model_.plane->second);
-      else
-        model_.initial_q.segment<3>(dof) = x;
-    }
+    for (int i = 0; i < model_.node_count; ++i) put_node(model_, i, scene_.positions.row(i), model_.initial_q);
     const auto n = static_cast<Eigen::Index>(model_.bend.size());
     model_.bend_offset = MatrixX3::Zero(n, 3);
     model_.half_offset = MatrixX3::Zero(static_cast<Eigen::Index>(model_.half.size()), 3);

@@ -20,6 +20,20 @@ inline Vector3 node_position(const Model& model, const VectorX& q, int node) {
   return model.planar() ? Vector3(model.plane->origin + place) : place;
 }
 
+/// Sets the rows of a node to a vector in the axes of space.
+inline void put_node_vector(const Model& model, int node, const Vector3& vector, VectorX& rows) {
+  const int dof = model.node_dof[at(node)];
+  if (model.planar())
+    rows.segment<2>(dof) << vector.dot(model.plane->first), vector.dot(model.plane->second);
+  else
+    rows.segment<3>(dof) = vector;
+}
+
+/// Puts a node to a position in space, in any configuration vector.
+inline void put_node(const Model& model, int node, const Vector3& position, VectorX& q) {
+  put_node_vector(model, node, model.planar() ? Vector3(position - model.plane->origin) : position, q);
+}
+
 /// Adds a vector in the axes of space to the rows of a node.
 inline void add_to_node(const Model& model, int node, const Vector3& by, VectorX& rows) {
   const int dof = model.node_dof[at(node)];

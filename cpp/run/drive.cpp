@@ -8,10 +8,14 @@
 
 namespace withe {
 
+namespace {
+
 Eigen::VectorBlock<VectorX> natural_stretch(const Model& model, Parameters& parameters, int rod) {
   const int first = model.rod_first_edge[at(rod)];
   return parameters.edge_natural_stretch.segment(first, model.rod_first_edge[at(rod) + 1] - first);
 }
+
+}  // namespace
 
 bool are_active(const Ramps& ramps) {
   for (const NaturalRamp& ramp : ramps.natural)
@@ -30,8 +34,8 @@ void apply_ramps(const Model& model, const Ramps& ramps, double time, Parameters
   for (const NumberRamp& ramp : ramps.numbers) {
     const double s = ramp.span.fraction(time);
     parameter_view(model, parameters, ramp.kind, ramp.part)(0, 0) = (1.0 - s) * ramp.from + s * ramp.to;
-    update_derived(model, Derived::nothing, 0, parameters);
   }
+  if (!ramps.numbers.empty()) update_derived(model, Derived::nothing, 0, parameters);
 }
 
 double apply_ramps(const Model& model, const Ramps& ramps, double time, const VectorX& q, const Configuration& c,

@@ -8,7 +8,6 @@
 
 namespace withe {
 
-Eigen::VectorBlock<VectorX> natural_stretch(const Model& model, Parameters& parameters, int rod);
 bool are_active(const Ramps& ramps);
 /// Sets the parameters that are on a ramp to their values at a time.
 void apply_ramps(const Model& model, const Ramps& ramps, double time, Parameters& parameters);

@@ -75,20 +75,23 @@ void EnergyCoefficients::set(const Model& model, const Parameters& p) {
   numbers = p;
 }
 
+void EnergyScratch::set(const Model& model, const Parameters& parameters, const State& state) {
+  compute_configuration(model, state, state.q, configuration);
+  coefficients.set(model, parameters);
+}
+
 double change_by_settings(const Model& model, const EnergyCoefficients& before, const Parameters& parameters,
                           const State& state, EnergyScratch& scratch) {
+  scratch.set(model, parameters, state);
   auto& [c, now, touching, components] = scratch;
-  compute_configuration(model, state, state.q, c);
-  now.set(model, parameters);
   const Energy a = mechanical_energy(model, before, c, state), b = mechanical_energy(model, now, c, state);
   return (b.kinetic - a.kinetic) + (b.stretch - a.stretch) + (b.bend - a.bend) + (b.twist - a.twist) +
          (b.gravity - a.gravity) + (b.spring - a.spring);
 }
 
 double elastic_energy(const Model& model, const Parameters& parameters, const State& state, EnergyScratch& scratch) {
+  scratch.set(model, parameters, state);
   auto& [c, now, touching, components] = scratch;
-  compute_configuration(model, state, state.q, c);
-  now.set(model, parameters);
   const BendTwistEnergy turned = bend_twist_energy(model, now.elastic, c);
   return stretch_energy(model, now.elastic, c) + turned.bend + turned.twist +
          stored_energy(model, now.numbers, state.q, c);
@@ -96,9 +99,8 @@ double elastic_energy(const Model& model, const Parameters& parameters, const St
 
 Energy energy_of(const Model& model, const Parameters& parameters, const Contact* contact, const State& state,
                  const Ledger& ledger, EnergyScratch& scratch) {
+  scratch.set(model, parameters, state);
   auto& [c, coefficients, touching, components] = scratch;
-  compute_configuration(model, state, state.q, c);
-  coefficients.set(model, parameters);
   Energy e = mechanical_energy(model, coefficients, c, state);
   e.loads = -ledger.load_work;
   if (contact) e.contact = contact->energy_of(state, parameters, touching);
@@ -110,9 +112,8 @@ Energy energy_of(const Model& model, const Parameters& parameters, const Contact
 
 Energy rod_energy(const Model& model, const Parameters& parameters, const State& state, int rod,
                   EnergyScratch& scratch) {
+  scratch.set(model, parameters, state);
   auto& [c, coefficients, touching, components] = scratch;
-  compute_configuration(model, state, state.q, c);
-  coefficients.set(model, parameters);
   const ElasticCoefficients& k = coefficients.elastic;
   const MassMatrix& mass = coefficients.mass;
   const int first = model.rod_first_edge.at(at(rod)), last = model.rod_first_edge.at(at(rod) + 1);
@@ -161,9 +162,8 @@ Energy rod_energy(const Model& model, const Parameters& parameters, const State&
 
 void find_component_energies(const Model& model, const Parameters& parameters, const State& state,
                              EnergyScratch& scratch) {
+  scratch.set(model, parameters, state);
   auto& [c, k, touching, out] = scratch;
-  compute_configuration(model, state, state.q, c);
-  k.set(model, parameters);
   const MassMatrix& mass = k.mass;
   const VectorX& v = state.v;
   for (VectorX* x : {&out.kinetic, &out.elastic, &out.travelling, &out.mass}) x->setZero(model.component_count);

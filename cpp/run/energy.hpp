@@ -50,6 +50,9 @@ struct EnergyScratch {
   EnergyCoefficients coefficients;
   ContactAtRest contact;
   ComponentEnergies components;
+
+  /// Sets configuration and coefficients to those of a state.
+  void set(const Model& model, const Parameters& parameters, const State& state);
 };
 
 /// Energy of a state, with the work and the losses up to it. `contact`: none where nothing touches.

@@ -96,15 +96,6 @@ void hold_hands(const Model& model, const State& state, const std::vector<Suppor
 
 }  // namespace
 
-void put_node(const Model& model, int node, const Vector3& position, VectorX& q) {
-  const int dof = model.node_dof[at(node)];
-  if (model.planar())
-    q.segment<2>(dof) << (position - model.plane->origin).dot(model.plane->first),
-        (position - model.plane->origin).dot(model.plane->second);
-  else
-    q.segment<3>(dof) = position;
-}
-
 void hold(const Model& model, const Moving& now, const std::vector<SupportPose>& supports, HeldTarget& target) {
   target.q = now.state.q;
   target.turn = target.spin = 0.0;

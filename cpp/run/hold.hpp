@@ -7,9 +7,6 @@
 
 namespace withe {
 
-/// Puts a node in space into a configuration vector.
-void put_node(const Model& model, int node, const Vector3& position, VectorX& q);
-
 /// Finds the held unknowns where supports have given poses.
 void hold(const Model& model, const Moving& now, const std::vector<SupportPose>& supports, HeldTarget& target);
 

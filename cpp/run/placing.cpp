@@ -20,9 +20,9 @@ namespace {
 constexpr double kMaxHeldMove = 1e-9;      // of the scene's length, or rad: what rounding may have moved
 constexpr double kMaxMisalignment = 1e-6;  // rad: directors from outside are no better
 
-/// Rings are where rods pass them now, and give way as far as they cannot hold these; one beyond an end of its rod
-/// has let it go.
-void pass_rings_anew(const Model& model, State& state) {
+/// Moves each ring to the present place of its rod. A ring slips where it cannot hold the rod, and lets go of a rod
+/// whose end has passed.
+void update_rings(const Model& model, State& state) {
   for (std::size_t s = 0; s < model.supports.size(); ++s) {
     if (!model.supports[s].active || !model.supports[s].slides()) continue;
     RingState& ring = state.hands[s].ring;
@@ -33,8 +33,8 @@ void pass_rings_anew(const Model& model, State& state) {
   }
 }
 
-/// A support that was moved at once gets there now, instead of in the next step, where its nodes are placed there.
-/// Where it is then, of the held unknowns.
+/// True if a support that was moved at once is moved now instead of in the next step, because its nodes are placed at
+/// its target. `there` has the held unknowns at the target.
 bool arrives(const Model& model, int support, const std::vector<bool>& given, const VectorX& q, Moving& now,
              HeldTarget& there) {
   const Support& held = model.supports[at(support)];
@@ -53,7 +53,7 @@ bool arrives(const Model& model, int support, const std::vector<bool>& given, co
   return true;
 }
 
-/// Unknowns with nodes where they are given to be; refuses to move what is held.
+/// Unknowns with nodes at their given positions. Throws std::invalid_argument where a held node would move.
 VectorX placed(const Model& model, const std::vector<RodState>& rods, Moving& now) {
   const State& state = now.state;
   VectorX q = state.q;
@@ -62,16 +62,12 @@ VectorX placed(const Model& model, const std::vector<RodState>& rods, Moving& no
     for (Eigen::Index i = 0; i < rod.positions.rows(); ++i) {
       const int node = model.description.rods[at(rod.rod)].nodes[static_cast<std::size_t>(i)],
                 dof = model.node_dof[at(node)];
-      const Vector3 x = rod.positions.row(i);
-      VectorX own = x;
-      if (model.planar()) {
-        const Vector3 from = x - model.plane->origin;
-        own = Vector2(from.dot(model.plane->first), from.dot(model.plane->second));
-      }
-      require(!given[at(node)] || (q.segment(dof, model.dimension) - own).norm() <= kMaxHeldMove * model.length_scale,
-              "positions of rods that share a node must agree" + place_of_node(model, node).words);
+      const VectorX before = q.segment(dof, model.dimension);
+      put_node(model, node, rod.positions.row(i), q);
+      require(
+          !given[at(node)] || (before - q.segment(dof, model.dimension)).norm() <= kMaxHeldMove * model.length_scale,
+          "positions of rods that share a node must agree" + place_of_node(model, node).words);
       given[at(node)] = true;
-      q.segment(dof, model.dimension) = own;
     }
   HeldTarget there;
   for (int s = 0; s < static_cast<int>(model.supports.size()); ++s) {
@@ -137,7 +133,7 @@ void place_directors(const Model& model, const RodState& rod, const VectorX& q, 
   }
 }
 
-/// Which rods have a node that is elsewhere.
+/// True for each rod of which a node has moved.
 std::vector<bool> moved_rods(const Model& model, const VectorX& before, const VectorX& now) {
   std::vector<bool> moved;
   for (const RodDescription& rod : model.description.rods)
@@ -195,13 +191,13 @@ bool leaves_plane(const Model& model, const State& state, const RodState& rod) {
   return false;
 }
 
-bool place_rods(const Model& model, const Parameters& parameters, const std::vector<RodState>& rods, Moving& now,
-                std::vector<bool>& moved) {
+std::vector<bool> place_rods(const Model& model, const Parameters& parameters, const std::vector<RodState>& rods,
+                             Moving& now) {
   std::vector<bool> is_set(at(model.edge_count), false);
   for (const RodState& rod : rods)
     for (Eigen::Index e = 0; e < rod.directors.rows(); ++e)
       is_set[at(model.rod_first_edge[at(rod.rod)] + static_cast<int>(e))] = true;
-  if (std::find(is_set.begin(), is_set.end(), true) == is_set.end()) return false;
+  if (std::find(is_set.begin(), is_set.end(), true) == is_set.end()) return {};
   State& state = now.state;
   const VectorX q = placed(model, rods, now), start = state.q;
   Configuration c;
@@ -230,9 +226,8 @@ bool place_rods(const Model& model, const Parameters& parameters, const std::vec
   compute_configuration(model, state, state.q, c);
   require(c.bend_strain.allFinite() && c.half_strain.allFinite(), "positions must not fold an edge back onto the next");
   accept_configuration(model, VectorX(state.q), c, state);
-  pass_rings_anew(model, state);
-  moved = moved_rods(model, start, state.q);
-  return true;
+  update_rings(model, state);
+  return moved_rods(model, start, state.q);
 }
 
 void set_rates(const Model& model, const std::vector<RodState>& rods, State& state) {
@@ -241,14 +236,9 @@ void set_rates(const Model& model, const std::vector<RodState>& rods, State& sta
     const int first = model.rod_first_edge[at(rod.rod)], end = model.rod_first_edge[at(rod.rod) + 1];
     if (rod.velocities.rows() > 0 || rod.spins.size() > 0)
       for (int e = first; e < end; ++e) is_set[at(e)] = true;
-    for (Eigen::Index i = 0; i < rod.velocities.rows(); ++i) {
-      const int dof = model.node_dof[at(model.description.rods[at(rod.rod)].nodes[static_cast<std::size_t>(i)])];
-      const Vector3 v = rod.velocities.row(i);
-      if (model.planar())
-        state.v.segment<2>(dof) << v.dot(model.plane->first), v.dot(model.plane->second);
-      else
-        state.v.segment<3>(dof) = v;
-    }
+    const std::vector<int>& nodes = model.description.rods[at(rod.rod)].nodes;
+    for (Eigen::Index i = 0; i < rod.velocities.rows(); ++i)
+      put_node_vector(model, nodes[static_cast<std::size_t>(i)], rod.velocities.row(i), state.v);
     if (!model.planar())
       for (Eigen::Index e = 0; e < rod.spins.size(); ++e)
         state.v(model.edge_dof[at(first + static_cast<int>(e))]) = rod.spins(e);

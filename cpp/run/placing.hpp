@@ -21,10 +21,10 @@ struct RodState {
 void check_shapes(const Model& model, const RodState& rod);
 /// True if a state of a rod leaves the plane of a planar scene.
 bool leaves_plane(const Model& model, const State& state, const RodState& rod);
-/// Sets nodes, frames and the branches of twists; `moved` has the rods of which a node is elsewhere. False where none
-/// was given. Throws std::invalid_argument where a support holds what would move, or an edge has no length.
-bool place_rods(const Model& model, const Parameters& parameters, const std::vector<RodState>& rods, Moving& now,
-                std::vector<bool>& moved);
+/// Sets nodes, frames and the branches of twists. Returns whether a node of each rod has moved; empty if no positions
+/// were given. Throws std::invalid_argument where a support holds a node that would move, or an edge has no length.
+std::vector<bool> place_rods(const Model& model, const Parameters& parameters, const std::vector<RodState>& rods,
+                             Moving& now);
 void set_rates(const Model& model, const std::vector<RodState>& rods, State& state);
 
 }  // namespace withe

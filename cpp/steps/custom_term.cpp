@@ -3,17 +3,12 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "model/edge_vectors.hpp"
+
 namespace withe {
 AppliedForces applied_forces(const Model& model, const MatrixX3& forces, const MatrixX3& moments) {
   AppliedForces out{VectorX::Zero(model.dof_count), {}};
-  for (int i = 0; i < model.node_count; ++i) {
-    const int dof = model.node_dof[at(i)];
-    const Vector3 f = forces.row(i);
-    if (model.planar())
-      out.force.segment<2>(dof) << f.dot(model.plane->first), f.dot(model.plane->second);
-    else
-      out.force.segment<3>(dof) = f;
-  }
+  for (int i = 0; i < model.node_count; ++i) put_node_vector(model, i, forces.row(i), out.force);
   for (Eigen::Index i = 0; i < moments.rows(); ++i) out.moments.emplace_back(moments.row(i));
   return out;
 }

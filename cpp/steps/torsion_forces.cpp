@@ -48,22 +48,25 @@ Vec3<Scalar> in_frame(const EdgeFrame<Scalar>& f, const Vec3d& components) {
   return Scalar(components.x) * f.d1 + Scalar(components.y) * f.d2 + Scalar(components.z) * f.tangent;
 }
 
-/// Components of the vectors that the edges of a spring carry.
-struct Carried {
-  Vec3d u, v, w;
+/// Components of the arms of a spring along d1, d2 and tangent of the edges that carry them.
+TorsionArms<double> carried_arms(const Model& model, int spring) {
+  const TorsionDescription& d = model.description.torsions[at(spring)];
+  const auto [first, second] = edges_of(model, spring);
+  return {carried(model, first, d.reference), carried(model, first, d.axis.cross(d.reference)),
+          carried(model, second, d.reference)};
+}
 
-  Carried(const Model& model, int spring) {
-    const TorsionDescription& d = model.description.torsions[at(spring)];
-    const auto [first, second] = edges_of(model, spring);
-    u = carried(model, first, d.reference);
-    v = carried(model, first, d.axis.cross(d.reference));
-    w = carried(model, second, d.reference);
-  }
-  template <class Scalar>
-  TorsionArms<Scalar> arms(const EdgeFrame<Scalar> (&frames)[2]) const {
-    return {in_frame(frames[0], u), in_frame(frames[0], v), in_frame(frames[1], w)};
-  }
-};
+template <class Scalar>
+TorsionArms<Scalar> arms_in(const EdgeFrame<Scalar> (&frames)[2], const TorsionArms<double>& carried) {
+  return {in_frame(frames[0], carried.u), in_frame(frames[0], carried.v), in_frame(frames[1], carried.w)};
+}
+
+/// Energy of a spring between two edges in a configuration [J].
+double energy_between(const Model& model, const std::array<int, 2>& edges, const TorsionArms<double>& carried,
+                      const TorsionSpring& spring, const Configuration& c) {
+  const EdgeFrame<double> frames[2] = {frame_of(model, c, edges[0]), frame_of(model, c, edges[1])};
+  return torsion_energy(spring, arms_in(frames, carried));
+}
 
 /// Dual number with the derivative `rate` by the unknown at `index`, or a constant for a negative index.
 D change(int index, double rate) {
@@ -113,12 +116,12 @@ void put(const D (&rows)[kTorsionUnknowns], bool with_matrix, TorsionLocal& out)
 }
 
 /// Gradient and Hessian of the energy, or of a torque alone, in a configuration.
-void torsion_local(const Model& model, const std::array<TorsionSeat, 2>& seats, const Carried& carried,
+void torsion_local(const Model& model, const std::array<TorsionSeat, 2>& seats, const TorsionArms<double>& carried,
                    const TorsionSpring& spring, const Configuration& c, bool with_matrix, TorsionLocal& out) {
   const int n = model.dimension;
   const EdgeFrame<D> frames[2] = {moving_frame(frame_of(model, c, seats[0].edge), seats[0], n, 1.0),
                                   moving_frame(frame_of(model, c, seats[1].edge), seats[1], n, 1.0)};
-  const Vec3<D> moment = torsion_moment(spring, carried.arms(frames));
+  const Vec3<D> moment = torsion_moment(spring, arms_in(frames, carried));
   D rows[kTorsionUnknowns];
   for (int k = 0; k < 2; ++k) {
     const Vec3<D> m = k == 0 ? -moment : moment;
@@ -130,9 +133,9 @@ void torsion_local(const Model& model, const std::array<TorsionSeat, 2>& seats, 
 }
 
 /// Discrete gradient over an energy-momentum step, and its derivatives by the middle of the step.
-void discrete_torsion_local(const Model& model, const std::array<TorsionSeat, 2>& seats, const Carried& carried,
-                            const TorsionSpring& spring, const DiscreteStep& step, bool with_matrix,
-                            TorsionLocal& out) {
+void discrete_torsion_local(const Model& model, const std::array<TorsionSeat, 2>& seats,
+                            const TorsionArms<double>& carried, const TorsionSpring& spring, const DiscreteStep& step,
+                            bool with_matrix, TorsionLocal& out) {
   const int n = model.dimension;
   EdgeFrame<double> start[2];
   EdgeFrame<D> middle[2], end[2];
@@ -142,7 +145,7 @@ void discrete_torsion_local(const Model& model, const std::array<TorsionSeat, 2>
     middle[k] = moving_frame(frame_of(model, step.middle, seat.edge), seat, n, 1.0);
     end[k] = moving_frame(frame_of(model, step.end, seat.edge), seat, n, 2.0);
   }
-  const Vec3<D> moment = discrete_torsion_moment(spring, carried.arms(start), carried.arms(end));
+  const Vec3<D> moment = discrete_torsion_moment(spring, arms_in(start, carried), arms_in(end, carried));
   const auto constant = [](const Vec3d& v) { return Vec3<D>{v.x, v.y, v.z}; };
   D rows[kTorsionUnknowns];
   for (int k = 0; k < 2; ++k) {
@@ -182,6 +185,7 @@ TorsionForces::TorsionForces(const Model& model) {
       seats[k].head = place_of(model.head_dof[at(edge)], model.dimension);
     }
     seats_.push_back(seats);
+    carried_.push_back(carried_arms(model, s));
     dofs.insert(dofs.end(), std::begin(own), std::end(own));
   }
   table_ = ElementTable(kTorsionUnknowns, std::move(dofs));
@@ -196,14 +200,15 @@ void TorsionForces::add(const StepProblem& problem, StepData& data, const Assemb
   for (int s = 0; s < table_.count(); ++s) {
     const TorsionSpring spring = spring_of(*problem.parameters, s);
     if (spring.stiffness == 0.0) continue;
-    const Carried carried(problem.model, s);
+    const TorsionArms<double>& carried = carried_[at(s)];
     if (problem.conserves_energy())
       discrete_torsion_local(problem.model, seats_[at(s)], carried, spring, discrete_step(problem, data),
                              !values.empty(), local);
     else
       torsion_local(problem.model, seats_[at(s)], carried, spring, data.configuration, !values.empty(), local);
     add_element(table_, s, local, data, values);
-    data.potential += torsion_energy(problem.model, *problem.parameters, data.configuration, s);
+    data.potential += energy_between(problem.model, {seats_[at(s)][0].edge, seats_[at(s)][1].edge}, carried, spring,
+                                     data.configuration);
     if (!problem.conserves_energy()) continue;
     const int* dofs = table_.dofs(s);
     for (int i = 0; i < kTorsionUnknowns; ++i)
@@ -216,7 +221,7 @@ void TorsionForces::add_adjoint(const StepProblem& problem, const StepData& data
   std::optional<DiscreteAdjoint> discrete;
   if (problem.conserves_energy()) discrete.emplace(problem, data, adjoint.rows, adjoint);
   for (int s = 0; s < table_.count(); ++s) {
-    const Carried carried(problem.model, s);
+    const TorsionArms<double>& carried = carried_[at(s)];
     const TorsionSpring spring = spring_of(*problem.parameters, s);
     double rows[kTorsionUnknowns];
     gather(table_, s, adjoint.rows, rows);
@@ -265,9 +270,7 @@ void TorsionForces::add_rounding(const StepProblem& problem, StepData& data) con
 }
 
 double torsion_energy(const Model& model, const PartNumbers& numbers, const Configuration& c, int spring) {
-  const auto [first, second] = edges_of(model, spring);
-  const EdgeFrame<double> frames[2] = {frame_of(model, c, first), frame_of(model, c, second)};
-  return torsion_energy(spring_of(numbers, spring), Carried(model, spring).arms(frames));
+  return energy_between(model, edges_of(model, spring), carried_arms(model, spring), spring_of(numbers, spring), c);
 }
 
 }  // namespace withe

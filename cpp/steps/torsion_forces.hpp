@@ -32,6 +32,7 @@ class TorsionForces final : public Term {
  private:
   using Seats = std::array<TorsionSeat, 2>;
   std::vector<Seats> seats_;
+  std::vector<TorsionArms<double>> carried_;  ///< components of the arms along d1, d2 and tangent of their edges
   ElementTable table_;
 };
 

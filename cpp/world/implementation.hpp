@@ -72,14 +72,11 @@ struct World::Implementation : Built, Running {
 
   // set_state.cpp
   void place(const std::vector<RodState>& rods);
-  void meet_anew(const std::vector<bool>& moved);
+  void renew_contacts(const std::vector<bool>& moved);
   /// Forgets predictions from past motion.
   void forget_motion();
 
   // prescribed.cpp
-  /// Leads a part of a natural shape to another value over a time [s].
-  template <class Value>
-  void begin_ramp(Ramp<Value>& ramp, const Value& now, const Value& value, double over);
   void take_contact();
   void set_contact(ContactDescription wanted);
   /// Leaves the plane of a planar scene where a parameter of the kind does.

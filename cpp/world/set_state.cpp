@@ -26,9 +26,8 @@ void World::set_state(const std::vector<RodState>& rods, std::optional<double> t
 }
 
 void World::Implementation::place(const std::vector<RodState>& rods) {
-  std::vector<bool> moved;
-  if (place_rods(model, parameters, rods, *this, moved)) {
-    meet_anew(moved);
+  if (const std::vector<bool> moved = place_rods(model, parameters, rods, *this); !moved.empty()) {
+    renew_contacts(moved);
     forget_motion();
     systems.forget_matrix();
   }
@@ -36,8 +35,8 @@ void World::Implementation::place(const std::vector<RodState>& rods) {
   forget_motion();
 }
 
-/// Contacts of rods that are where no step has led them to; all others go on.
-void World::Implementation::meet_anew(const std::vector<bool>& moved) {
+/// Finds the contacts of moved rods again; all other contacts continue.
+void World::Implementation::renew_contacts(const std::vector<bool>& moved) {
   Contact* contact = systems.scheme().contact();
   if (!contact) return;
   const auto is_moved = [&](int edge) { return edge >= 0 && moved[at(model.edge_rod[at(edge)])]; };

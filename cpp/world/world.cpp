@@ -7,6 +7,7 @@
 #include "common/check.hpp"
 #include "common/timer.hpp"
 #include "forces/stokeslets.hpp"
+#include "model/edge_vectors.hpp"
 #include "run/checks.hpp"
 #include "run/drive.hpp"
 #include "run/frames.hpp"
@@ -265,13 +266,6 @@ void World::Implementation::take_contact() {
   if (remade) remake_equations();
 }
 
-template <class Value>
-void World::Implementation::begin_ramp(Ramp<Value>& ramp, const Value& now, const Value& value, double over) {
-  ramp = {now, value, state.time, state.time + over, true};
-  reaction_current = false;
-  state.acceleration_current = false;
-}
-
 void World::Implementation::leave_plane_for(const ParameterSetting& setting) {
   const std::string why = leaving_plane(model, setting);
   if (!why.empty()) leave_plane(why);
@@ -325,19 +319,22 @@ void World::Implementation::set(std::span<const ParameterSetting> settings, doub
   plan_current = false;
 }
 
-/// Start a ramp from the present value.
+/// Starts a ramp from the present value.
 void World::Implementation::begin_ramp(const ParameterSetting& setting, double over) {
   const auto& [kind, owner, values] = setting;
   ParameterView now = parameter_view(model, parameters, kind, owner);
   const MatrixX target = values.rows() == now.rows() ? MatrixX(values) : MatrixX(values.replicate(now.rows(), 1));
+  const Span way{state.time, state.time + over};
   if (info_of(kind).number) {
     end_ramp(setting);
-    ramps.numbers.push_back({kind, owner, now(0, 0), target(0, 0), {state.time, state.time + over}});
-  } else if (kind == ParameterKind::natural_curvature)
-    begin_ramp(ramps.natural[at(owner)].curvature, MatrixX2(now), MatrixX2(target), over);
-  else
-    begin_ramp(kind == ParameterKind::natural_twist ? ramps.natural[at(owner)].twist : ramps.natural[at(owner)].stretch,
-               VectorX(now.col(0)), VectorX(target.col(0)), over);
+    ramps.numbers.push_back({kind, owner, now(0, 0), target(0, 0), way});
+  } else if (kind == ParameterKind::natural_curvature) {
+    ramps.natural[at(owner)].curvature = {now, target, way.start, way.end, true};
+  } else {
+    NaturalRamp& own = ramps.natural[at(owner)];
+    Ramp<VectorX>& ramp = kind == ParameterKind::natural_twist ? own.twist : own.stretch;
+    ramp = {now.col(0), target.col(0), way.start, way.end, true};
+  }
   reaction_current = false;
   state.acceleration_current = false;
 }
@@ -422,14 +419,7 @@ void World::set_velocities(const MatrixX3& velocities) {
     const VectorX off = velocities * self.model.plane->normal;
     if (off.cwiseAbs().maxCoeff() > 1e-9 * velocities.cwiseAbs().maxCoeff()) self.leave_plane("a velocity");
   }
-  for (int i = 0; i < self.model.node_count; ++i) {
-    const int dof = self.model.node_dof[at(i)];
-    const Vector3 v = velocities.row(i);
-    if (self.model.planar())
-      self.state.v.segment<2>(dof) << v.dot(self.model.plane->first), v.dot(self.model.plane->second);
-    else
-      self.state.v.segment<3>(dof) = v;
-  }
+  for (int i = 0; i < self.model.node_count; ++i) put_node_vector(self.model, i, velocities.row(i), self.state.v);
   self.forget_motion();
 }
 
