@@ -26,7 +26,7 @@ requirements = $$(python tools/requirements.py $(1))
 CXX_SOURCES := $(wildcard cpp/*/*.hpp cpp/*/*.cpp python/bindings/*.hpp python/bindings/*.cpp)
 CXX_TESTS := $(wildcard tests/cpp/*.hpp tests/cpp/*.cpp tests/cpp/*/*.hpp tests/cpp/*/*.cpp benchmarks/*.cpp)
 CMAKE_FILES := CMakeLists.txt cpp/CMakeLists.txt $(wildcard cpp/*/CMakeLists.txt) python/bindings/CMakeLists.txt
-PYTHON_SOURCES := $(shell find python/withe -name '*.py' -o -name '*.pyi' -o -name '*.pt' -o -name py.typed)
+PYTHON_SOURCES := $(shell find python/withe -name '*.py' -o -name '*.pyi' -o -name '*.pt' -o -name '*.json' -o -name py.typed)
 # Folders too: a deleted file is a change.
 SOURCE_FOLDERS := $(wildcard cpp/*/) $(shell find python/withe -type d -not -name __pycache__)
 

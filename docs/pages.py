@@ -2,6 +2,7 @@
 
 import importlib
 import inspect
+import json
 import re
 from pathlib import Path
 
@@ -43,7 +44,35 @@ def reference(folder: Path) -> None:
         put(folder / f"{module}.md", [*lines, "```"])
         for name in names:
             put(folder / f"{module}.{name}.md", name_page(module, name))
+    index.append("Keys of a scene file <scene_file>")
+    put(folder / "scene_file.md", scene_file_page())
     put(folder / "index.md", [*index, "```"])
+
+
+def scene_file_page() -> list[str]:
+    """Return the page of the keys of scene files, from their JSON schema."""
+    schema = json.loads((ROOT / "python/withe/scene/scene.schema.json").read_text(encoding="utf-8"))
+    lines = ["# Keys of a scene file", "", "How to write one: [Scenes in files](../../how_to/scene_files.md).", ""]
+    tables = [("[materials.NAME]", schema["$defs"]["material"])]
+    for name, content in schema["properties"].items():
+        kinds = content.get("items", {}).get("anyOf", [content.get("items", {})])
+        if "properties" in kinds[0]:
+            tables += [(f"[[{name}]]", each) for each in kinds]
+        elif "properties" in content:
+            tables.append((f"[{name}]", content))
+    for title, content in tables:
+        keys = content["properties"]
+        kind = keys.get("kind", {}).get("const")
+        lines += [f"## `{title}`" + (f", kind {kind!r}" if kind else ""), ""]
+        lines += ["| key | needed | meaning |", "|---|---|---|"]
+        for key, value in keys.items():
+            if key != "kind" or not kind:
+                needed = "yes" if key in content.get("required", ()) else ""
+                text = value.get("description", "").replace("|", "\\|").replace("*", "\\*")
+                choices = ", ".join(f'`"{each}"`' for each in value.get("enum", ()))
+                lines.append(f"| `{key}` | {needed} | {text or choices} |")
+        lines.append("")
+    return lines
 
 
 def name_page(module: str, name: str) -> list[str]:

@@ -1,4 +1,4 @@
-"""The command line: ``withe perceive IMAGE``, ``withe deploy PATTERN``, ``withe fold --paper a4``."""
+"""The command line: ``withe run SCENE``, ``withe perceive IMAGE``, ``withe deploy PATTERN``, ``withe fold``."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ from collections.abc import Sequence
 from typing import Any
 
 from withe.deployment import command as deploy
+from withe.errors import ConvergenceError
 from withe.folding import command as fold
 from withe.perception import command as perceive
+from withe.scene import command as scene
 
 __all__ = ["main"]
 
@@ -19,6 +21,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; what the user gave wrongly, and what is warned of, is said in one line."""
     parser = argparse.ArgumentParser(prog="withe", description="Tools around withe: soft robots made of slender rods.")
     commands = parser.add_subparsers(required=True, metavar="command")
+    scene.add_parser(commands)
     perceive.add_parser(commands)
     deploy.add_parser(commands)
     fold.add_parser(commands)
@@ -28,7 +31,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             warnings.simplefilter("always", UserWarning)
             warnings.showwarning = _said
             return int(parsed.run(parsed))
-    except (ValueError, OSError, ImportError) as error:
+    except (ValueError, OSError, ImportError, ConvergenceError) as error:
         sys.stderr.write(f"withe: {error}\n")
         return 2
 

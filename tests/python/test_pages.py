@@ -44,6 +44,8 @@ def test_the_code_of_a_page_runs(page, tmp_path, monkeypatch):
     pytest.importorskip("matplotlib").use("Agg")
     monkeypatch.chdir(tmp_path)
     names = {"__name__": "page", **CONTEXT.get(page, dict)()}
+    for name, content in re.findall(r"```toml\n# (\S+)\n(.*?)```", (ROOT / page).read_text(), re.DOTALL):
+        Path(name).write_text(content)
     for block in re.findall(r"```python\n(.*?)```", (ROOT / page).read_text(), re.DOTALL):
         for old, new in SHORTER.get(page, {}).items():
             block = block.replace(old, new)

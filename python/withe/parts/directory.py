@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 
 from withe.common.validation import near_word
 from withe.parts.handles import EdgeHandle, Handle, Layout, NodeHandle, Rod, parse_place
-from withe.parts.kinds import ContactSettings, Part, Pass, RodPart
+from withe.parts.kinds import Actuation, ContactSettings, Part, Pass, RodPart
 from withe.parts.table import handle_of, kind_of
 
 __all__ = ["Directory"]
@@ -22,6 +22,7 @@ class Directory:
         self.layout = Layout()
         self.parts: dict[str, Part] = {}
         self.contact = ContactSettings()
+        self.actuations: tuple[Actuation, ...] = ()  # in the order of time
         self._retired: dict[str, int] = {}  # greatest number of a released part that was named by one, by its word
 
     def copy(self) -> Directory:
@@ -30,6 +31,7 @@ class Directory:
         other.layout = self.layout.copy()
         other.parts = dict(self.parts)
         other.contact = self.contact
+        other.actuations = self.actuations
         other._retired = dict(self._retired)
         return other
 

@@ -17,6 +17,7 @@ from withe.parts.sections import SectionProperties
 __all__ = [
     "LOAD_KINDS",
     "SUPPORT_KINDS",
+    "Actuation",
     "ContactModel",
     "ContactSettings",
     "CustomForcePart",
@@ -218,6 +219,16 @@ class CustomForcePart(Part):
     function: Callable[[float, FloatArray, FloatArray], Any]
     jacobian: Callable[[float, FloatArray, FloatArray], Any] | None = None
     moments: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Actuation:
+    """Values that a simulation sets at a given time."""
+
+    target: str | tuple[str, str] | None  # name of a part, of two bodies, or None for the scene
+    at: float  # [s]
+    over: float  # [s]
+    values: Mapping[str, Any]
 
 
 @dataclass(frozen=True, eq=False)

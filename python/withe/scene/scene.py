@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import uuid
+from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast, overload
 
 import numpy as np
@@ -13,6 +16,7 @@ from withe.common import validation
 from withe.common.attributes import known_attributes, of_a_simulation
 from withe.common.deprecation import moved_into, renamed
 from withe.common.keywords import keyword_hints
+from withe.parts.actuation import add_actuation
 from withe.parts.applied_loads import AppliedLoads, Bearer
 from withe.parts.directory import Directory
 from withe.parts.handles import Joint, Load, NodeHandle, Rod, RodPlace, parse_place
@@ -21,9 +25,15 @@ from withe.parts.materials import Material, Section, Stiffness
 from withe.parts.options import Bending, BuildOptions, Integrator, Solver
 from withe.parts.rods import Natural, make_rod
 from withe.scene.contacts import Contacts
+from withe.scene.declarations import Declaration, declares
+from withe.scene.file_format import METHODS
+from withe.scene.files import fill, save_scene
 from withe.scene.joints import JoinedNodes
 from withe.scene.loads import Loads
+from withe.scene.options import checked_options, with_build_options
 from withe.scene.supports import Supports
+from withe.simulation.parameters import Settable
+from withe.simulation.schedule import check_actuations
 from withe.simulation.simulation import Simulation
 
 __all__ = ["Scene"]
@@ -33,6 +43,7 @@ _DEFAULT_SOLVER = Solver()
 _IN_SOLVER = ("mixed", "step_tolerance", "force_tolerance", "max_iterations", "max_halvings", "max_steps")
 
 
+@declares(*METHODS)
 @keyword_hints
 @known_attributes("use a method such as set_friction, or an option of build")
 class Scene(AppliedLoads, Loads, Contacts, Supports):
@@ -42,11 +53,12 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
 
     * describe: `add_rod`, `join`, `add_mass`, `add_spring`, `add_torsion_spring`, `add_tendon`, `gravity`
     * hold: `clamp`, `pin`, `grasp`
-    * load: `add_force`, `add_moment`, `add_load`, `add_pressure`, `add_drag`, `add_fluid`, `add_custom_force`
+    * load: `add_force`, `add_moment`, `add_load`, `add_pressure`, `add_drag`, `add_fluid`, `add_custom_force`,
+      `actuate` at given times
     * touch: `enable_contact`, `add_floor`, `add_plane`, `add_sphere`, `add_capsule`, `set_friction`,
       `set_restitution`, `set_contact_stiffness`, `ignore_contact`, `set_contact_group`
-    * run: `build`, `build_batch`
-    * read: `rods`, and ``scene["arm"]`` for the handle of a name
+    * run: `build`, `build_batch`, `build_options`
+    * read: `rods`, and ``scene["arm"]`` for the handle of a name; `save`, `load` of TOML files
     * differentiate: see `withe.Simulation`, whose equations have derivatives
 
     Parameters
@@ -70,6 +82,9 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
     def __init__(self, gravity: npt.ArrayLike = (0.0, 0.0, -9.81)) -> None:
         self._directory = Directory(uuid.uuid4().hex)
         self._joints = JoinedNodes(self._directory)
+        self._declarations: list[Declaration] = []
+        self._build_options: dict[str, Any] = {}
+        self._material_names: dict[str, Material] = {}  # of the file that the scene was read from
         self.gravity = gravity
 
     @property
@@ -329,8 +344,129 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         joints = tuple(cast(Joint, self._directory.add(part)) for part in parts)
         return joints if len(joints) > 1 else joints[0]
 
+    # Actuation over time
+
+    def actuate(
+        self, target: Settable | str | None = None, /, *, at: float = 0.0, over: float = 0.0, **values: Any
+    ) -> None:
+        """Set parameters of a part at a given time of every simulation of the scene.
+
+        The simulation calls `Simulation.set` at the first time step that begins at the time `at` or later.
+        `Simulation.equilibrium` does not advance time and therefore applies no actuation.
+
+        Parameters
+        ----------
+        target : handle, str, or pair of bodies
+            Part to change, as in `Simulation.set`. By default the scene.
+        at : float [s]
+            Time, counted from the start of the simulation.
+        over : float [s]
+            Duration of a linear ramp to the values. By default the change is immediate.
+        **values
+            Parameters of the target, as in `Simulation.set`.
+
+        Raises
+        ------
+        ValueError
+            A target that the scene does not have, or a negative time. `build` raises it for a parameter that the
+            target does not have, and for a value out of range.
+
+        Examples
+        --------
+        >>> import withe
+        >>> scene = withe.Scene(gravity=(0, 0, 0))
+        >>> rubber = withe.Material(youngs_modulus=1e6, density=1000.0, viscosity=100.0)
+        >>> arm = scene.add_rod(start=(0, 0, 0), end=(0.3, 0, 0), nodes=31, radius=5e-3, material=rubber)
+        >>> support = scene.clamp(arm.start)
+        >>> scene.actuate(arm, at=0.1, over=0.2, natural_curvature=(5.0, 0.0))
+        >>> simulation = scene.build()
+        >>> record = simulation.run(0.3)
+        >>> simulation.get(arm, "natural_curvature")[0].round(6).tolist()
+        [5.0, 0.0]
+        """
+        add_actuation(self._directory, target, at, over, values)
+
+    # Files
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the scene to a TOML file, which `load` reads and people can edit.
+
+        The file has the arguments of the calls that described the scene, so that the loaded scene equals this one to
+        the last bit. Its keys are the names of the arguments.
+
+        Parameters
+        ----------
+        path : path-like
+            Path of the file, ending in ".toml".
+
+        Returns
+        -------
+        pathlib.Path
+
+        Raises
+        ------
+        ValueError
+            Another suffix, or a Python function in the scene: a load or friction that varies, or a custom force.
+        OSError
+            The file cannot be written.
+
+        Examples
+        --------
+        >>> import withe
+        >>> scene = withe.Scene()
+        >>> rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+        >>> arm = scene.add_rod(start=(0, 0, 0), end=(0.3, 0, 0), nodes=31, radius=5e-3, material=rubber, name="arm")
+        >>> path = scene.save("arm.toml")
+        >>> withe.Scene.load(path)
+        Scene(arm)
+        """
+        return save_scene(self, path)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Scene:
+        """Read a scene from a TOML file.
+
+        Parameters
+        ----------
+        path : path-like
+            File that `save` or a person wrote. The documentation has its keys under "Scenes in files", and
+            ``scene.schema.json`` in this package is its JSON schema, for editors.
+
+        Returns
+        -------
+        Scene
+            `build` uses the options in the table [build] of the file as its defaults.
+
+        Raises
+        ------
+        ValueError
+            A file that is not TOML or describes no scene. The message names the file, the line, and for a misspelt key
+            the key that may be meant.
+        OSError
+            The file, or a CSV file that it names, cannot be opened.
+        """
+        scene = cls()
+        fill(scene, path)
+        return scene
+
     # Simulations
 
+    @property
+    def build_options(self) -> dict[str, Any]:
+        """Options that `build` and `build_batch` use where a call does not give them. Assign a dictionary to set them.
+
+        Raises
+        ------
+        ValueError
+            On assignment: an unknown option, or a value out of range.
+        """
+        return dict(self._build_options)
+
+    @build_options.setter
+    def build_options(self, options: Mapping[str, Any]) -> None:
+        self._build_options = checked_options(options, type(self).build)
+
+    @with_build_options
     @moved_into("solver", Solver, solver="linear_solver", **{word: word for word in _IN_SOLVER})
     def build(
         self,
@@ -409,7 +545,9 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         directory = self._directory.copy()
         if bending == "tangent":
             directory.parts.update({rod.name: rod.without_arcs() for rod in directory.all(RodPart)})
-        return Simulation._build(directory, self._gravity.copy(), options)
+        simulation = Simulation._build(directory, self._gravity.copy(), options)
+        check_actuations(simulation._session)
+        return simulation
 
     @renamed(n="count")
     def build_batch(self, count: int, *, workers: int | None = None, **options: Any) -> Batch:
@@ -439,6 +577,8 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         >>> batch.set(arm, youngs_modulus=[0.8e6, 1.0e6, 1.2e6])
         >>> batch.step(10)
         """
+        if self._directory.actuations:
+            raise ValueError("build_batch does not support actuate(): call batch.set() between steps instead")
         number = validation.integer(count, "count", 1, 1_000_000)
         threads = None if workers is None else validation.integer(workers, "workers", 1, 4096)
         first = self.build(**options)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -43,6 +44,8 @@ class Settings:
         Loads that were added during the simulation, in order.
     ramps : dict of (str, str or None) to float [s]
         Time of the last ramp, by word (or "move") and part.
+    actuated : float [s]
+        Time up to which the actuations of the scene have been applied.
     """
 
     rods: list[RodParameters]
@@ -57,6 +60,7 @@ class Settings:
     frictions: dict[tuple[str, ...], Coefficients] = field(default_factory=dict)
     loads: dict[str, LoadPart] = field(default_factory=dict)
     ramps: dict[tuple[str, str | None], float] = field(default_factory=dict)
+    actuated: float = -math.inf
 
     def copy(self) -> Settings:
         """Return an independent copy. Values are never changed in place."""
@@ -73,4 +77,5 @@ class Settings:
             dict(self.frictions),
             dict(self.loads),
             dict(self.ramps),
+            self.actuated,
         )

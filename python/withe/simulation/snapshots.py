@@ -129,6 +129,7 @@ class Snapshot:
                 arrays[f"load_{number}_axis"] = load.axis
         header = {
             "time": self._time,
+            "actuated": None if settings.actuated < 0.0 else settings.actuated,
             "rods": len(settings.rods),
             "masses": settings.masses,
             "drags": settings.drags,
@@ -202,6 +203,7 @@ class Snapshot:
             supports=supports,
             paths=paths,
             loads=loads,
+            actuated=_actuated(header),
         )
         missing = tuple(str(name) for name in header["functions"])
         fields = tuple(tuple(str(name) for name in names) for names in header["friction_fields"])
@@ -309,6 +311,11 @@ def _matched(snapshot: Snapshot, mine: Settings, directory: Directory, scene: Di
                 f"snapshot files do not store functions of time: set the function of {name!r} on this simulation first"
             )
     return settings
+
+
+def _actuated(header: dict[str, Any]) -> float:
+    value = header.get("actuated")
+    return -math.inf if value is None else validation.non_negative(value, "actuated")
 
 
 def _read_path(arrays: dict[str, npt.NDArray[Any]], prefix: str) -> Turn | Waypoints | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
@@ -27,6 +28,7 @@ from withe.simulation.linearisation import Linearisation, Stability
 from withe.simulation.loads import load_index
 from withe.simulation.paths import EquilibriumPath, PathOptions, path_of
 from withe.simulation.readouts import Equilibrium
+from withe.simulation.schedule import apply_due, next_time, steps_until_next
 from withe.simulation.session import Session
 from withe.simulation.supports import find_support
 from withe.simulation.unknowns import Unknown
@@ -71,13 +73,25 @@ class Stepping:
 
     def step(self, count: int) -> None:
         """Advance by time steps."""
-        with self._convergence():
-            self.session.world.step(count, step_callback(self.session), force_function(self.session))
+        while count > 0:
+            steps = count
+            if self.session.scene.actuations:
+                apply_due(self.session)
+                steps = steps_until_next(self.session, count)
+            with self._convergence():
+                self.session.world.step(steps, step_callback(self.session), force_function(self.session))
+            count -= steps
 
     def advance_to(self, time: float) -> None:
         """Advance to a time, with steps of equal length that are no longer than the time step."""
-        with self._convergence():
-            self.session.world.advance_to(time, step_callback(self.session), force_function(self.session))
+        then = -math.inf
+        while then < time:
+            then = time
+            if self.session.scene.actuations:
+                apply_due(self.session)
+                then = min(time, next_time(self.session))
+            with self._convergence():
+                self.session.world.advance_to(then, step_callback(self.session), force_function(self.session))
 
     def equilibrium(self, stable: bool) -> Equilibrium:
         """Go to the equilibrium that the present state leads to; see `Simulation.equilibrium`."""
