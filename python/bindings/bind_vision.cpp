@@ -15,6 +15,7 @@
 #include "common/check.hpp"
 #include "vision/color_image.hpp"
 #include "vision/crossing_order.hpp"
+#include "vision/ground_mask.hpp"
 #include "vision/labels.hpp"
 #include "vision/mbest.hpp"
 #include "vision/thinning.hpp"
@@ -135,6 +136,15 @@ Bytes foreground_mask(const Bytes& image, int contrast) {
   return mask;
 }
 
+Bytes ground_mask(const Bytes& image, int contrast) {
+  const ColorImage picture = to_image(image);
+  Bytes mask({picture.height, picture.width});
+  std::uint8_t* pixels = mask.mutable_data();
+  const py::gil_scoped_release release;
+  withe::ground_mask(picture, contrast, pixels);
+  return mask;
+}
+
 }  // namespace
 
 void register_vision(py::module_& module) {
@@ -147,6 +157,8 @@ void register_vision(py::module_& module) {
   module.def("hsv_mask", &hsv_mask, py::arg("image"), py::arg("ranges"), "Pixels whose colour is in a range.");
   module.def("foreground_mask", &foreground_mask, py::arg("image"), py::arg("contrast"),
              "Pixels whose colour is far from that of the border.");
+  module.def("ground_mask", &ground_mask, py::arg("image"), py::arg("contrast"),
+             "Pixels that differ from the ground beneath by more than a shadow can.");
   module.def("trace_lines", &trace_lines, py::arg("mask"), py::arg("image") = py::none(), py::arg("method") = "withe",
              "Every line in a mask, in order, and labels.");
 }

@@ -7,7 +7,7 @@
 
 from withe.perception.camera import Camera
 from withe.perception.drawing import draw
-from withe.perception.masks import border_filter, color_filter, network_mask
+from withe.perception.masks import border_filter, color_filter, ground_filter, network_mask
 from withe.perception.results import Ambiguity, Crossing, Joint, Tracing
 from withe.perception.tags import TagDetection, detect_tags
 from withe.perception.tracing import trace, trace_mask

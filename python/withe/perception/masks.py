@@ -1,4 +1,4 @@
-"""Masks of cable pixels: by colour, by contrast with the border, or by a network."""
+"""Masks of cable pixels: by contrast with the ground or the border, by colour, or by a network."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from withe import _core
 from withe.common.extras import require
 
-__all__ = ["MaskFunction", "border_filter", "color_filter", "network_mask"]
+__all__ = ["MaskFunction", "border_filter", "color_filter", "ground_filter", "network_mask"]
 
 Image = NDArray[np.uint8]
 MaskFunction = Callable[[Image], Any]
@@ -21,8 +21,37 @@ Range = tuple[Sequence[int], Sequence[int]]
 _HIGHEST = (180, 255, 255)
 
 
+def ground_filter(image: Image, contrast: int = 25) -> NDArray[np.bool_]:
+    """Return the pixels that differ from the ground by more than a shadow can. This is the default filter.
+
+    The filter suits cables on a ground of one colour or of weak texture, such as plain wood, under uneven light and
+    with soft shadows. It does not find a cable whose colour is a shade of the ground.
+
+    Parameters
+    ----------
+    image : ndarray of uint8, shape (height, width, 3)
+        Red, green, blue.
+    contrast : int
+        Least difference of a cable from the ground [grey levels].
+
+    Returns
+    -------
+    ndarray of bool, shape (height, width)
+
+    Notes
+    -----
+    The logarithms of the channels are compared with a quadratic surface through the ground, fitted by robust least
+    squares. A shadow lowers the three logarithms alike, to no less than 0.26 of the light. A pixel therefore counts if
+    its ratios of the channels differ, if it is brighter than the ground, or if it is darker than a shadow. Thresholds
+    are five standard deviations of the ground. On a ground so dark that its shadows are below `contrast`, the result is
+    that of `border_filter`.
+    """
+    mask: NDArray[np.bool_] = _core.ground_mask(image, contrast).view(np.bool_)
+    return mask
+
+
 def border_filter(image: Image, contrast: int = 25) -> NDArray[np.bool_]:
-    """Return the pixels that differ from the median colour of the image's border. This is the default filter.
+    """Return the pixels that differ from the median colour of the image's border.
 
     The threshold on the largest difference of a channel is the one that separates two classes best (Otsu). It uses
     square roots, so that dark cables are found beside bright ones.

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from withe import _core
 from withe.common.extras import require
-from withe.perception.masks import MaskFunction, border_filter
+from withe.perception.masks import MaskFunction, ground_filter
 from withe.perception.results import Ambiguity, Crossing, Joint, Tracing
 
 __all__ = ["check_image", "check_mask", "read_image", "trace", "trace_mask"]
@@ -114,7 +114,7 @@ def trace(
         A file, or red, green and blue as uint8. One channel (grey) and a fourth (alpha, ignored) are accepted.
     mask : array_like of shape (height, width), or callable, optional
         Pixels of cables: booleans or numbers, or a function from the picture to such an array, as `color_filter` and
-        `network_mask` return. By default the pixels that differ from the border (`border_filter`).
+        `network_mask` return. By default the pixels that differ from the ground (`ground_filter`).
     method : {"withe", "mbest"}
         Method of this package, or the published one for comparison.
 
@@ -141,7 +141,7 @@ def trace(
     picture = read_image(image) if isinstance(image, str | os.PathLike) else check_image(image)
     started = time.perf_counter()
     if mask is None:
-        mask = border_filter
+        mask = ground_filter
     pixels = check_mask(mask(picture) if callable(mask) else mask)
     masked = time.perf_counter() - started
     if pixels.shape != picture.shape[:2]:
