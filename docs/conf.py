@@ -17,6 +17,7 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
     "sphinx.ext.napoleon",
+    "sphinx.ext.viewcode",
     "sphinx_copybutton",
     "sphinx_design",
 ]
@@ -37,6 +38,7 @@ napoleon_use_ivar = True
 napoleon_use_param = False
 napoleon_use_rtype = False
 default_role = "code"
+maximum_signature_line_length = 80  # a longer signature has a line for each argument
 
 html_theme = "furo"
 html_title = f"withe {release}"
@@ -45,3 +47,9 @@ html_css_files = ["wide.css"]
 html_theme_options = {"navigation_with_keys": True}
 
 pages.write(Path(__file__).parent)
+
+
+def setup(app: object) -> None:
+    """Connect the functions that complete and check the reference."""
+    app.connect("autodoc-process-docstring", pages.process_docstring, priority=900)  # after napoleon
+    app.connect("env-check-consistency", pages.report_missing)

@@ -4,7 +4,11 @@ import importlib
 import inspect
 import json
 import re
+import types
+from collections.abc import Iterator
+from functools import cache, cached_property
 from pathlib import Path
+from typing import Any
 
 MODULES = {
     "withe": "Scenes, simulations and records",
@@ -80,11 +84,108 @@ def name_page(module: str, name: str) -> list[str]:
     value = getattr(importlib.import_module(module), name)
     lines = [f"# {module}.{name}", "", "```{eval-rst}", f".. currentmodule:: {module}", ""]
     if inspect.isclass(value):
-        bases = "Env, Exception, VectorEnv, object, tuple"  # whose members are documented elsewhere
-        lines += [f".. autoclass:: {name}", "   :members:", f"   :inherited-members: {bases}"]
-    else:
-        lines += [f".. autofunction:: {name}" if inspect.isroutine(value) else f".. autodata:: {name}"]
+        return [*lines, f".. autoclass:: {name}", "```", *member_sections(module, name, value)]
+    lines += [f".. autofunction:: {name}" if inspect.isroutine(value) else f".. autodata:: {name}"]
     return [*lines, "```"]
+
+
+def member_sections(module: str, name: str, owner: type) -> list[str]:
+    """Return tables of the members of a class by purpose, and a section for each purpose."""
+    groups = purposes(owner)
+    begin = ["", "```{eval-rst}", f".. currentmodule:: {module}", ""]
+    lines = list(begin)
+    for purpose, names in groups.items():
+        lines += [f".. rubric:: {purpose}", "", ".. autosummary::", "   :nosignatures:", ""]
+        lines += [f"   ~{name}.{member}" for member in names] + [""]
+    lines += ["```"]
+    own = dict(members(owner))
+    for purpose, names in groups.items():
+        lines += ["", f"## {purpose}", *begin]
+        for member in names:
+            kind = "autoproperty" if isinstance(own[member], property | cached_property) else "automethod"
+            lines += [f".. {kind}:: {name}.{member}"]
+        lines += ["```"]
+    return lines
+
+
+CONTENTS = "Methods and properties by purpose:"
+"""Line of a docstring above a list of members by purpose, "* purpose: `member`, ...", which ends at an empty line."""
+
+
+def purposes(owner: type) -> dict[str, list[str]]:
+    """Return the members of a class by purpose, in the order of its docstring, or methods and properties apart."""
+    own = dict(members(owner))
+    groups: dict[str, list[str]] = {}
+    _, found, text = (owner.__doc__ or "").partition(CONTENTS + "\n")
+    if found:
+        for row in re.split(r"\n\s*\n", text.strip("\n"))[0].split("* ")[1:]:
+            groups[row.split(":")[0].strip().capitalize()] = re.findall(r"`(\w+)`", row)
+    else:
+        properties = [each for each in own if isinstance(own[each], property | cached_property)]
+        groups = {"Methods": [each for each in own if each not in properties], "Properties": properties}
+    old = [name for name in own if (own[name].__doc__ or "").startswith("Deprecated")]
+    groups = {purpose: [name for name in names if name not in old] for purpose, names in groups.items()}
+    return {purpose: names for purpose, names in (groups | {"Old names": old}).items() if names}
+
+
+def members(owner: type) -> Iterator[tuple[str, Any]]:
+    """Yield the public methods and properties of a class that the package defines."""
+    for name in dir(owner):
+        if name.startswith("_"):
+            continue
+        home = next(each for each in owner.__mro__ if name in vars(each))
+        found = vars(home)[name]
+        documented = inspect.isroutine(found) or isinstance(found, property | cached_property)
+        if documented and home.__module__.partition(".")[0] == "withe":
+            yield name, found
+
+
+@cache
+def names_by_id() -> dict[int, str]:
+    """Return the public names by the id of their value."""
+    found = {module: importlib.import_module(module) for module in MODULES}
+    return {
+        id(getattr(value, name)): f"{module}.{name}" for module, value in found.items() for name in public_names(module)
+    }
+
+
+def overridden(owner: type, member: str) -> tuple[str, Any] | None:
+    """Return name and function of the public method that a method of a class overrides; None if there is none."""
+    public = names_by_id()
+    homes = [each for each in owner.__mro__ if member in vars(each)]
+    for base in homes[1:]:
+        if id(base) in public and isinstance(vars(base)[member], types.FunctionType):
+            return f"{public[id(base)]}.{member}", vars(base)[member]
+    return None
+
+
+def process_docstring(app: Any, what: str, name: str, value: Any, options: Any, lines: list[str]) -> None:
+    """Leave the contents of a class to the tables of its page, and name the method that a method overrides."""
+    if what == "class" and CONTENTS in lines:
+        first = lines.index(CONTENTS)
+        last = next(place for place in range(first + 2, len(lines)) if not lines[place].strip())
+        del lines[first : last + 1]
+    elif what == "method" and not any(line.startswith((":param", ":Parameters:", "   :param")) for line in lines):
+        module, owner, member = name.rsplit(".", 2)
+        found = overridden(getattr(importlib.import_module(module), owner), member)
+        if found is not None:
+            lines += ["", f"Arguments and result are those of :meth:`{found[0]}`.", ""]
+
+
+def report_missing(app: Any, environment: Any) -> None:
+    """Warn of public names, and members of public classes, that no page describes."""
+    from sphinx.util import logging
+
+    described = environment.get_domain("py").objects
+    for module in MODULES:
+        for name in public_names(module):
+            value = getattr(importlib.import_module(module), name)
+            wanted = [f"{module}.{name}"]
+            if inspect.isclass(value):
+                wanted += [f"{module}.{name}.{member}" for member, _ in members(value)]
+            for each in wanted:
+                if each not in described:
+                    logging.getLogger(__name__).warning("%s is public, and the reference lacks it", each)
 
 
 def rooms(folder: Path) -> None:

@@ -13,6 +13,9 @@ by rounding, so set it to "baseline" everywhere to find the same bits on unlike 
 from withe import deployment, folding, knots, learning, perception, real2sim, shapes, view
 from withe._core import __version__
 from withe.batch import Batch
+from withe.batch.records import BatchRecord, Equilibria
+from withe.common.frames import EnergyHistory
+from withe.common.outlines import ObstacleOutline, RodOutline, SpringOutline, TendonOutline
 from withe.errors import (
     BranchChangedWarning,
     CoarseMeshWarning,
@@ -44,10 +47,13 @@ from withe.parts.handles import (
 )
 from withe.parts.materials import Circle, Material, Rectangle, Stiffness, Tube
 from withe.parts.options import Solver
+from withe.parts.sections import SectionProperties
 from withe.parts.torsion_springs import TorsionSpring
 from withe.recording.record import Record
 from withe.scene.scene import Scene
+from withe.simulation.hands import Deflection, HeldPose, Passage, RunningHand
 from withe.simulation.linearisation import Linearisation
+from withe.simulation.paths import EquilibriumPath
 from withe.simulation.readouts import Energy, Equilibrium, Momentum, Plan, Reaction, RodEnergy, Statistics
 from withe.simulation.running import run_many
 from withe.simulation.simulation import Simulation
@@ -55,20 +61,26 @@ from withe.simulation.snapshots import Snapshot
 
 __all__ = [
     "Batch",
+    "BatchRecord",
     "BranchChangedWarning",
     "Circle",
     "CoarseMeshWarning",
     "CoarseStepWarning",
     "ConvergenceError",
     "CustomForce",
+    "Deflection",
     "Drag",
     "EdgeHandle",
     "Energy",
     "EnergyDriftWarning",
+    "EnergyHistory",
+    "Equilibria",
     "Equilibrium",
+    "EquilibriumPath",
     "Fluid",
     "FrictionMap",
     "Hand",
+    "HeldPose",
     "Joint",
     "Linearisation",
     "Load",
@@ -77,7 +89,9 @@ __all__ = [
     "Momentum",
     "NodeHandle",
     "Obstacle",
+    "ObstacleOutline",
     "OutOfPlaneWarning",
+    "Passage",
     "Plan",
     "PlausibilityWarning",
     "Reaction",
@@ -87,16 +101,21 @@ __all__ = [
     "Rod",
     "RodCrossingWarning",
     "RodEnergy",
+    "RodOutline",
+    "RunningHand",
     "Scene",
+    "SectionProperties",
     "Simulation",
     "Snapshot",
     "Solver",
     "Spring",
+    "SpringOutline",
     "SqueezedRodWarning",
     "Statistics",
     "Stiffness",
     "Support",
     "Tendon",
+    "TendonOutline",
     "TorsionSpring",
     "Tube",
     "__version__",

@@ -112,6 +112,11 @@ class ConvergenceError(RuntimeError):
 
     The simulation keeps its last accepted state, so it can be read, changed and continued.
 
+    Parameters
+    ----------
+    message : str
+        Text of the error.
+
     Attributes
     ----------
     time : float [s]

@@ -173,7 +173,29 @@ def reef_knot(
 def granny_knot(
     *, length: float = 1.0, radius: float = 2e-3, nodes: int | None = None, tails: Tails = "up"
 ) -> FloatArray:
-    """Points of a loose granny knot: like `reef_knot`, with two half knots of the same handedness."""
+    """Return the points of a loose granny knot: like `reef_knot`, with two half knots of the same handedness.
+
+    Parameters
+    ----------
+    length : float [m]
+        Length of the whole rod.
+    radius : float [m]
+        Radius of the section.
+    nodes : int
+        Number of nodes. By default 301, or more if edges would be longer than 9 radii, which would cut off the bends.
+    tails : {"up", "sideways"}
+        Direction of the ends: along +z, or along x, away from each other, as if they were pulled apart.
+
+    Returns
+    -------
+    ndarray of shape (nodes, 3) [m]
+        Evenly spaced points; the loop hangs below.
+
+    Raises
+    ------
+    ValueError
+        A length too small for the knot, too few nodes for the length, or unknown tails.
+    """
     return _two_half_knots(1.0, length, radius, nodes, tails)
 
 
@@ -275,7 +297,7 @@ def _even(points: FloatArray, nodes: int, length: float, braid_radius: float) ->
 
 
 def writhe(points: npt.ArrayLike, closed: bool = False) -> float:
-    """Return the writhe of a polygon [turns]. The ends of an open polygon are continued straight to infinity.
+    """Return the writhe of a polygon. The ends of an open polygon are continued straight to infinity.
 
     The Gauss integral over each pair of edges is the area that their directions sweep on the sphere
     [Klenin and Langowski 2000, method 1a].
@@ -288,7 +310,7 @@ def writhe(points: npt.ArrayLike, closed: bool = False) -> float:
 
     Returns
     -------
-    float
+    float [turns]
 
     Raises
     ------
@@ -309,7 +331,30 @@ def writhe(points: npt.ArrayLike, closed: bool = False) -> float:
 
 
 def link(points: FloatArray, directors: FloatArray, closed: bool) -> float:
-    """Twist of material frames, shape (edges, 3, 3), over parallel transport, and writhe of the polygon [turns]."""
+    """Return the twist of material frames over parallel transport, plus the writhe of the polygon.
+
+    Parameters
+    ----------
+    points : ndarray of shape (nodes, 3) [m]
+        Nodes of the rod.
+    directors : ndarray of shape (edges, 3, 3)
+        Material frames of the edges, with rows d1, d2, tangent.
+    closed : bool
+        True if the last point is joined to the first.
+
+    Returns
+    -------
+    float [turns]
+
+    Raises
+    ------
+    ValueError
+        See `writhe`.
+
+    See Also
+    --------
+    writhe : Writhe alone.
+    """
     first, tangent = directors[:, 0], directors[:, 2]
     stencils = len(first) - (0 if closed else 1)
     _, twists = natural_shape(tangent, first, np.ones(stencils), closed)
@@ -344,6 +389,11 @@ def signed_crossings(points: npt.ArrayLike, direction: npt.ArrayLike = (0.0, 0.0
     Returns
     -------
     int
+
+    Raises
+    ------
+    ValueError
+        A wrong shape, values that are not finite, or a direction of length zero.
     """
     x = _polygon(points, 1, False)
     view = validation.unit_vector(direction, "direction")
@@ -380,7 +430,7 @@ def alexander_polynomial(points: npt.ArrayLike, closed: bool = False) -> npt.NDA
 
     Returns
     -------
-    ndarray of int
+    ndarray of int of shape (degree + 1,)
         Coefficients from the lowest power of t on. The first is not zero, and they sum to 1.
 
     Raises

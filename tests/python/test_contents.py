@@ -16,7 +16,7 @@ def table(kind):
     return [(row.split(":")[0].strip(), re.findall(r"`(\w+)`", row)) for row in rows.split("* ")[1:]]
 
 
-@pytest.mark.parametrize("kind", [withe.Scene, withe.Simulation])
+@pytest.mark.parametrize("kind", [withe.Scene, withe.Simulation, withe.Batch, withe.Record])
 def test_every_public_method_stands_in_the_contents_exactly_once(kind):
     listed = [name for _, names in table(kind) for name in names]
     assert sorted(listed) == sorted(name for name in dir(kind) if not name.startswith("_"))

@@ -43,6 +43,17 @@ class Batch(Setting, Reading):
     be set, read, moved and clamped between steps. A simulation whose step does not converge has failed: it keeps its
     last accepted state and does not step until it is restored, reset or replaced. The other simulations continue.
 
+    Methods and properties by purpose:
+
+    * describe: `set`, for every parameter; old names are `set_natural_curvature`, `set_natural_twist` and
+      `set_natural_stretch`
+    * hold: `move`
+    * run: `step`, `run`, `equilibrium`, `failed`, `failures`, `snapshot`, `restore`, `reset`, `copy`
+    * read the batch: `lanes`, `workers`, `time`, `time_step`, `rods`, `get`, `energy`, `momentum`, `statistics`
+    * read rods: `positions`, `velocities`, `directors`, `spins`, `curvatures`, `twists`, `tensions`
+    * read parts: `reaction`, `wrench`, `joint_angle`, `joint_rate`, `joint_torque`, `spring_tension`,
+      `tendon_length`, `tendon_points`, `obstacle_position`, `contacts`
+
     Parameters
     ----------
     simulations : iterable of Simulation
@@ -56,6 +67,12 @@ class Batch(Setting, Reading):
     ValueError
         No simulation, an object that is not a simulation, a simulation given twice or of another shape, or workers
         below 1.
+
+    See Also
+    --------
+    Scene.build_batch : Make a batch of one scene.
+    run_many : Run many simulations in processes or on a cluster.
+    withe.learning.VectorEnvironment : A batch as an environment for reinforcement learning.
 
     Examples
     --------
@@ -140,6 +157,11 @@ class Batch(Setting, Reading):
         RuntimeError
             Called by a callback, or while another thread runs one of them.
 
+        See Also
+        --------
+        run : Advance by a duration and record frames.
+        failed : Simulations whose step did not converge.
+
         Examples
         --------
         >>> batch = scene.build_batch(4)
@@ -217,6 +239,12 @@ class Batch(Setting, Reading):
         KeyboardInterrupt, or the exception of a callback
             The run ended early. `record` of each simulation holds the frames until then.
 
+        See Also
+        --------
+        step : Advance without records.
+        BatchRecord : The records of all simulations.
+        Simulation.run : Run one simulation.
+
         Examples
         --------
         >>> batch = scene.build_batch(3, time_step=5e-3)
@@ -247,6 +275,18 @@ class Batch(Setting, Reading):
         Equilibria
             Arrays with one entry per simulation, and the `Equilibrium` of each. A simulation without an equilibrium
             keeps its state; `failures` of the result holds the errors.
+
+        Raises
+        ------
+        ValueError
+            A lane that does not exist.
+        RuntimeError
+            Called by a callback of a run.
+
+        See Also
+        --------
+        Simulation.equilibrium : How an equilibrium is found.
+        Equilibria : Results of all simulations.
 
         Examples
         --------
@@ -311,6 +351,20 @@ class Batch(Setting, Reading):
         ----------
         lanes : array_like of shape (n,), bool, or of numbers, optional
             Simulations to read. By default all.
+
+        Returns
+        -------
+        tuple of Snapshot
+            One snapshot per chosen simulation.
+
+        Raises
+        ------
+        ValueError
+            A lane that does not exist.
+
+        See Also
+        --------
+        restore : Return to the states.
         """
         return tuple(simulation.snapshot() for _, simulation in self._lanes.each(self._lanes.chosen(lanes)))
 
@@ -331,6 +385,11 @@ class Batch(Setting, Reading):
             simulation is changed.
         RuntimeError
             Called by a callback of a run.
+
+        See Also
+        --------
+        snapshot : Keep the present states.
+        reset : Return to the states after `Scene.build`.
 
         Examples
         --------
@@ -371,6 +430,10 @@ class Batch(Setting, Reading):
         RuntimeError
             Called by a callback of a run.
 
+        See Also
+        --------
+        restore : Return to any snapshots.
+
         Examples
         --------
         >>> batch = scene.build_batch(3)
@@ -383,7 +446,13 @@ class Batch(Setting, Reading):
         self.restore([simulation._initial for _, simulation in self._lanes.each(numbers)], numbers)
 
     def copy(self) -> Batch:
-        """Return an independent batch in the same state, in which failed simulations can step again."""
+        """Return an independent batch in the same state, in which failed simulations can step again.
+
+        Returns
+        -------
+        Batch
+            A change of one of the two does not affect the other.
+        """
         return Batch([simulation.copy() for simulation in self], self.workers)
 
     def __copy__(self) -> Batch:

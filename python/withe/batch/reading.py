@@ -2,14 +2,46 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal, overload
 
 import numpy as np
 import numpy.typing as npt
 
 from withe.batch.lanes import Lanes, output
-from withe.parts.handles import Hand, Joint, NodeHandle, Obstacle, Rod, Spring, Support, Tendon
+from withe.parts.handles import (
+    Drag,
+    Fluid,
+    Hand,
+    Joint,
+    Load,
+    Mass,
+    NodeHandle,
+    Obstacle,
+    Rod,
+    Spring,
+    Support,
+    Tendon,
+)
+from withe.parts.torsion_springs import TorsionSpring
 from withe.simulation.readouts import Energy, Momentum, Reaction, RodEnergy, Statistics
+from withe.simulation.typed_words import (
+    Body,
+    DragWord,
+    FluidNumber,
+    JointWord,
+    LoadVector,
+    MassWord,
+    MaterialWord,
+    ObstacleNumber,
+    ObstacleVector,
+    PairNumber,
+    RodArray,
+    SceneNumber,
+    SpringWord,
+    SupportVector,
+    TendonWord,
+    TorsionWord,
+)
 
 __all__ = ["Reading"]
 
@@ -50,6 +82,11 @@ class Reading:
         ValueError
             Not a rod of this scene, or an `out` of another shape, type or layout.
 
+        See Also
+        --------
+        velocities : Velocities of the same nodes.
+        Simulation.positions : Positions in one simulation.
+
         Examples
         --------
         >>> batch = scene.build_batch(3)
@@ -59,80 +96,372 @@ class Reading:
         return _of_nodes(self._lanes, "positions", rod, out)
 
     def velocities(self, rod: Rod | str | None = None, out: FloatArray | None = None) -> FloatArray:
-        """Return the velocities of the nodes of a rod, or of all nodes, shape (n, nodes, 3) [m/s]."""
+        """Return the velocities of the nodes of a rod, or of all nodes of the scene.
+
+        Parameters
+        ----------
+        rod : Rod or str, optional
+            Rod to read. By default all nodes of the scene.
+        out : ndarray of shape (n, nodes, 3), float64, optional
+            Array that is filled and returned.
+
+        Returns
+        -------
+        ndarray of shape (n, nodes, 3) [m/s]
+
+        Raises
+        ------
+        ValueError
+            Not a rod of this scene, or an `out` of another shape, type or layout.
+
+        See Also
+        --------
+        positions : Positions of the same nodes.
+        """
         return _of_nodes(self._lanes, "velocities", rod, out)
 
     def directors(self, rod: Rod | str, out: FloatArray | None = None) -> FloatArray:
-        """Return the material frames of the edges, shape (n, edges, 3, 3), with rows d1, d2, tangent."""
+        """Return the material frames of the edges of a rod.
+
+        Parameters
+        ----------
+        rod : Rod or str
+            Rod to read.
+        out : ndarray of shape (n, edges, 3, 3), float64, optional
+            Array that is filled and returned.
+
+        Returns
+        -------
+        ndarray of shape (n, edges, 3, 3)
+            The rows of each frame are the unit vectors d1, d2 and the tangent.
+
+        Raises
+        ------
+        ValueError
+            Not a rod of this scene, or an `out` of another shape, type or layout.
+        """
         part = self._lanes.rod(rod)
         return _read(self._lanes, "directors", part.index, (len(part.lengths), 3, 3), out)
 
     def curvatures(self, rod: Rod | str, out: FloatArray | None = None) -> FloatArray:
-        """Return the curvatures towards d1 and d2, shape (n, stencils, 2) [1/m]."""
+        """Return the curvatures of a rod towards its directors d1 and d2.
+
+        Parameters
+        ----------
+        rod : Rod or str
+            Rod to read.
+        out : ndarray of shape (n, stencils, 2), float64, optional
+            Array that is filled and returned.
+
+        Returns
+        -------
+        ndarray of shape (n, stencils, 2) [1/m]
+
+        Raises
+        ------
+        ValueError
+            Not a rod of this scene, or an `out` of another shape, type or layout.
+        """
         part = self._lanes.rod(rod)
         return _read(self._lanes, "curvatures", part.index, (len(part.voronoi), 2), out)
 
     def twists(self, rod: Rod | str, out: FloatArray | None = None) -> FloatArray:
-        """Return the twists per length, shape (n, stencils) [rad/m]."""
+        """Return the twists per length of a rod.
+
+        Parameters
+        ----------
+        rod : Rod or str
+            Rod to read.
+        out : ndarray of shape (n, stencils), float64, optional
+            Array that is filled and returned.
+
+        Returns
+        -------
+        ndarray of shape (n, stencils) [rad/m]
+
+        Raises
+        ------
+        ValueError
+            Not a rod of this scene, or an `out` of another shape, type or layout.
+        """
         part = self._lanes.rod(rod)
         return _read(self._lanes, "twists", part.index, (len(part.voronoi),), out)
 
     def tensions(self, rod: Rod | str, out: FloatArray | None = None) -> FloatArray:
-        """Return the tension of each edge, as `Simulation.tensions`, shape (n, edges) [N]."""
+        """Return the tension of each edge of a rod. See `Simulation.tensions`.
+
+        Parameters
+        ----------
+        rod : Rod or str
+            Rod to read.
+        out : ndarray of shape (n, edges), float64, optional
+            Array that is filled and returned.
+
+        Returns
+        -------
+        ndarray of shape (n, edges) [N]
+
+        Raises
+        ------
+        ValueError
+            Not a rod of this scene, or an `out` of another shape, type or layout.
+        """
         part = self._lanes.rod(rod)
         return _read(self._lanes, "tensions", part.index, (len(part.lengths),), out)
 
     def spins(self, rod: Rod | str, out: FloatArray | None = None) -> FloatArray:
-        """Return the angular velocities of the edges about their tangents, shape (n, edges) [rad/s]."""
+        """Return the angular velocities of the edges of a rod about their tangents.
+
+        Parameters
+        ----------
+        rod : Rod or str
+            Rod to read.
+        out : ndarray of shape (n, edges), float64, optional
+            Array that is filled and returned.
+
+        Returns
+        -------
+        ndarray of shape (n, edges) [rad/s]
+
+        Raises
+        ------
+        ValueError
+            Not a rod of this scene, or an `out` of another shape, type or layout.
+        """
         part = self._lanes.rod(rod)
         return _read(self._lanes, "spins", part.index, (len(part.lengths),), out)
 
     def energy(self, rod: Rod | str | None = None) -> Energy | RodEnergy:
-        """Return the energies of every simulation, or of one rod in each; each field has shape (n,) [J]."""
+        """Return the energies of every simulation, or of one rod in each.
+
+        Parameters
+        ----------
+        rod : Rod or str, optional
+            Rod whose energies are returned.
+
+        Returns
+        -------
+        Energy or RodEnergy
+            Each field has shape (n,) [J].
+
+        Raises
+        ------
+        ValueError
+            Not a rod of this scene.
+
+        See Also
+        --------
+        Simulation.energy : Energies of one simulation.
+        """
         return self._lanes.gathered(lambda s: s.energy() if rod is None else s.energy(rod))  # type: ignore[no-any-return]
 
     def momentum(self) -> Momentum:
-        """Return the linear and angular momentum of every simulation, each of shape (n, 3)."""
+        """Return the linear and angular momentum of every simulation.
+
+        Returns
+        -------
+        Momentum
+            Each field has shape (n, 3), linear [kg m/s] and angular [kg m^2/s].
+
+        See Also
+        --------
+        Simulation.momentum : Momentum of one simulation.
+        """
         return self._lanes.gathered(lambda s: s.momentum())  # type: ignore[no-any-return]
 
     def reaction(self, support: Support | NodeHandle | str) -> Reaction:
-        """Return the force and moment of a support on its rod, each of shape (n, 3) [N], [N m]."""
+        """Return the force and moment of a support on its rod.
+
+        Parameters
+        ----------
+        support : Support, NodeHandle or str
+            The support, or its node.
+
+        Returns
+        -------
+        Reaction
+            Force of shape (n, 3) [N] and moment of shape (n, 3) [N m].
+
+        Raises
+        ------
+        ValueError
+            The node has no support.
+
+        See Also
+        --------
+        Simulation.reaction : Reaction in one simulation.
+        """
         return self._lanes.gathered(lambda s: s.reaction(support))  # type: ignore[no-any-return]
 
     def wrench(self, hand: Hand | str) -> Reaction:
-        """Return the force and moment of a hand on its rod, about the hand, each of shape (n, 3) [N], [N m]."""
+        """Return the total force and moment of a hand on its rod, about the hand.
+
+        Parameters
+        ----------
+        hand : Hand or str
+            The hand.
+
+        Returns
+        -------
+        Reaction
+            Force of shape (n, 3) [N] and moment of shape (n, 3) [N m].
+
+        Raises
+        ------
+        ValueError
+            Not a hand, or a released one.
+
+        See Also
+        --------
+        Simulation.wrench : Force and moment in one simulation.
+        """
         return self._lanes.gathered(lambda s: s.wrench(hand))  # type: ignore[no-any-return]
 
     def spring_tension(self, spring: Spring | str) -> FloatArray:
-        """Return the tension of a spring and its damper, shape (n,) [N]."""
+        """Return the force of a spring and its damper, positive in tension.
+
+        Parameters
+        ----------
+        spring : Spring or str
+            Spring to read.
+
+        Returns
+        -------
+        ndarray of shape (n,) [N]
+
+        Raises
+        ------
+        ValueError
+            Not a spring of this scene.
+        """
         return self._lanes.gathered(lambda s: s.spring_tension(spring))  # type: ignore[no-any-return]
 
     def tendon_length(self, tendon: Tendon | str) -> FloatArray:
-        """Return the length of a tendon from its first guide to its last, shape (n,) [m]."""
+        """Return the length of a tendon from its first guide to its last.
+
+        Parameters
+        ----------
+        tendon : Tendon or str
+            Tendon to read.
+
+        Returns
+        -------
+        ndarray of shape (n,) [m]
+
+        Raises
+        ------
+        ValueError
+            Not a tendon of this scene.
+        """
         return self._lanes.gathered(lambda s: s.tendon_length(tendon))  # type: ignore[no-any-return]
 
     def tendon_points(self, tendon: Tendon | str) -> FloatArray:
-        """Return the positions of the guides of a tendon, shape (n, guides, 3) [m]."""
+        """Return the positions of the guides of a tendon.
+
+        Parameters
+        ----------
+        tendon : Tendon or str
+            Tendon to read.
+
+        Returns
+        -------
+        ndarray of shape (n, guides, 3) [m]
+
+        Raises
+        ------
+        ValueError
+            Not a tendon of this scene.
+        """
         return self._lanes.gathered(lambda s: s.tendon_points(tendon))  # type: ignore[no-any-return]
 
     def joint_angle(self, joint: Joint | str) -> FloatArray:
-        """Return the angle of a revolute joint since the drawing, shape (n,) [rad]."""
+        """Return the angle of a revolute joint since the drawing.
+
+        Parameters
+        ----------
+        joint : Joint or str
+            Revolute joint to read.
+
+        Returns
+        -------
+        ndarray of shape (n,) [rad]
+
+        Raises
+        ------
+        ValueError
+            Not a revolute joint of this scene.
+        """
         return self._lanes.gathered(lambda s: s.joint_angle(joint))  # type: ignore[no-any-return]
 
     def joint_rate(self, joint: Joint | str) -> FloatArray:
-        """Return the rate of `joint_angle`, shape (n,) [rad/s]."""
+        """Return the rate of `joint_angle`.
+
+        Parameters
+        ----------
+        joint : Joint or str
+            Revolute joint to read.
+
+        Returns
+        -------
+        ndarray of shape (n,) [rad/s]
+
+        Raises
+        ------
+        ValueError
+            Not a revolute joint of this scene.
+        """
         return self._lanes.gathered(lambda s: s.joint_rate(joint))  # type: ignore[no-any-return]
 
     def joint_torque(self, joint: Joint | str) -> FloatArray:
-        """Return the torque of a revolute joint on its second rod, shape (n,) [N m]."""
+        """Return the torque of a revolute joint on its second rod.
+
+        Parameters
+        ----------
+        joint : Joint or str
+            Revolute joint to read.
+
+        Returns
+        -------
+        ndarray of shape (n,) [N m]
+
+        Raises
+        ------
+        ValueError
+            Not a revolute joint of this scene.
+        """
         return self._lanes.gathered(lambda s: s.joint_torque(joint))  # type: ignore[no-any-return]
 
     def obstacle_position(self, obstacle: Obstacle | str) -> FloatArray:
-        """Return the position of an obstacle, shape (n, 3) [m]."""
+        """Return the position of an obstacle. See `Simulation.obstacle_position`.
+
+        Parameters
+        ----------
+        obstacle : Obstacle or str
+            Obstacle to read.
+
+        Returns
+        -------
+        ndarray of shape (n, 3) [m]
+
+        Raises
+        ------
+        ValueError
+            Not an obstacle of this scene.
+        """
         return self._lanes.gathered(lambda s: s.obstacle_position(obstacle))  # type: ignore[no-any-return]
 
     def contacts(self) -> list[npt.NDArray[np.void]]:
-        """Return the contacts of every simulation, each a table as in `Simulation.contacts`."""
+        """Return the contacts of every simulation.
+
+        Returns
+        -------
+        list of structured ndarray of shape (contacts,)
+            One table per simulation, as `Simulation.contacts` returns it.
+
+        See Also
+        --------
+        Simulation.contacts : Columns of a table.
+        """
         return [simulation.contacts() for simulation in self._lanes.simulations]
 
     @property
@@ -140,13 +469,99 @@ class Reading:
         """Return counts and times of the work so far; each field has shape (n,)."""
         return self._lanes.gathered(lambda s: s.statistics)  # type: ignore[no-any-return]
 
+    @overload
+    def get(self, target: Rod, word: MaterialWord) -> Any: ...
+
+    @overload
+    def get(self, target: Rod, word: RodArray) -> FloatArray: ...
+
+    @overload
+    def get(self, target: Load, word: LoadVector) -> Any: ...
+
+    @overload
+    def get(self, target: Load, word: Literal["pressure"]) -> Any: ...
+
+    @overload
+    def get(self, target: Mass, word: MassWord) -> FloatArray: ...
+
+    @overload
+    def get(self, target: Spring, word: SpringWord) -> FloatArray: ...
+
+    @overload
+    def get(self, target: Tendon, word: TendonWord) -> FloatArray: ...
+
+    @overload
+    def get(self, target: Joint, word: JointWord) -> FloatArray: ...
+
+    @overload
+    def get(self, target: TorsionSpring, word: TorsionWord) -> FloatArray: ...
+
+    @overload
+    def get(self, target: Drag, word: DragWord) -> FloatArray: ...
+
+    @overload
+    def get(self, target: Fluid, word: FluidNumber) -> FloatArray: ...
+
+    @overload
+    def get(self, target: Fluid, word: Literal["regularization"]) -> Any: ...
+
+    @overload
+    def get(self, target: Obstacle, word: ObstacleNumber) -> FloatArray: ...
+
+    @overload
+    def get(self, target: Obstacle, word: ObstacleVector) -> FloatArray: ...
+
+    @overload
+    def get(self, target: Obstacle, word: Literal["friction"]) -> Any: ...
+
+    @overload
+    def get(self, target: Support, word: SupportVector) -> FloatArray: ...
+
+    @overload
+    def get(self, target: Support, word: Literal["friction"]) -> FloatArray: ...
+
+    @overload
+    def get(self, target: tuple[Body, Body], word: PairNumber) -> FloatArray: ...
+
+    @overload
+    def get(self, target: tuple[Body, Body], word: Literal["friction", "contact_stiffness"]) -> Any: ...
+
+    @overload
+    def get(self, target: Literal["gravity"], word: None = None) -> FloatArray: ...
+
+    @overload
+    def get(self, target: SceneNumber, word: None = None) -> FloatArray: ...
+
+    @overload
+    def get(self, target: Literal["contact_stiffness"], word: None = None) -> Any: ...
+
+    @overload
+    def get(self, target: str, word: str | None = None) -> Any: ...
+
     def get(self, target: Any, word: str | None = None) -> Any:
         """Return the present value of a parameter of `set` in every simulation.
+
+        Parameters
+        ----------
+        target : handle or str
+            Part to read, as in `Simulation.get`.
+        word : str
+            Parameter, as in `Simulation.get`.
 
         Returns
         -------
         ndarray of shape (n, ...)
             Values; a tuple if they are not numbers.
+
+        Raises
+        ------
+        ValueError
+            A parameter that the target does not have.
+
+        See Also
+        --------
+        set : Change a parameter.
+        Simulation.get : The parameters, and the value of each.
         """
         return self._lanes.gathered(lambda s: s.get(target, word))
 

@@ -26,6 +26,16 @@ class BatchRecord(Sequence[Record]):
     ``record=`` of the run. Read-outs need equal numbers of frames. If a simulation failed or ended early, read the
     records one by one, ``run[3]``.
 
+    Parameters
+    ----------
+    records : sequence of Record
+        One record per simulation, of the same scene.
+
+    See Also
+    --------
+    Batch.run : Run a batch.
+    Record : Frames of one simulation.
+
     Examples
     --------
     >>> run = scene.build_batch(3, time_step=5e-3).run(0.1, record_every=0.02, progress=False)
@@ -70,31 +80,137 @@ class BatchRecord(Sequence[Record]):
         return self._stacked([record.times for record in self._records])
 
     def positions(self, rod: Rod | str | None = None) -> FloatArray:
-        """Positions of nodes, shape (n, frames, nodes, 3) [m]."""
+        """Return the positions of the nodes of a rod, or of all nodes.
+
+        Parameters
+        ----------
+        rod : Rod or str, optional
+            Rod to read. By default every node of the scene.
+
+        Returns
+        -------
+        ndarray of shape (n, frames, nodes, 3) [m]
+
+        Raises
+        ------
+        ValueError
+            Records with different numbers of frames, or no rod of that name.
+        """
         return self._stacked([record.positions(rod) for record in self._records])
 
     def velocities(self, rod: Rod | str | None = None) -> FloatArray:
-        """Velocities of nodes, shape (n, frames, nodes, 3) [m/s]."""
+        """Return the velocities of the nodes of a rod, or of all nodes.
+
+        Parameters
+        ----------
+        rod : Rod or str, optional
+            Rod to read. By default every node of the scene.
+
+        Returns
+        -------
+        ndarray of shape (n, frames, nodes, 3) [m/s]
+
+        Raises
+        ------
+        ValueError
+            Records with different numbers of frames, or no rod of that name.
+        """
         return self._stacked([record.velocities(rod) for record in self._records])
 
     def directors(self, rod: Rod | str) -> FloatArray:
-        """Material frames of edges, shape (n, frames, edges, 3, 3)."""
+        """Return the material frames of the edges of a rod.
+
+        Parameters
+        ----------
+        rod : Rod or str
+            Rod to read.
+
+        Returns
+        -------
+        ndarray of shape (n, frames, edges, 3, 3)
+            The rows of each frame are the unit vectors d1, d2 and the tangent.
+
+        Raises
+        ------
+        ValueError
+            Records with different numbers of frames, or no rod of that name.
+        """
         return self._stacked([record.directors(rod) for record in self._records])
 
     def curvatures(self, rod: Rod | str) -> FloatArray:
-        """Curvatures towards d1 and d2, shape (n, frames, stencils, 2) [1/m]."""
+        """Return the curvatures of a rod towards its directors d1 and d2.
+
+        Parameters
+        ----------
+        rod : Rod or str
+            Rod to read.
+
+        Returns
+        -------
+        ndarray of shape (n, frames, stencils, 2) [1/m]
+
+        Raises
+        ------
+        ValueError
+            Records with different numbers of frames, or no rod of that name.
+        """
         return self._stacked([record.curvatures(rod) for record in self._records])
 
     def twists(self, rod: Rod | str) -> FloatArray:
-        """Twists, shape (n, frames, stencils) [rad/m]."""
+        """Return the twists per length of a rod.
+
+        Parameters
+        ----------
+        rod : Rod or str
+            Rod to read.
+
+        Returns
+        -------
+        ndarray of shape (n, frames, stencils) [rad/m]
+
+        Raises
+        ------
+        ValueError
+            Records with different numbers of frames, or no rod of that name.
+        """
         return self._stacked([record.twists(rod) for record in self._records])
 
     def tensions(self, rod: Rod | str) -> FloatArray:
-        """Axial forces of edges, shape (n, frames, edges) [N]."""
+        """Return the tension of each edge of a rod.
+
+        Parameters
+        ----------
+        rod : Rod or str
+            Rod to read.
+
+        Returns
+        -------
+        ndarray of shape (n, frames, edges) [N]
+
+        Raises
+        ------
+        ValueError
+            Records with different numbers of frames, or no rod of that name.
+        """
         return self._stacked([record.tensions(rod) for record in self._records])
 
     def spins(self, rod: Rod | str) -> FloatArray:
-        """Angular velocities of edges about their tangents, shape (n, frames, edges) [rad/s]."""
+        """Return the angular velocities of the edges of a rod about their tangents.
+
+        Parameters
+        ----------
+        rod : Rod or str
+            Rod to read.
+
+        Returns
+        -------
+        ndarray of shape (n, frames, edges) [rad/s]
+
+        Raises
+        ------
+        ValueError
+            Records with different numbers of frames, or no rod of that name.
+        """
         return self._stacked([record.spins(rod) for record in self._records])
 
     def _stacked(self, arrays: list[Any]) -> npt.NDArray[Any]:
@@ -115,6 +231,10 @@ class Equilibria(Sequence[Equilibrium]):
     ----------
     failures : tuple of ConvergenceError or None
         Error of each simulation without an equilibrium, which keeps its previous state.
+
+    See Also
+    --------
+    Batch.equilibrium : Find the equilibria of a batch.
     """
 
     failures: tuple[ConvergenceError | None, ...]

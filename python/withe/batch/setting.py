@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Unpack, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -12,8 +12,28 @@ from withe.batch.lanes import IntArray, Lanes, row
 from withe.common import validation
 from withe.common.deprecation import old_word
 from withe.common.keywords import keyword_hints
-from withe.parts.handles import NodeHandle, Obstacle, Rod, Support
+from withe.parts.handles import Drag, Fluid, Joint, Load, Mass, NodeHandle, Obstacle, Rod, Spring, Support, Tendon
 from withe.parts.parameters import NATURAL_WORDS
+from withe.parts.torsion_springs import TorsionSpring
+from withe.simulation.typed_words import (
+    Body,
+    DragWords,
+    FluidWords,
+    Frictions,
+    JointWords,
+    LoadWords,
+    MassWords,
+    ObstacleWords,
+    PairWords,
+    RodWords,
+    Rotations,
+    SceneWords,
+    SpringWords,
+    SupportWords,
+    TendonWords,
+    TorsionWords,
+    Values,
+)
 
 __all__ = ["Setting"]
 
@@ -35,23 +55,228 @@ class Setting:
         discrete: bool = False,
         lanes: npt.ArrayLike | None = None,
     ) -> None:
-        """Deprecated: use ``set(rod, natural_curvature=..., over=...)``, or discrete_curvature."""
+        """Deprecated: use ``set(rod, natural_curvature=..., over=...)``, or discrete_curvature.
+
+        Parameters
+        ----------
+        rod : Rod or str
+            Rod to actuate.
+        curvature : array_like of shape (n, 2) or (n, stencils, 2) [1/m]
+            Natural curvature towards d1 and d2, one row per simulation.
+        over : float [s]
+            Duration of a linear ramp to the value. By default the change is immediate.
+        discrete : bool
+            True if the curvature is given as 2 tan(phi / 2) [-], with phi the angle between two edges.
+        lanes : array_like of shape (n,), bool, or of numbers, optional
+            Simulations to change. By default all.
+
+        Raises
+        ------
+        ValueError
+            See `set`.
+
+        See Also
+        --------
+        set : The method to use instead.
+        """
         old_word("set_natural_curvature", "set(rod, natural_curvature=..., over=...)")
         _curve(self._lanes, rod, curvature, over, lanes, discrete=validation.truth(discrete, "discrete"))
 
     def set_natural_twist(
         self, rod: Rod | str, twist: npt.ArrayLike, over: float = 0.0, *, lanes: npt.ArrayLike | None = None
     ) -> None:
-        """Deprecated: use ``set(rod, natural_twist=..., over=...)``."""
+        """Deprecated: use ``set(rod, natural_twist=..., over=...)``.
+
+        Parameters
+        ----------
+        rod : Rod or str
+            Rod to actuate.
+        twist : array_like of shape (n,) or (n, stencils) [rad/m]
+            Natural twist, one row per simulation.
+        over : float [s]
+            Duration of a linear ramp to the value. By default the change is immediate.
+        lanes : array_like of shape (n,), bool, or of numbers, optional
+            Simulations to change. By default all.
+
+        Raises
+        ------
+        ValueError
+            See `set`.
+
+        See Also
+        --------
+        set : The method to use instead.
+        """
         old_word("set_natural_twist", "set(rod, natural_twist=..., over=...)")
         _twist(self._lanes, rod, twist, over, lanes)
 
     def set_natural_stretch(
         self, rod: Rod | str, stretch: npt.ArrayLike, over: float = 0.0, *, lanes: npt.ArrayLike | None = None
     ) -> None:
-        """Deprecated: use ``set(rod, natural_stretch=..., over=...)``."""
+        """Deprecated: use ``set(rod, natural_stretch=..., over=...)``.
+
+        Parameters
+        ----------
+        rod : Rod or str
+            Rod to actuate.
+        stretch : array_like of shape (n,) or (n, edges) [-]
+            Natural length over drawn length, one row per simulation.
+        over : float [s]
+            Duration of a linear ramp to the value. By default the change is immediate.
+        lanes : array_like of shape (n,), bool, or of numbers, optional
+            Simulations to change. By default all.
+
+        Raises
+        ------
+        ValueError
+            See `set`.
+
+        See Also
+        --------
+        set : The method to use instead.
+        """
         old_word("set_natural_stretch", "set(rod, natural_stretch=..., over=...)")
         _stretch(self._lanes, rod, stretch, over, lanes)
+
+    @overload
+    def set(
+        self, target: Rod, /, *, over: float = 0.0, lanes: npt.ArrayLike | None = None, **values: Unpack[RodWords]
+    ) -> None: ...
+
+    @overload
+    def set(
+        self,
+        target: Load,
+        /,
+        *,
+        over: float = 0.0,
+        lanes: npt.ArrayLike | None = None,
+        **values: Unpack[LoadWords[Values]],
+    ) -> None: ...
+
+    @overload
+    def set(
+        self,
+        target: Mass,
+        /,
+        *,
+        over: float = 0.0,
+        lanes: npt.ArrayLike | None = None,
+        **values: Unpack[MassWords[npt.ArrayLike]],
+    ) -> None: ...
+
+    @overload
+    def set(
+        self,
+        target: Spring,
+        /,
+        *,
+        over: float = 0.0,
+        lanes: npt.ArrayLike | None = None,
+        **values: Unpack[SpringWords[npt.ArrayLike]],
+    ) -> None: ...
+
+    @overload
+    def set(
+        self,
+        target: Tendon,
+        /,
+        *,
+        over: float = 0.0,
+        lanes: npt.ArrayLike | None = None,
+        **values: Unpack[TendonWords[npt.ArrayLike]],
+    ) -> None: ...
+
+    @overload
+    def set(
+        self,
+        target: Joint,
+        /,
+        *,
+        over: float = 0.0,
+        lanes: npt.ArrayLike | None = None,
+        **values: Unpack[JointWords[npt.ArrayLike]],
+    ) -> None: ...
+
+    @overload
+    def set(
+        self,
+        target: TorsionSpring,
+        /,
+        *,
+        over: float = 0.0,
+        lanes: npt.ArrayLike | None = None,
+        **values: Unpack[TorsionWords[npt.ArrayLike]],
+    ) -> None: ...
+
+    @overload
+    def set(
+        self,
+        target: Drag,
+        /,
+        *,
+        over: float = 0.0,
+        lanes: npt.ArrayLike | None = None,
+        **values: Unpack[DragWords[npt.ArrayLike]],
+    ) -> None: ...
+
+    @overload
+    def set(
+        self,
+        target: Fluid,
+        /,
+        *,
+        over: float = 0.0,
+        lanes: npt.ArrayLike | None = None,
+        **values: Unpack[FluidWords[npt.ArrayLike]],
+    ) -> None: ...
+
+    @overload
+    def set(
+        self,
+        target: Obstacle,
+        /,
+        *,
+        over: float = 0.0,
+        lanes: npt.ArrayLike | None = None,
+        **values: Unpack[ObstacleWords[npt.ArrayLike, Frictions]],
+    ) -> None: ...
+
+    @overload
+    def set(
+        self,
+        target: Support,
+        /,
+        *,
+        over: float = 0.0,
+        lanes: npt.ArrayLike | None = None,
+        **values: Unpack[SupportWords[npt.ArrayLike, Rotations]],
+    ) -> None: ...
+
+    @overload
+    def set(
+        self,
+        target: tuple[Body, Body],
+        /,
+        *,
+        over: float = 0.0,
+        lanes: npt.ArrayLike | None = None,
+        **values: Unpack[PairWords[npt.ArrayLike, Frictions]],
+    ) -> None: ...
+
+    @overload
+    def set(
+        self,
+        target: None = None,
+        /,
+        *,
+        over: float = 0.0,
+        lanes: npt.ArrayLike | None = None,
+        **values: Unpack[SceneWords[npt.ArrayLike]],
+    ) -> None: ...
+
+    @overload
+    def set(self, target: str, /, *, over: float = 0.0, lanes: npt.ArrayLike | None = None, **values: Any) -> None: ...
 
     def set(
         self, target: Any = None, /, *, over: float = 0.0, lanes: npt.ArrayLike | None = None, **values: Any
@@ -64,7 +289,7 @@ class Setting:
             Target, as in `Simulation.set`.
         over : float [s]
             Duration of a linear ramp to the values that `Simulation.set` can ramp. By default the change is immediate.
-        lanes : array_like, optional
+        lanes : array_like of shape (n,), bool, or of numbers, optional
             Mask or numbers of the simulations. By default all.
         **values
             Words of `Simulation.set`. An array has one row per simulation; a number, a function or None is for all.
@@ -76,6 +301,12 @@ class Setting:
         ValueError
             A word that the target does not have, a value out of range, or an array without a row for each simulation.
             Simulations before the one that refuses its value keep their new values.
+
+        See Also
+        --------
+        get : Return the present values.
+        move : Move a support or an obstacle.
+        Simulation.set : The parameters of each kind of part.
 
         Examples
         --------
@@ -132,7 +363,7 @@ class Setting:
             Rotations about the tangent, or about the axis of an obstacle; one number is for all simulations.
         over : float [s]
             Duration of the ramp to the targets. By default they are reached within the next step.
-        lanes : array_like, optional
+        lanes : array_like of shape (n,), bool, or of numbers, optional
             Simulations to move. By default all. For paths move one: ``batch[i].move(..., path=path)``.
 
         Raises
@@ -140,6 +371,11 @@ class Setting:
         ValueError
             See `Simulation.move`; or an array without a row for each simulation. Simulations before the one that
             refuses its target do move.
+
+        See Also
+        --------
+        set : Set parameters.
+        Simulation.move : Move a support of one simulation, also along a path.
 
         Examples
         --------

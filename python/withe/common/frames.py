@@ -18,10 +18,18 @@ FloatArray = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, repr=False)
 class EnergyHistory(ShortRepr):
-    """Energies of every frame, arrays of shape (frames,) [J].
+    """Energies of every frame of a `Record`.
 
-    `total` is the sum of kinetic, stretch, bend, twist, gravity, loads, contact and spring. `work`, done by
-    supports and actuation, and `dissipated` count from the start of the simulation.
+    Attributes
+    ----------
+    kinetic, stretch, bend, twist, gravity, loads, contact, spring : ndarray of shape (frames,) [J]
+        Energies of the scene by kind.
+    total : ndarray of shape (frames,) [J]
+        Sum of these energies.
+    work : ndarray of shape (frames,) [J]
+        Work of supports and actuation since the start of the simulation.
+    dissipated : ndarray of shape (frames,) [J]
+        Energy dissipated since the start of the simulation.
     """
 
     kinetic: FloatArray

@@ -9,6 +9,8 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
+from withe.common.short_repr import ShortRepr
+
 __all__ = ["Named", "ObstacleOutline", "RodOutline", "SpringOutline", "TendonOutline", "index_of"]
 
 FloatArray = npt.NDArray[np.float64]
@@ -25,8 +27,8 @@ class HasName(Protocol):
 Named = str | HasName
 
 
-@dataclass(frozen=True)
-class RodOutline:
+@dataclass(frozen=True, repr=False)
+class RodOutline(ShortRepr):
     """Outline of a rod for pictures and files, without its motion.
 
     Attributes
@@ -58,8 +60,8 @@ class RodOutline:
         return len(self.rows) - (0 if self.closed else 2)
 
 
-@dataclass(frozen=True)
-class ObstacleOutline:
+@dataclass(frozen=True, repr=False)
+class ObstacleOutline(ShortRepr):
     """Outline of an obstacle for pictures, without its motion.
 
     Attributes
@@ -78,8 +80,8 @@ class ObstacleOutline:
     radius: float
 
 
-@dataclass(frozen=True)
-class SpringOutline:
+@dataclass(frozen=True, repr=False)
+class SpringOutline(ShortRepr):
     """Outline of a spring for pictures, without the motion of its nodes.
 
     Attributes
@@ -93,14 +95,14 @@ class SpringOutline:
     rows: tuple[int, int]
 
 
-@dataclass(frozen=True)
-class TendonOutline:
+@dataclass(frozen=True, repr=False)
+class TendonOutline(ShortRepr):
     """Outline of a tendon for pictures and read-outs, without the motion of its rods.
 
     Attributes
     ----------
     name : str
-    guides : tuple of (int, int, float)
+    guides : tuple of (int, int, float [-])
         Position of each guide: index of the rod in the scene, edge of the rod, and place along the edge, from 0 to 1.
     offsets : ndarray of shape (guides, 2) [m]
         Offsets along the directors of the edge.

@@ -73,17 +73,28 @@ class Cable:
 
     @property
     def stretch_stiffness(self) -> float:
-        """EA Lgb^2 / EI of a solid round section, 4 (Lgb / radius)^2 (dissertation, (9.10))."""
+        """EA Lgb^2 / EI of a solid round section, 4 (Lgb / radius)^2 [-] (dissertation, (9.10))."""
         return 4.0 * (self.gravito_bending_length / self.radius) ** 2
 
     @classmethod
     def dlo(cls, number: int) -> Cable:
-        """One of the five of the experiments: pink and green silicone rubber, rope, thick rubber, a USB cable.
+        """Return one of the five cables of the experiments.
+
+        They are pink and green silicone rubber, rope, thick rubber, and a USB cable.
 
         Parameters
         ----------
         number : int
             1 to 5 [Choi, dissertation, table 9.1].
+
+        Returns
+        -------
+        Cable
+
+        Raises
+        ------
+        ValueError
+            A number that is not from 1 to 5.
         """
         lgb, radius, length = _TABLE[validation.integer(number, "number", 1, 5)]
         return cls(length, radius, lgb)

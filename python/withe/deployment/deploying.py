@@ -89,14 +89,14 @@ def deploy(
     plan : LayPlan
     cable : Cable
         True cable, if it differs from the planner's. The jaw holds it at the length of the plan.
-    friction : float
+    friction : float [-]
         Coefficient of friction between cable and floor. Without any, nothing stays where it is laid.
-    rolling_friction : float
+    rolling_friction : float [-]
         Rolling friction of the floor, see `Scene.add_floor`. Without it, a straight cable that is released under
         tension, at a small angle, rolls aside by millimetres.
     seed : int
         Seed of the noise.
-    noise : float
+    noise : float [-]
         Scale of deviations that the planner does not know, drawn once per trial. With 1 the standard deviations are 5 %
         in Lgb, 20 % in friction, 0.5 / m in natural curvature, and 0.5 mm and 0.5 degrees of the jaw on each axis.
     nodes : int
@@ -269,6 +269,11 @@ def hang(cable: Cable, *, nodes: int = 200) -> FloatArray:
     -------
     ndarray of shape (nodes, 3) [m]
         Centreline of the cable from the free end; the jaw is upright above the origin.
+
+    Raises
+    ------
+    ValueError
+        A number of nodes that is not from 20 to 2000.
 
     Examples
     --------

@@ -41,7 +41,7 @@ class Slip:
     ----------
     start, end : float [m]
         Arc lengths of both ends of the part.
-    needed : float
+    needed : float [-]
         Largest friction coefficient that the part needs.
     test : str
         Test with the largest need: "floor", "lift-off", "free end", "tail" or "overlap".
@@ -95,7 +95,7 @@ class Feasibility:
         direction at the push, and moves along (144 Lgb^3 4 radius / friction)^(1/4) on either side. This is the length
         of a beam under a friction load: EI d^4y/ds^4 = -friction w, where the slope vanishes at the push. At the other
         end the deflection y, its slope and its curvature vanish. That length slips as well.
-    friction : float
+    friction : float [-]
         Friction coefficient of the floor.
     slips : tuple of Slip
         Parts that need more friction.

@@ -95,6 +95,11 @@ class GraspNetwork(Surrogate):
     ----------
     network : withe.learning.Network
 
+    Raises
+    ------
+    ValueError
+        A network that has learned something else.
+
     Examples
     --------
     >>> import withe
@@ -159,6 +164,13 @@ class GraspNetwork(Surrogate):
         -------
         dict of Tensor
             "x", "y", "z" [Lgb] of the position, and "ex", "ey", "ez" [rad] of the rotation vector.
+
+        Raises
+        ------
+        ValueError
+            Not floating point tensors, or shapes that do not broadcast.
+        ImportError
+            torch is not installed.
 
         Examples
         --------

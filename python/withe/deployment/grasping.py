@@ -46,15 +46,15 @@ class Grasp:
 
     Attributes
     ----------
-    position : ndarray [Lgb]
+    position : ndarray of shape (..., 3) [Lgb]
         Position of the held end.
-    rotation : ndarray [rad]
+    rotation : ndarray of shape (..., 3) [rad]
         Rotation vector from the frame at lift-off to the frame of the jaw, whose first axis is the tangent there.
-    force : ndarray [w Lgb]
+    force : ndarray of shape (..., 3) [w Lgb]
         Force of the floor on the suspended part at lift-off.
-    stable : ndarray of bool
+    stable : ndarray of bool of shape (...)
         True if the energy is a minimum while the jaw holds position and rotation, also against motion out of the plane.
-    residual : ndarray
+    residual : ndarray of shape (...)
         Largest error of the boundary value problem: of tangents, and of moments in w Lgb^2.
     """
 
@@ -66,7 +66,7 @@ class Grasp:
 
     @property
     def friction(self) -> FloatArray:
-        """Friction coefficient that lift-off needs, the tangential force of the floor over its normal force."""
+        """Friction coefficient that lift-off needs, shape (...) [-]: tangential over normal force of the floor."""
         return np.asarray(np.hypot(self.force[..., 0], self.force[..., 1]) / self.force[..., 2])
 
 
@@ -98,7 +98,7 @@ def grasp(
     curvature : array_like [1/Lgb]
         Curvature at the lift-off point, -6 to 6. **A positive curvature bends the rod towards -y**, to the right of its
         way, as in the tables of the dissertation's public code. (9.1) has the opposite sign.
-    stretch_stiffness : array_like
+    stretch_stiffness : array_like [-]
         EA Lgb^2 / EI, which is 4 (Lgb / radius)^2 for a round rod (9.10). At least 100, and at least 4 times the
         suspended length.
     axial_force : array_like [w Lgb]

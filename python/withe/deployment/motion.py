@@ -26,7 +26,15 @@ _UPRIGHT = 0.5 * np.pi - 1e-3
 
 @dataclass(frozen=True)
 class Phase:
-    """A part of a motion: "hang", "touch down" or "lay", with its start and end [s]."""
+    """A part of a motion.
+
+    Attributes
+    ----------
+    name : str
+        "hang", "touch down" or "lay".
+    start, end : float [s]
+        Times at which the part begins and ends.
+    """
 
     name: str
     start: float

@@ -292,13 +292,28 @@ class Pattern:
             )
 
     def to_dict(self) -> dict[str, Any]:
-        """Return all numbers as lists, for JSON. SI units."""
+        """Return all numbers as lists, for JSON. SI units.
+
+        Returns
+        -------
+        dict
+            All fields by name.
+        """
         columns = {name: getattr(self, name).tolist() for name in ("raw", "curvature_behind", *_COLUMNS)}
         return {**columns, "deviation": self.deviation, "lead_in": self.lead_in}
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Pattern:
         """Return the pattern of a `to_dict`, to the last digit. It is not smoothed again.
+
+        Parameters
+        ----------
+        content : mapping
+            Fields, as `to_dict` returns them.
+
+        Returns
+        -------
+        Pattern
 
         Raises
         ------
@@ -336,7 +351,7 @@ class Pattern:
         Parameters
         ----------
         cable : Cable
-        friction : float
+        friction : float [-]
             Friction coefficient between cable and floor.
         method : {"exact", "least_friction"}
             Method by which the cable is laid.

@@ -104,7 +104,22 @@ class LayPlan(PlanFile):
         return self.method
 
     def feasibility(self, friction: float) -> Feasibility:
-        """Predict where friction holds the cable and where it slips; see `Pattern.feasibility`."""
+        """Predict where friction holds the cable and where it slips; see `Pattern.feasibility`.
+
+        Parameters
+        ----------
+        friction : float [-]
+            Friction coefficient between cable and floor.
+
+        Returns
+        -------
+        Feasibility
+
+        Raises
+        ------
+        ValueError
+            Friction that is negative or above 10.
+        """
         return examine(
             self.pattern,
             self.cable,
@@ -117,7 +132,7 @@ class LayPlan(PlanFile):
 
         Parameters
         ----------
-        friction : float
+        friction : float [-]
             Available friction coefficient. Parts that need more are shaded.
 
         Returns
@@ -128,7 +143,13 @@ class LayPlan(PlanFile):
         return draw_plan(self.pattern, self.positions, self.feasibility(friction), title)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return all numbers as lists, for JSON. SI units."""
+        """Return all numbers as lists, for JSON. SI units.
+
+        Returns
+        -------
+        dict
+            All fields by name.
+        """
         return {
             "controller": self.method,
             "start": self.start,
@@ -194,7 +215,7 @@ def plan(
         * "network": "exact" for thin cables from a small network, without friction. Needs torch.
         * "intuitive": the jaw upright above the lift-off point, at the height of the suspended length; the baseline of
           the dissertation (figure 9.2).
-    friction : float
+    friction : float [-]
         Friction coefficient between cable and floor. Needed by "optimised"; "exact" and "least_friction" warn where it
         is too low.
     speed : float [m/s]

@@ -26,17 +26,17 @@ class StraightPose:
 
     Attributes
     ----------
-    x, z : ndarray [Lgb]
+    x, z : ndarray of shape (...) [Lgb]
         Position of the held end, relative to the lift-off point.
-    angle : ndarray [rad]
+    angle : ndarray of shape (...) [rad]
         Angle of the tangent at the held end above the floor.
     force : ndarray of shape (..., 2) [w Lgb]
         Force of the floor on the rod at lift-off, along the rod and up.
-    stable : ndarray of bool
+    stable : ndarray of bool of shape (...)
         True if the energy is a minimum while the jaw holds position and rotation, also against motion out of the plane.
-    valid : ndarray of bool
+    valid : ndarray of bool of shape (...)
         True if the rod stays above the floor and the floor pushes (dissertation (9.6)).
-    residual : ndarray
+    residual : ndarray of shape (...)
         Largest error of the boundary value problem.
     """
 
@@ -60,7 +60,7 @@ class StraightLine:
     ----------
     suspended : float [Lgb]
         Suspended length, 0.3 to 50.
-    stretch_stiffness : float
+    stretch_stiffness : float [-]
         EA Lgb^2 / EI, as in `grasp`.
 
     Attributes
@@ -127,7 +127,16 @@ class StraightLine:
         return np.concatenate([rays[:, 2:], rays[::-1, :2]])
 
     def points(self, x: float, z: float) -> FloatArray:
-        """Points of the rod of one pose, shape (n, 3) [Lgb].
+        """Return the points of the rod of one pose.
+
+        Parameters
+        ----------
+        x, z : float [Lgb]
+            Position of the held end, relative to the lift-off point.
+
+        Returns
+        -------
+        ndarray of shape (n, 3) [Lgb]
 
         Raises
         ------

@@ -87,7 +87,7 @@ class Tying:
 
     @property
     def centrelines(self) -> tuple[FloatArray, ...]:
-        """Final centrelines, from the free ends; `withe.knots` identifies their knot."""
+        """Final centrelines, each of shape (nodes, 3) [m], from the free ends. `withe.knots` identifies their knot."""
         return self.shapes[-1]
 
 
@@ -116,7 +116,7 @@ def tie(
         One plan per cable; later cables are laid over earlier ones.
     steps : sequence of sequences of Move
         Moves of each step.
-    friction : float
+    friction : float [-]
         Friction coefficient of cables with the floor and each other.
     picks : sequence of sequences of array_like of shape (3,) [m], optional
         `Tying.picks` of a rehearsal.

@@ -26,7 +26,7 @@ from withe.folding.plunging import plunge
 from withe.folding.seeing import SeenEdge, find_edge, overhead_camera
 from withe.folding.sheet_network import SheetNetwork
 from withe.folding.sheets import Elastica
-from withe.folding.simulated_sheet import Fold, SimulatedSheet
+from withe.folding.simulated_sheet import Fold, Held, SimulatedSheet
 from withe.folding.trials import Outcome, Trial, run_trials
 from withe.folding.wide_sheet import WideFold, WideSheet
 
@@ -34,6 +34,7 @@ __all__ = [
     "Elastica",
     "Fold",
     "FoldPlan",
+    "Held",
     "Jaw",
     "Measured",
     "Noise",

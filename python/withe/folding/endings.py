@@ -60,7 +60,7 @@ def plan(
     grasp : {"moment_free", "free"}
         "moment_free": the jaw holds the edge at the angle without moment [dissertation, (7.6)]. "free", for method
         "slip" only: the jaw may apply any moment, and the curvature of the sheet is bounded.
-    uncertainty : pair of float
+    uncertainty : pair of float [-]
         For method "slip": relative error of Lgb (either sign) and of friction (less) of the paper. With a free moment,
         a path without slide is one on which no such paper slides.
     ending : {"auto", "slow", "plunge"}

@@ -61,10 +61,23 @@ class Jaw:
         object.__setattr__(self, "force_limit", validation.positive(self.force_limit, "force_limit"))
 
     def clearance(self, x: FloatArray, z: FloatArray, angle: FloatArray, side: str) -> FloatArray:
-        """Height of the lowest point of the fingers over the table [m], for the sheet's outer edge at (x, z).
+        """Return the height of the lowest point of the fingers over the table.
 
         With `side` "edge" the fingers come from beyond the outer edge, in line with the sheet. With "side" they come
         across the sheet, and nothing of them is beyond the edge.
+
+        Parameters
+        ----------
+        x, z : ndarray of shape (n,) [m]
+            Position of the outer edge of the sheet.
+        angle : ndarray of shape (n,) [rad]
+            Angle of the held part of the sheet above the table.
+        side : {"edge", "side"}
+            Direction from which the fingers come.
+
+        Returns
+        -------
+        ndarray of shape (n,) [m]
         """
         beyond = self.reach if side == "edge" else 0.0
         sine, cosine = np.sin(angle), np.abs(np.cos(angle))

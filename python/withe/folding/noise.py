@@ -25,11 +25,11 @@ class Noise:
 
     Parameters
     ----------
-    gravito_bending_length : float
+    gravito_bending_length : float [-]
         Relative standard deviation of Lgb.
-    friction : float
+    friction : float [-]
         Relative standard deviation of the friction coefficient between sheet and table.
-    friction_variation : float
+    friction_variation : float [-]
         Relative variation of friction along the table, in waves of 30 to 300 mm.
     curl : float [1/m]
         Natural curvature of the sheet.
@@ -71,7 +71,12 @@ class Noise:
 
     @classmethod
     def none(cls) -> Noise:
-        """Return noise without any deviation."""
+        """Return noise without any deviation.
+
+        Returns
+        -------
+        Noise
+        """
         return cls(*(0.0 for _ in fields(cls)))
 
 

@@ -30,11 +30,11 @@ class Paper:
     gravito_bending_length : float [m]
         Lgb = (EI / 2w)^(1/3), with EI the bending stiffness and w the weight per length. `measure` finds it with a
         ruler.
-    friction : float
+    friction : float [-]
         Friction coefficient between sheet and table.
     thickness : float [m]
         Thickness of the sheet.
-    outline : sequence of pairs of float
+    outline : sequence of pairs of float [-]
         Width along the sheet: pairs of a share of the length, from the lifted edge on, and a share of `width`, linear
         in between. By default the width is uniform.
 
@@ -79,7 +79,17 @@ class Paper:
                 raise ValueError(f"{name} must be at most {what}, got {value:g} m: are all sizes in metres?")
 
     def width_at(self, place: npt.ArrayLike) -> FloatArray:
-        """Return the width [m] at distances from the lifted edge [m]."""
+        """Return the width at distances from the lifted edge.
+
+        Parameters
+        ----------
+        place : array_like of shape (...) [m]
+            Distances from the lifted edge.
+
+        Returns
+        -------
+        ndarray of shape (...) [m]
+        """
         shares, widths = np.array(self.outline).T
         return np.asarray(self.width * np.interp(np.asarray(place, dtype=float) / self.length, shares, widths))
 
@@ -90,22 +100,37 @@ class Paper:
 
     @classmethod
     def a4(cls) -> Paper:
-        """Office paper, 297 mm by 210 mm, Lgb 48 mm [Choi, dissertation, 7.8.3]."""
+        """Return office paper, 297 mm by 210 mm, Lgb 48 mm [Choi, dissertation, 7.8.3].
+
+        Returns
+        -------
+        Paper
+        """
         return cls(0.297, 0.210, 0.048)
 
     @classmethod
     def us_letter(cls) -> Paper:
-        """Office paper, 279.4 mm by 215.9 mm, Lgb 60 mm [Choi, dissertation, 7.8.3]."""
+        """Return office paper, 279.4 mm by 215.9 mm, Lgb 60 mm [Choi, dissertation, 7.8.3].
+
+        Returns
+        -------
+        Paper
+        """
         return cls(0.2794, 0.2159, 0.060)
 
     @classmethod
     def cardboard(cls) -> Paper:
-        """Cardboard of the size of US Letter, Lgb 132 mm [Choi, dissertation, 7.8.3]."""
+        """Return cardboard of the size of US Letter, Lgb 132 mm [Choi, dissertation, 7.8.3].
+
+        Returns
+        -------
+        Paper
+        """
         return cls(0.2794, 0.2159, 0.132)
 
     @classmethod
     def origami(cls, side: float = 0.35) -> Paper:
-        """Square origami paper, Lgb 43 mm [Choi, dissertation, 7.8.3], to be folded over its diagonal.
+        """Return square origami paper, Lgb 43 mm [Choi, dissertation, 7.8.3], to be folded over its diagonal.
 
         A jaw holds it by a corner: the width grows from there to the middle, and falls again. A fold of corner on
         corner (the target "half") at the default size would lift more of it than a jaw without a moment can lead. The
@@ -116,6 +141,15 @@ class Paper:
         side : float [m]
             Side of the square. The dissertation does not state it; its C = 0.30 m needs at least 0.213 m. A smaller
             sheet has too little lying weight to stay in place.
+
+        Returns
+        -------
+        Paper
+
+        Raises
+        ------
+        ValueError
+            A side that is not positive or too large for paper.
         """
         diagonal = np.sqrt(2.0) * validation.positive(side, "side")
         return cls(diagonal, diagonal, 0.043, outline=((0.0, 0.0), (0.5, 1.0), (1.0, 0.0)))

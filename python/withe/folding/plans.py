@@ -67,7 +67,7 @@ class FoldPlan(PlanFile):
     clearance : float [m]
         Least height of the fingers over the table while the edge looks back (angle > pi / 2). At the start the lower
         finger needs the edge to overhang the table, or to be bent up.
-    uncertainty : tuple of float
+    uncertainty : tuple of float [-]
         Relative errors of Lgb and friction.
     curvature : float [1/Lgb]
         Bound on the curvature with a free moment.
@@ -185,12 +185,16 @@ class FoldPlan(PlanFile):
         return self.slide_of(self.paper)
 
     def slide_of(self, paper: Paper) -> FloatArray:
-        """Return the slide of another paper on these poses [m], shape (n,), as `slide` for the plan's paper.
+        """Return the slide of another paper on these poses, as `slide` for the plan's paper.
 
         Parameters
         ----------
         paper : Paper
             Paper of the same size, possibly with another Lgb and friction.
+
+        Returns
+        -------
+        ndarray of shape (n,) [m]
 
         Raises
         ------
@@ -217,7 +221,12 @@ class FoldPlan(PlanFile):
         return np.where(sheet.valid, slide * paper.gravito_bending_length, np.nan)
 
     def before_plunge(self) -> FoldPlan:
-        """The part of the plan before a plunge; the whole plan without a plunge."""
+        """Return the part of the plan before a plunge; the whole plan without a plunge.
+
+        Returns
+        -------
+        FoldPlan
+        """
         if self.plunges_at is None:
             return self
         slow = self.times <= self.plunges_at
@@ -307,6 +316,8 @@ class FoldPlan(PlanFile):
         ------
         ImportError
             matplotlib is not installed.
+        ValueError
+            `poses` is not a whole number above 0.
         """
         if axes is None:
             axes = require("matplotlib.pyplot", "view").subplots(layout="constrained")[1]
@@ -325,7 +336,13 @@ class FoldPlan(PlanFile):
         return axes
 
     def to_dict(self) -> dict[str, Any]:
-        """Return all values, with frames and units, for JSON. Values that are not finite become None."""
+        """Return all values, with frames and units, for JSON. Values that are not finite become None.
+
+        Returns
+        -------
+        dict
+            Frames, units and all fields.
+        """
         return {
             "frames": {
                 "world": "origin where the middle of the lifted edge lay in the flat sheet; x along the sheet to its "

@@ -127,6 +127,8 @@ def find_edge(
     ------
     ValueError
         A picture in which there is no such edge.
+    ImportError
+        OpenCV is not installed.
 
     Examples
     --------

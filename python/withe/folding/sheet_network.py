@@ -87,6 +87,11 @@ class SheetNetwork(Surrogate):
     ----------
     network : withe.learning.Network
 
+    Raises
+    ------
+    ValueError
+        A network that has learned something else.
+
     Examples
     --------
     >>> import withe
@@ -158,6 +163,13 @@ class SheetNetwork(Surrogate):
         dict of Tensor
             The names are those of `Elastica`: "angle", "suspended", "force_ratio". The small network adds
             "normal_force", "tangential_force" and "max_curvature".
+
+        Raises
+        ------
+        ValueError
+            Not floating point tensors, or shapes that do not broadcast.
+        ImportError
+            torch is not installed.
 
         Examples
         --------

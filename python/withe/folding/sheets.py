@@ -46,26 +46,26 @@ class Elastica:
 
     Attributes
     ----------
-    x, z : ndarray [Lgb]
+    x, z : ndarray of shape (...) [Lgb]
         Displacement of the tip from its place in the flat sheet: back, and up from the table.
-    angle : ndarray [rad]
+    angle : ndarray of shape (...) [rad]
         Angle of the tangent at the tip above the direction in which the sheet leaves the table.
-    suspended : ndarray [Lgb]
+    suspended : ndarray of shape (...) [Lgb]
         Suspended length.
-    normal_force, tangential_force : ndarray [w Lgb]
+    normal_force, tangential_force : ndarray of shape (...) [w Lgb]
         Force of the table on the sheet at the lift-off point: upwards, and in the direction in which the sheet leaves.
         The tangential force is positive if it compresses the sheet, and negative if it pulls the sheet taut. w is the
         weight per length, at width 1 if the width varies.
-    force_ratio : ndarray
+    force_ratio : ndarray of shape (...) [-]
         Absolute tangential force over normal force. The sheet behind the lift-off point presses on the table too. A
         sheet of length L therefore slips if the tangential force exceeds friction * (normal_force + L - suspended).
-    max_curvature : ndarray [1/Lgb]
+    max_curvature : ndarray of shape (...) [1/Lgb]
         Greatest absolute curvature.
-    tip_moment : ndarray [w Lgb^2]
+    tip_moment : ndarray of shape (...) [w Lgb^2]
         Moment of the jaw on the sheet.
-    valid : ndarray of bool
+    valid : ndarray of bool of shape (...)
         True if the pose exists; `elastica` lists the refused positions.
-    stable : ndarray of bool
+    stable : ndarray of bool of shape (...)
         True if the energy is a minimum while the jaw holds position and angle.
     """
 

@@ -69,7 +69,15 @@ class Fold:
 
 @dataclass(frozen=True)
 class Held:
-    """State of a sheet and its jaw during a motion, from which `carry_on` continues."""
+    """State of a sheet and its jaw during a motion, made by `SimulatedSheet.hold`, from which `carry_on` continues.
+
+    Attributes
+    ----------
+    state : Snapshot
+        State of the simulation.
+    jaw : object
+        Position of the jaw in its motion.
+    """
 
     state: Snapshot
     jaw: JawMotion
@@ -97,7 +105,7 @@ class SimulatedSheet(TableSheet[Fold]):
     time_step : float [s]
         Time step of backward Euler. It is shorter if the jaw would move by more than 2 mm in a step, and for 0.1 s
         after that.
-    own_friction : float
+    own_friction : float [-]
         Coefficient of the sheet on itself.
     record_every : float [s]
         Interval between frames of `Fold.record`, at which steps end; infinity records no frames in between.
@@ -165,7 +173,12 @@ class SimulatedSheet(TableSheet[Fold]):
         return lambda points: of_paper * drawn.friction_at(points[:, 0])
 
     def positions(self) -> FloatArray:
-        """Return the present positions of the sheet, from the lifted edge on, shape (edges + 1, 3) [m]."""
+        """Return the present positions of the sheet, from the lifted edge on.
+
+        Returns
+        -------
+        ndarray of shape (edges + 1, 3) [m]
+        """
         return self.simulation.positions(self.rod)
 
     @property
@@ -211,16 +224,52 @@ class SimulatedSheet(TableSheet[Fold]):
     def carry_out(
         self, motions: Iterable[Motion], target: float, *, duration: float = LONGEST, progress: bool = True
     ) -> Fold:
-        """Carry out motions in a row, from the flat sheet. See `TableSheet.carry_out`."""
+        """Carry out motions in a row, from the flat sheet.
+
+        Parameters
+        ----------
+        motions : iterable of FoldPlan
+            Each motion is requested when the previous one has ended, so a generator may look at the sheet in between.
+            The first pose of a motion is the last pose of the previous one.
+        target : float [m]
+            Place on the sheet where the lifted edge should lie in the end.
+        duration : float [s]
+            Duration that a progress bar expects.
+        progress : bool
+            True to show a progress bar.
+
+        Returns
+        -------
+        Fold
+        """
         self._begin()
         return self._carried(JawMotion(motions, self._drawn), target, duration, progress)
 
     def hold(self) -> Held:
-        """Keep the state between two motions. A motion may call `hold`, and `carry_on` continues from that state."""
+        """Keep the state between two motions. A motion may call `hold`, and `carry_on` continues from that state.
+
+        Returns
+        -------
+        Held
+        """
         return Held(self.simulation.snapshot(), copy(self._motion))
 
     def carry_on(self, held: Held, motions: Iterable[Motion], target: float) -> Fold:
-        """Carry out other motions from a kept state, as `carry_out` does from the flat sheet."""
+        """Carry out other motions from a kept state, as `carry_out` does from the flat sheet.
+
+        Parameters
+        ----------
+        held : Held
+            State, as `hold` returns it.
+        motions : iterable of FoldPlan
+            Motions from this state on.
+        target : float [m]
+            Place on the sheet where the lifted edge should lie in the end.
+
+        Returns
+        -------
+        Fold
+        """
         self.simulation.restore(held.state)
         return self._carried(held.jaw.on_from_here(motions), target, LONGEST, False)
 

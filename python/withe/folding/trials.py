@@ -87,7 +87,7 @@ class Outcome:
     trial : Trial
     gravito_bending_length : float [m]
         Measured value.
-    needed_friction : float
+    needed_friction : float [-]
         Least friction at which the sheet does not slide on the planned path, before a plunge. NaN without a plan.
     plunges : bool
         True if the plan ends in a plunge.
@@ -98,7 +98,7 @@ class Outcome:
         Values of `Fold`; NaN without a plan.
     failure : str or None
         Error of the planner or the sheet that prevented the fold. It begins with "no plan" if it is the planner's.
-    seconds : float
+    seconds : float [s]
         Processor time on the thread of the trial, without other trials. Trials of one sheet share its photographs and
         plans.
     """

@@ -88,7 +88,7 @@ class WideSheet(TableSheet[WideFold]):
         Seed of the noise.
     noise : Noise, optional
         Deviations of the sheet, table and jaw. `friction_variation` is ignored.
-    unevenness : float
+    unevenness : float [-]
         Relative standard deviation of half the difference between the coefficients of the strips. The deviation is at
         most twice this value.
     jaw : Jaw, optional
@@ -97,7 +97,7 @@ class WideSheet(TableSheet[WideFold]):
         Number of edges of each strip.
     time_step : float [s]
         Time step of backward Euler; shorter in plunges, as in `SimulatedSheet`.
-    own_friction : float
+    own_friction : float [-]
         Coefficient of a strip on itself.
 
     Attributes
@@ -227,7 +227,24 @@ class WideSheet(TableSheet[WideFold]):
     def carry_out(
         self, motions: Iterable[Motion], target: float, *, duration: float = LONGEST, progress: bool = True
     ) -> WideFold:
-        """Carry out motions in a row, from the flat sheet. See `TableSheet.carry_out`."""
+        """Carry out motions in a row, from the flat sheet.
+
+        Parameters
+        ----------
+        motions : iterable of FoldPlan
+            Each motion is requested when the previous one has ended, so a generator may look at the sheet in between.
+            The first pose of a motion is the last pose of the previous one.
+        target : float [m]
+            Place on the sheet where the lifted edge should lie in the end.
+        duration : float [s]
+            Duration that a progress bar expects.
+        progress : bool
+            True to show a progress bar.
+
+        Returns
+        -------
+        WideFold
+        """
         simulation = self.simulation
         self._begin()
         jaw = JawMotion(motions, self._drawn)

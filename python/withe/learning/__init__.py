@@ -15,7 +15,7 @@ call of `register`.
 import sys
 from typing import Any
 
-from withe.learning.arms import Follow, Obstacles2D, Obstacles3D, Reach
+from withe.learning.arms import Arm, Follow, Obstacles2D, Obstacles3D, Reach
 from withe.learning.environments import environment_class
 from withe.learning.functions import equilibrium, rollout
 from withe.learning.limbs import Crawl, Wrap
@@ -27,6 +27,7 @@ from withe.learning.training import train_policy
 
 __all__ = [
     "Alternating",
+    "Arm",
     "Cosine",
     "Crawl",
     "Environment",

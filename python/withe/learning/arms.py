@@ -99,7 +99,15 @@ class Arm(Task):
         return built
 
     def add_obstacles(self, scene: Scene, generator: np.random.Generator) -> None:
-        """Add obstacles to the scene; none by default."""
+        """Add obstacles to the scene; none by default.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene with the arm.
+        generator : numpy.random.Generator
+            Source of random numbers.
+        """
 
     def prepare(self, robots: Batch) -> None:
         """Allocate bends and targets of all robots."""
@@ -119,7 +127,15 @@ class Arm(Task):
 
     @abstractmethod
     def aim(self, lane: int, generator: np.random.Generator) -> None:
-        """Return the position of a robot's target at the start of its episode."""
+        """Choose the target of a robot at the start of its episode.
+
+        Parameters
+        ----------
+        lane : int
+            Number of the robot.
+        generator : numpy.random.Generator
+            Source of random numbers.
+        """
 
     def act(self, robots: Batch, actions: FloatArray, chosen: IntArray) -> None:
         """Ramp the natural curvatures and twists."""
@@ -148,11 +164,31 @@ class Arm(Task):
         return np.concatenate(rows, axis=1, dtype=np.float32, casting="same_kind")
 
     def seen(self, robots: Batch) -> list[FloatArray]:
-        """Return observations besides the arm: arrays with a row for each robot."""
+        """Return observations besides the arm: arrays with a row for each robot.
+
+        Parameters
+        ----------
+        robots : Batch
+            All robots.
+
+        Returns
+        -------
+        list of ndarray of shape (n, ...)
+        """
         return [self.target[:, self.axes]]
 
     def distances(self, robots: Batch) -> FloatArray:
-        """Return the distance of every tip from its target, shape (n,) [m]."""
+        """Return the distance of every tip from its target.
+
+        Parameters
+        ----------
+        robots : Batch
+            All robots.
+
+        Returns
+        -------
+        ndarray of shape (n,) [m]
+        """
         apart = (robots.positions("arm", out=self._x)[:, -1] - self.target)[:, self.axes]
         return np.asarray(np.sqrt(np.einsum("ij,ij->i", apart, apart)))
 
@@ -249,7 +285,17 @@ class Reach(Arm):
         self.goal[lane] = (0.0, 0.0, np.sin(0.5 * yaw), np.cos(0.5 * yaw))
 
     def orientations(self, robots: Batch) -> FloatArray:
-        """Return quaternions of the last edges, scalar last. The drawn arm has (0, 0, 0, 1)."""
+        """Return quaternions of the last edges, scalar last. The drawn arm has (0, 0, 0, 1).
+
+        Parameters
+        ----------
+        robots : Batch
+            All robots.
+
+        Returns
+        -------
+        ndarray of shape (n, 4)
+        """
         from scipy.spatial.transform import Rotation
 
         frames = robots.directors("arm")[:, -1].swapaxes(1, 2)

@@ -93,7 +93,22 @@ class _Environment:
         return self._episodes.robots[0]
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
-        """Begin an episode; equal seeds give equal episodes."""
+        """Begin an episode; equal seeds give equal episodes.
+
+        Parameters
+        ----------
+        seed : int, optional
+            Seed of the random numbers of this and later episodes.
+        options : dict, optional
+            Not used.
+
+        Returns
+        -------
+        observation : ndarray of shape (...)
+            Observation of the task.
+        info : dict
+            Empty.
+        """
         self._check(False)
         super().reset(seed=seed)  # type: ignore[misc]
         self._episodes.begin(self._lane, [self.np_random])
@@ -101,7 +116,29 @@ class _Environment:
         return self._episodes.observe()[0], {}
 
     def step(self, action: npt.ArrayLike) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """Do an action, for one control step."""
+        """Apply an action for one control step.
+
+        Parameters
+        ----------
+        action : array_like of shape (action_size,) [-]
+            Action, each number from -1 to 1.
+
+        Returns
+        -------
+        observation : ndarray of shape (...)
+            Observation of the task.
+        reward : float [-]
+            Reward of the task.
+        terminated, truncated : bool
+            True if the episode has terminated, or has reached its last step.
+        info : dict
+            "failed" is True if the simulation did not converge.
+
+        Raises
+        ------
+        ValueError
+            An action of wrong shape, not finite, or outside of -1 to 1.
+        """
         self._check(True)
         outcome = self._episodes.act(self._episodes.checked(action)[None], self._lane)
         self._show()
@@ -115,7 +152,13 @@ class _Environment:
         )
 
     def render(self) -> npt.NDArray[np.uint8] | None:
-        """A picture, shape (480, 640, 3); none of a window."""
+        """Return a picture of the robot.
+
+        Returns
+        -------
+        ndarray of shape (480, 640, 3), uint8, or None
+            None for a window, and without a render mode.
+        """
         self._check(True)
         if self._screen is None or self.render_mode == "human":
             return None
@@ -226,6 +269,25 @@ class _VectorEnvironment:
         """Begin episodes of all robots, or of the robots in ``options["reset_mask"]``, shape (n,), bool.
 
         Seeds are one number per robot, or one number: then robot i has the seed ``seed + i``.
+
+        Parameters
+        ----------
+        seed : int or sequence of int, optional
+            One number per robot, or one number.
+        options : dict, optional
+            "reset_mask" of shape (n,), bool, chooses robots.
+
+        Returns
+        -------
+        observations : ndarray of shape (n, ...)
+            Observations of the task.
+        infos : dict
+            Empty.
+
+        Raises
+        ------
+        ValueError
+            A mask of another shape or type, or a wrong number of seeds.
         """
         self._check(False)
         chosen = self._all
@@ -259,7 +321,31 @@ class _VectorEnvironment:
         ]
 
     def step(self, actions: npt.ArrayLike) -> tuple[Any, FloatArray, Any, Any, dict[str, Any]]:
-        """Do an action with every robot, for one control step; one whose episode is over begins another instead."""
+        """Apply an action of every robot for one control step. A robot whose episode is over begins another instead.
+
+        Parameters
+        ----------
+        actions : array_like of shape (n, action_size) [-]
+            Actions, each number from -1 to 1.
+
+        Returns
+        -------
+        observations : ndarray of shape (n, ...)
+            Observations of the task.
+        rewards : ndarray of shape (n,) [-]
+            Rewards of the task.
+        terminated, truncated : ndarray of bool of shape (n,)
+            True if the episode of a robot has terminated, or has reached its last step.
+        infos : dict
+            "failed" marks robots whose simulation did not converge. With ``autoreset="same_step"``, "final_obs" holds
+            the last observations of the episodes that ended.
+
+        Raises
+        ------
+        ValueError
+            Actions of wrong shape, not finite, or outside of -1 to 1; or, with ``autoreset="disabled"``, an episode
+            that is over.
+        """
         self._check(True)
         values = self._episodes.checked(actions, self.num_envs)
         over = self._over.copy()
@@ -288,14 +374,26 @@ class _VectorEnvironment:
         return self._episodes.observe(), rewards, terminated, truncated, infos
 
     def render(self) -> Any:
-        """A picture of the first robot, in a tuple as Gymnasium wants it; none of a window."""
+        """Return a picture of the first robot, in a tuple as Gymnasium defines it.
+
+        Returns
+        -------
+        tuple of one ndarray of shape (480, 640, 3), uint8, or None
+            None for a window, and without a render mode.
+        """
         self._check(True)
         if self._screen is None or self.render_mode == "human":
             return None
         return (self._screen.picture(),)
 
     def close_extras(self, **options: Any) -> None:
-        """Close the window."""
+        """Close the window.
+
+        Parameters
+        ----------
+        **options
+            Not used.
+        """
         if self._screen is not None:
             self._screen.close()
 

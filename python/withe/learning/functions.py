@@ -219,7 +219,8 @@ def _set(simulation: Simulation, unknown: Unknown, value: FloatArray) -> None:
             simulation.move(target, position=value)
         else:
             values: dict[str, Any] = {word: value if value.ndim else float(value)}
-            simulation.set(target, **values)
+            part: Any = target  # of any kind, whose words are checked when they are set
+            simulation.set(part, **values)
     elif any(unknown == word.name for word in SCENE_WORDS):
         values = {unknown: value if value.ndim else float(value)}
         simulation.set(**values)

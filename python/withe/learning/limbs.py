@@ -69,7 +69,13 @@ class Crawl(_Limbs):
     friction = 0.8
 
     def build(self, generator: np.random.Generator) -> Simulation:
-        """Build the robot on its feet, as drawn."""
+        """Build the robot on its feet, as drawn.
+
+        Raises
+        ------
+        ValueError
+            An attribute of a derived class is out of range.
+        """
         scene = Scene()
         rubber = Material(youngs_modulus=1.5e7, poisson_ratio=0.5, density=1180.0, viscosity=5.0e4)
         arch = (self.fall - self.rise) / self.length

@@ -32,7 +32,7 @@ class Cosine:
         Passes over the data.
     batch : int
         Samples per step.
-    rate : float
+    rate : float [-]
         Largest rate. It is reached after a twentieth of all steps.
     """
 
@@ -55,11 +55,11 @@ class Alternating:
         Initial and final number of samples per step.
     patience : int
         Number of epochs without a decrease of the loss by 1 % that count as a stall.
-    rates : pair of float
+    rates : pair of float [-]
         Rates of gradient descent, which comes first, and of Adam. A stall at the largest batch halves both.
-    whole_below : float
+    whole_below : float [-]
         Held-out loss below which training also uses the held-out data.
-    until : float
+    until : float [-]
         Loss at which training ends.
     """
 
@@ -114,7 +114,7 @@ def train_network(
         always scaled.
     schedule : Cosine or Alternating, optional
         Schedule of training. By default ``Cosine()``.
-    held_out : float
+    held_out : float [-]
         Share of the samples that are not trained on, and determine the best epoch.
     seed : int
         Seed. Equal seeds give equal networks if torch runs the same. The seed of torch itself does not change.

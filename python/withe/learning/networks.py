@@ -44,9 +44,9 @@ class Training:
         Epoch that was kept, counted from 1: the one with the least held-out loss. 0 without training.
     held_out_until : int
         Epoch after which training also used the held-out data.
-    loss : float
+    loss : float [-]
         Held-out loss after the best epoch.
-    seconds : float
+    seconds : float [s]
         Duration of the training.
     stopped : str
         Reason for the end: "epochs", "time", "loss" or "interrupted".
@@ -185,6 +185,13 @@ class Network:
         Returns
         -------
         Path
+
+        Raises
+        ------
+        OSError
+            The file cannot be written.
+        ImportError
+            torch is not installed.
         """
         path = Path(path)
         content = {
@@ -219,6 +226,8 @@ class Network:
             A file with other content or of another version.
         FileNotFoundError
             The file does not exist.
+        ImportError
+            torch is not installed.
         """
         torch = require("torch", "learn")
         try:

@@ -68,6 +68,16 @@ class Surrogate:
     def load(cls, path: str | os.PathLike[str] | None = None) -> Self:
         """Read a network from a file; by default the small one that is shipped with withe.
 
+        Parameters
+        ----------
+        path : str or path, optional
+            File to read. By default the network that is shipped with withe.
+
+        Returns
+        -------
+        Surrogate
+            A network of this class.
+
         Raises
         ------
         ValueError
@@ -78,7 +88,23 @@ class Surrogate:
         return cls(Network.load(cls.SHIPPED if path is None else path))
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write the network to a file."""
+        """Write the network to a file.
+
+        Parameters
+        ----------
+        path : str or path
+            File to write.
+
+        Returns
+        -------
+        pathlib.Path
+            Path of the file.
+
+        Raises
+        ------
+        OSError
+            The file cannot be written.
+        """
         return self.network.save(path)
 
     def __reduce__(self) -> tuple[type[Self], tuple[Network]]:

@@ -77,29 +77,105 @@ class Task(ABC):
 
     @abstractmethod
     def build(self, generator: np.random.Generator) -> Simulation:
-        """Build a robot in its state at the start of an episode, with random numbers if `redraw` is true."""
+        """Build a robot in its state at the start of an episode, with random numbers if `redraw` is true.
+
+        Parameters
+        ----------
+        generator : numpy.random.Generator
+            Source of random numbers.
+
+        Returns
+        -------
+        Simulation
+        """
 
     @abstractmethod
     def act(self, robots: Batch, actions: FloatArray, chosen: IntArray) -> None:
-        """Apply actions of the chosen robots, shape (chosen, action_size), for the next control step."""
+        """Apply actions of the chosen robots for the next control step.
+
+        Parameters
+        ----------
+        robots : Batch
+            All robots.
+        actions : ndarray of shape (chosen, action_size) [-]
+            Actions, each number from -1 to 1.
+        chosen : ndarray of int of shape (chosen,)
+            Numbers of the robots that act.
+        """
 
     @abstractmethod
     def observe(self, robots: Batch) -> npt.NDArray[np.floating[Any]]:
-        """Return the observations of every robot, shape (n, ...), finite."""
+        """Return the observations of every robot.
+
+        Parameters
+        ----------
+        robots : Batch
+            All robots.
+
+        Returns
+        -------
+        ndarray of shape (n, ...)
+            Finite numbers, in any units.
+        """
 
     @abstractmethod
     def reward(self, robots: Batch) -> FloatArray:
-        """Return the reward of the present state of every robot, shape (n,), finite."""
+        """Return the reward of the present state of every robot.
+
+        Parameters
+        ----------
+        robots : Batch
+            All robots.
+
+        Returns
+        -------
+        ndarray of shape (n,) [-]
+            Finite numbers.
+        """
 
     def finished(self, robots: Batch) -> npt.NDArray[np.bool_]:
-        """Return True for each robot whose episode has terminated (not truncated), shape (n,); none by default."""
+        """Return True for each robot whose episode has terminated (not truncated); none by default.
+
+        Parameters
+        ----------
+        robots : Batch
+            All robots.
+
+        Returns
+        -------
+        ndarray of bool of shape (n,)
+        """
         return np.zeros(len(robots), bool)
 
     def prepare(self, robots: Batch) -> None:  # noqa: B027
-        """Allocate data of each robot. Called once. By default it does nothing."""
+        """Allocate data of each robot. Called once. By default it does nothing.
+
+        Parameters
+        ----------
+        robots : Batch
+            All robots.
+        """
 
     def begin(self, robots: Batch, chosen: IntArray, generators: list[np.random.Generator]) -> None:  # noqa: B027
-        """Begin an episode of the chosen robots, each with its random generator. By default it does nothing."""
+        """Begin an episode of the chosen robots, each with its random generator. By default it does nothing.
+
+        Parameters
+        ----------
+        robots : Batch
+            All robots.
+        chosen : ndarray of int of shape (chosen,)
+            Numbers of the robots whose episode begins.
+        generators : list of numpy.random.Generator
+            Source of random numbers of each chosen robot.
+        """
 
     def draw(self, axes: Any, robots: Batch) -> None:  # noqa: B027
-        """Add to a picture of the first robot, on 3D axes of matplotlib. By default it does nothing."""
+        """Add to a picture of the first robot, on 3D axes of matplotlib. By default it does nothing.
+
+        Parameters
+        ----------
+        axes : mpl_toolkits.mplot3d.Axes3D
+            Axes of the picture.
+        robots : Batch
+            All robots.
+        """

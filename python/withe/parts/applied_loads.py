@@ -64,6 +64,16 @@ class AppliedLoads(ABC):
         Returns
         -------
         Load
+
+        Raises
+        ------
+        ValueError
+            Not a node of this scene, a wrong shape, or a value that is not finite.
+
+        See Also
+        --------
+        Simulation.set : Change the force during a simulation.
+        add_load : Add a distributed force.
         """
         return _put_at_node(self._bearer, "force", node, force, follower, name)
 
@@ -87,6 +97,16 @@ class AppliedLoads(ABC):
         Returns
         -------
         Load
+
+        Raises
+        ------
+        ValueError
+            Not a node of this scene, a wrong shape, or a value that is not finite.
+
+        See Also
+        --------
+        Simulation.set : Change the moment during a simulation.
+        add_force : Add a force.
         """
         return _put_at_node(self._bearer, "moment", node, moment, follower, name)
 
@@ -107,6 +127,16 @@ class AppliedLoads(ABC):
         Returns
         -------
         Load
+
+        Raises
+        ------
+        ValueError
+            Not a rod of this scene, a wrong shape, or a value that is not finite.
+
+        See Also
+        --------
+        add_force : Add a force at a node.
+        add_pressure : Add a pressure.
         """
         part = self._bearer.directory.rod(rod, "rod of the load")
         follows = validation.truth(follower, "follower")
@@ -146,6 +176,10 @@ class AppliedLoads(ABC):
         ------
         ValueError
             No normal is given for an open rod, or for a closed rod that encloses no area.
+
+        See Also
+        --------
+        add_load : Add a distributed force in any direction.
         """
         part = self._bearer.directory.rod(rod, "rod of the pressure")
         if normal is None:

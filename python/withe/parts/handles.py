@@ -142,62 +142,62 @@ class Handle:
 
 @dataclass(frozen=True)
 class Joint(Handle):
-    """Nodes that `Scene.join` made one."""
+    """Handle of a joint, made by `Scene.join`: nodes that are one."""
 
 
 @dataclass(frozen=True)
 class Support(Handle):
-    """Handle of a support, made by `clamp` and `pin`."""
+    """Handle of a support, made by `Scene.clamp` and `Scene.pin`."""
 
 
 @dataclass(frozen=True)
 class Hand(Support):
-    """Handle of a hand, made by `grasp`."""
+    """Handle of a hand, made by `Scene.grasp`."""
 
 
 @dataclass(frozen=True)
 class Load(Handle):
-    """A force, a moment or a distributed load."""
+    """Handle of a load, made by `Scene.add_force`, `add_moment`, `add_load` and `add_pressure`."""
 
 
 @dataclass(frozen=True)
 class Mass(Handle):
-    """A mass at a node."""
+    """Handle of a mass at a node, made by `Scene.add_mass`."""
 
 
 @dataclass(frozen=True)
 class Spring(Handle):
-    """A spring, with a damper beside it, between two nodes."""
+    """Handle of a spring between two nodes, made by `Scene.add_spring`."""
 
 
 @dataclass(frozen=True)
 class Tendon(Handle):
-    """A tendon that runs through guides on rods."""
+    """Handle of a tendon, made by `Scene.add_tendon`."""
 
 
 @dataclass(frozen=True)
 class Drag(Handle):
-    """Viscous drag on some rods."""
+    """Handle of the viscous drag on some rods, made by `Scene.add_drag`."""
 
 
 @dataclass(frozen=True)
 class Fluid(Handle):
-    """A viscous fluid around all rods."""
+    """Handle of the viscous fluid around all rods, made by `Scene.add_fluid`."""
 
 
 @dataclass(frozen=True)
 class CustomForce(Handle):
-    """Forces computed by a function of the user's."""
+    """Handle of forces that a function of the user computes, made by `Scene.add_custom_force`."""
 
 
 @dataclass(frozen=True)
 class Obstacle(Handle):
-    """Something solid that rods touch."""
+    """Handle of an obstacle, made by `Scene.add_floor`, `add_plane`, `add_sphere` and `add_capsule`."""
 
 
 @dataclass(frozen=True)
 class NodeHandle(Handle):
-    """A node of a rod; its name is "arm.start", "arm.end" or "arm.node(3)".
+    """Handle of a node of a rod, made by `Rod.node`, `Rod.start` and `Rod.end`.
 
     Attributes
     ----------
@@ -205,6 +205,8 @@ class NodeHandle(Handle):
         Name of the rod.
     index : int
         Zero or more.
+    name : str
+        "arm.start", "arm.end" or "arm.node(3)".
     """
 
     rod: str = field(repr=False)
@@ -213,7 +215,17 @@ class NodeHandle(Handle):
 
 @dataclass(frozen=True)
 class EdgeHandle(Handle):
-    """An edge of a rod, from node `index` to the next; its name is "arm.edge(3)"."""
+    """Handle of the edge of a rod from node `index` to the next, made by `Rod.edge`.
+
+    Attributes
+    ----------
+    name : str
+        "arm.edge(3)".
+    rod : str
+        Name of the rod.
+    index : int
+        Number of the edge, zero or more.
+    """
 
     rod: str = field(repr=False)
     index: int = field(repr=False)
@@ -221,7 +233,12 @@ class EdgeHandle(Handle):
 
 @dataclass(frozen=True)
 class Rod(Handle):
-    """A rod of a scene, made by `Scene.add_rod`.
+    """Handle of a rod of a scene, made by `Scene.add_rod`.
+
+    See Also
+    --------
+    Scene.add_rod : Add a rod.
+    Simulation.positions : Positions of the nodes of a rod.
 
     Examples
     --------
@@ -293,7 +310,16 @@ class Rod(Handle):
         return self.node(index)
 
     def node(self, index: int) -> NodeHandle:
-        """A node by its index; negative ones count from the end.
+        """Return a node by its index. Negative indices count from the end.
+
+        Parameters
+        ----------
+        index : int
+            Index of the node.
+
+        Returns
+        -------
+        NodeHandle
 
         Raises
         ------
@@ -307,7 +333,16 @@ class Rod(Handle):
         return NodeHandle(self.scene_id, f"{self.name}.{word}", self.name, i)
 
     def edge(self, index: int) -> EdgeHandle:
-        """An edge by its index; negative ones count from the end.
+        """Return an edge by its index. Negative indices count from the end.
+
+        Parameters
+        ----------
+        index : int
+            Index of the edge.
+
+        Returns
+        -------
+        EdgeHandle
 
         Raises
         ------

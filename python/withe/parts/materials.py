@@ -24,7 +24,7 @@ class Material:
     Parameters
     ----------
     youngs_modulus : float [Pa]
-    poisson_ratio : float
+    poisson_ratio : float [-]
         In (-1, 0.5]; 0.5, the default, keeps the volume.
     density : float [kg/m^3]
     viscosity : float [Pa s]
@@ -35,6 +35,11 @@ class Material:
     ------
     ValueError
         A modulus or density that is not positive, a negative viscosity, a Poisson ratio out of range.
+
+    See Also
+    --------
+    Stiffness : Stiffnesses given directly.
+    Scene.add_rod : Add a rod of a material.
 
     Examples
     --------
@@ -84,6 +89,10 @@ class Stiffness:
         GJ.
     viscous_time : float or array_like of shape (edges,) [s]
         Kelvin-Voigt damping: every stiffness times this time resists the rate of its strain.
+
+    See Also
+    --------
+    Material : Stiffness and mass from a material.
     """
 
     stretch: npt.ArrayLike

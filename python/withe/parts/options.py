@@ -29,9 +29,9 @@ class Solver:
         Solver of the linear equations.
     mixed : bool
         True to solve for axial forces as separate unknowns in Newton's method.
-    step_tolerance : float
+    step_tolerance : float [-]
         Bound on the last Newton step, relative to the length of the scene.
-    force_tolerance : float
+    force_tolerance : float [-]
         Bound on the residual, relative to the forces in the scene.
     max_iterations : int
         Maximum number of iterations of one Newton solve.
@@ -46,6 +46,10 @@ class Solver:
     ------
     ValueError
         An option out of range.
+
+    See Also
+    --------
+    Scene.build : Build a simulation with these options.
 
     Examples
     --------

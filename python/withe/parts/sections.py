@@ -11,26 +11,27 @@ import numpy.typing as npt
 
 from withe.common import validation
 from withe.common.keywords import keyword_hints
+from withe.common.short_repr import ShortRepr
 
 __all__ = ["Circle", "Rectangle", "Section", "SectionProperties", "Tube"]
 
 FloatArray = npt.NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class SectionProperties:
-    """Properties of a section for the equations of a rod, each an array of shape (edges,).
+@dataclass(frozen=True, repr=False)
+class SectionProperties(ShortRepr):
+    """Properties of the section of every edge of a rod.
 
     Attributes
     ----------
-    area [m^2]
-    moment1, moment2 [m^4]
+    area : ndarray of shape (edges,) [m^2]
+    moment1, moment2 : ndarray of shape (edges,) [m^4]
         Second moments of area that resist curvature towards d1 and d2.
-    torsion [m^4]
+    torsion : ndarray of shape (edges,) [m^4]
         Torsion constant J.
-    radii [m]
+    radii : ndarray of shape (edges,) [m]
         Radius of a round section, half the larger side of another.
-    widths : shape (edges, 2) [m], or None
+    widths : ndarray of shape (edges, 2) [m], or None
         Sides along d1 and d2; None for a round section.
     """
 
@@ -65,7 +66,25 @@ class Circle:
     radius: npt.ArrayLike
 
     def properties(self, edges: int, owner: str) -> SectionProperties:
-        """The section of every edge of a rod; `owner`, such as "rod 'arm'", is named in errors."""
+        """Return the properties of the section of every edge of a rod.
+
+        Parameters
+        ----------
+        edges : int
+            Number of edges.
+        owner : str
+            Name of the rod in errors, such as "rod 'arm'".
+
+        Returns
+        -------
+        SectionProperties
+            Area [m^2] and moments of area [m^4], each of shape (edges,).
+
+        Raises
+        ------
+        ValueError
+            A radius that is not positive, or an array of another length.
+        """
         r = validation.per_item(self.radius, f"radius of {owner}", edges, "edges")
         moment = 0.25 * math.pi * r**4
         return SectionProperties(math.pi * r**2, moment, moment.copy(), 2.0 * moment, r)
@@ -85,7 +104,26 @@ class Tube:
     inner_radius: npt.ArrayLike
 
     def properties(self, edges: int, owner: str) -> SectionProperties:
-        """The section of every edge of a rod; `owner`, such as "rod 'arm'", is named in errors."""
+        """Return the properties of the section of every edge of a rod.
+
+        Parameters
+        ----------
+        edges : int
+            Number of edges.
+        owner : str
+            Name of the rod in errors, such as "rod 'arm'".
+
+        Returns
+        -------
+        SectionProperties
+            Area [m^2] and moments of area [m^4], each of shape (edges,).
+
+        Raises
+        ------
+        ValueError
+            A radius that is not positive, an inner radius that is not below the outer one, or an array of another
+            length.
+        """
         outer = validation.per_item(self.outer_radius, f"outer_radius of {owner}", edges, "edges")
         inner = validation.per_item(self.inner_radius, f"inner_radius of {owner}", edges, "edges", zero=True)
         if np.any(inner >= outer):
@@ -111,7 +149,25 @@ class Rectangle:
     height: npt.ArrayLike
 
     def properties(self, edges: int, owner: str) -> SectionProperties:
-        """The section of every edge of a rod; `owner`, such as "rod 'arm'", is named in errors."""
+        """Return the properties of the section of every edge of a rod.
+
+        Parameters
+        ----------
+        edges : int
+            Number of edges.
+        owner : str
+            Name of the rod in errors, such as "rod 'arm'".
+
+        Returns
+        -------
+        SectionProperties
+            Area [m^2] and moments of area [m^4], each of shape (edges,).
+
+        Raises
+        ------
+        ValueError
+            A side that is not positive, or an array of another length.
+        """
         width = validation.per_item(self.width, f"width of {owner}", edges, "edges")
         height = validation.per_item(self.height, f"height of {owner}", edges, "edges")
         return SectionProperties(

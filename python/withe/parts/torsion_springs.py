@@ -21,7 +21,7 @@ FloatArray = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class TorsionSpring(Handle):
-    """A torsion spring between two edges."""
+    """Handle of a torsion spring between two edges, made by `Scene.add_torsion_spring`."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -92,9 +92,13 @@ class Camera:
         metres : array_like of shape (n, 2) or (n, 3) [m]
             Positions of the points: on the plane z = 0 (at least four points, no three on a line), or anywhere (at
             least six, not in one plane).
-        matrix, distortion : optional
+        matrix, distortion : array_like of shape (3, 3) [px], and of shape (4,) or (5,) [-], optional
             Matrix and distortion of the camera, if they are known. Points on a plane do not determine other heights
             without the matrix.
+
+        Returns
+        -------
+        Camera
 
         Raises
         ------
@@ -169,6 +173,12 @@ class Camera:
         Returns
         -------
         ndarray of shape (n, 2) [px]
+
+        Raises
+        ------
+        ValueError
+            A wrong shape, values that are not finite, or points off the plane of a camera that is calibrated on a plane
+            only.
         """
         world = _checked(points, (None, 3), "points")
         if self._flat:

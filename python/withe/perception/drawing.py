@@ -41,6 +41,8 @@ def draw(image: ArrayLike, tracing: Tracing) -> NDArray[np.uint8]:
     ------
     ValueError
         The argument is not an image.
+    ImportError
+        OpenCV is not installed.
     """
     cv2 = require("cv2", "vision")
     picture = np.ascontiguousarray(check_image(image) // 2 + 20)

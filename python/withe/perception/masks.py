@@ -133,10 +133,15 @@ def network_mask(model: Any, threshold: float = 0.5, size: tuple[int, int] | Non
         An ONNX file (run by OpenCV), a TorchScript file (.pt), or a module. Its input is one image of shape
         (1, 3, height, width), RGB from 0 to 1. Its output is one value per pixel, of shape (1, 1, height, width) or
         without leading ones. Of several channels the last is used.
-    threshold : float
+    threshold : float [-]
         Pixels above it belong to cables.
     size : (int, int), optional
         Height and width of the network's input. The image is resized to it, and the result is resized back.
+
+    Returns
+    -------
+    callable
+        Filter for `trace`: a function from an image to a mask of shape (height, width).
 
     Raises
     ------

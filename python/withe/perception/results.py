@@ -26,7 +26,7 @@ class Crossing:
     point : ndarray of shape (2,) [px]
     over, under : (int, int)
         Cable, and row of its centreline. Both name the same cable if it crosses itself.
-    confidence : float
+    confidence : float [-]
         Confidence in the order, from 0 (unknown, as from a mask alone) to 1.
     """
 
@@ -138,7 +138,13 @@ class Tracing:
         return points
 
     def to_dict(self) -> dict[str, Any]:
-        """Return all fields as plain Python objects for JSON; labels as runs (label, length) row by row."""
+        """Return all fields as plain Python objects for JSON; labels as runs (label, length) row by row.
+
+        Returns
+        -------
+        dict
+            Format, version and all fields.
+        """
         flat = self.labels.ravel()
         starts = np.flatnonzero(np.diff(flat, prepend=-1)) if len(flat) else np.zeros(0, int)
         lengths = np.diff(np.append(starts, len(flat)))
@@ -165,6 +171,15 @@ class Tracing:
     @classmethod
     def from_dict(cls, fields: dict[str, Any]) -> Tracing:
         """Return a tracing from the fields of `to_dict`.
+
+        Parameters
+        ----------
+        fields : dict
+            Fields, as `to_dict` returns them.
+
+        Returns
+        -------
+        Tracing
 
         Raises
         ------

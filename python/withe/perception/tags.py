@@ -51,11 +51,16 @@ class TagDetection(ShortRepr):
     normal: Array | None
 
     def pixels(self, numbers: Sequence[int]) -> Array:
-        """Return the centres of the tags with these numbers, shape (n, 2) [px]; NaN for tags that were not found.
+        """Return the centres of the tags with these numbers.
 
         Parameters
         ----------
         numbers : sequence of int
+
+        Returns
+        -------
+        ndarray of shape (n, 2) [px]
+            NaN for tags that were not found.
         """
         places = {number: i for i, number in enumerate(self.numbers)}
         missing = np.full(2, np.nan)

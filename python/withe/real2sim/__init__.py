@@ -13,7 +13,7 @@ from withe.real2sim.fitting import fit
 from withe.real2sim.logs import Log, read_log
 from withe.real2sim.motions import fit_motion
 from withe.real2sim.results import Fit, Outlier, Unobservable
-from withe.real2sim.targets import Curvatures, Tags
+from withe.real2sim.targets import Curvatures, Residual, Tags, Target
 
 __all__ = [
     "Calibration",
@@ -22,7 +22,9 @@ __all__ = [
     "Fit",
     "Log",
     "Outlier",
+    "Residual",
     "Tags",
+    "Target",
     "Unobservable",
     "calibrate",
     "fit",

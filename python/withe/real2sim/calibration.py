@@ -38,7 +38,7 @@ _SIDE = "side of the plane on which the camera is"
 
 
 class Calibration(Camera):
-    """A camera perpendicular to the plane in which a robot moves, and the places of its tags.
+    """A camera perpendicular to the plane in which a robot moves, and the places of its tags, made by `calibrate`.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class Calibration(Camera):
     scale : float [px/m]
     tilt : float [rad]
         Tilt of the base, towards positive curvature; 0 unless it was fitted.
-    places : list of (str, float)
+    places : list of (str, float [m])
         Rod and length along it [m] of every tag, for `Tags`.
     gravity : ndarray of shape (3,) [m/s^2]
         Gravity for the simulation: turned back by the tilt.

@@ -99,7 +99,13 @@ class Centrelines(ShortRepr, Target):
         return across_of_points(self.samples, normal, self.camera is None)
 
     def bind(self, simulation: Simulation) -> Residual:
-        """Return the residual for the nodes of a simulation."""
+        """Return the residual for the nodes of a simulation.
+
+        Raises
+        ------
+        ValueError
+            Rods that are not joined end to end.
+        """
         given = [self.rods] if isinstance(self.rods, Rod | str) else list(self.rods)
         lines = lines_of(simulation, [rod_part(simulation, rod) for rod in given])
         if len(lines) != 1:

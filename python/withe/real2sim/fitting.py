@@ -78,7 +78,7 @@ def fit(
     conditions : callable, optional
         Called with a simulation and the frame before each equilibrium, to set loads or move supports. It is called once
         more with a copy and the first frame, so that its errors are raised early.
-    tolerance : float, optional
+    tolerance : float [unit of the residuals], optional
         Norm of residuals below which a frame has converged. By default 1e-10; with "source" the sum of absolute
         residuals, 2.5e-3.
     max_iterations : int, optional

@@ -31,10 +31,10 @@ class Outlier:
     ----------
     frame, tag : int
         Indices, from 0.
-    jump : float
+    jump : float [px or m]
         Distance between the residual of the tag and its prediction from the neighbouring frames, for a fit without the
         tag, in the unit of the target [px or m].
-    scatter : float
+    scatter : float [px or m]
         Usual error: 1.48 times the median over all tags, at least sigma, or a millionth of the extent of all tags
         without one.
     """
@@ -57,13 +57,13 @@ class Unobservable:
 
     Attributes
     ----------
-    weights : dict of str to float
+    weights : dict of str to float [-]
         Share of each unknown in the combination: of the logarithm of a parameter, or of natural curvature times the
         length of the rod.
-    effect : float
+    effect : float [sigma, or unit of the target]
         Root mean square motion of the targets for a change by a factor e, or for a turn of one radian, while all other
         unknowns adapt. In units of sigma, or of the target without sigma.
-    misfit : float
+    misfit : float [sigma, or unit of the target]
         Root mean square residual of the fit, in the same unit as `effect`. A systematic misfit of this size would hide
         the change.
     frames : tuple of int
@@ -180,7 +180,19 @@ class Fit:
         )
 
     def value(self, rod: Rod | str, word: str = "natural_curvature") -> FloatArray:
-        """Return the values of one unknown, shape (frames, n): of a rod, or `value("delay")`.
+        """Return the values of one unknown: of a rod, or `value("delay")`.
+
+        Parameters
+        ----------
+        rod : Rod or str
+            Rod of the unknown, or "delay".
+        word : str
+            Parameter of the rod.
+
+        Returns
+        -------
+        ndarray of shape (frames, n)
+            Values in SI units.
 
         Raises
         ------
@@ -190,7 +202,25 @@ class Fit:
         return self.values[:, self._place(rod, word)]
 
     def sigma(self, rod: Rod | str, word: str = "natural_curvature") -> FloatArray:
-        """Return the standard deviations of one unknown, shape (frames, n)."""
+        """Return the standard deviations of one unknown.
+
+        Parameters
+        ----------
+        rod : Rod or str
+            Rod of the unknown, or "delay".
+        word : str
+            Parameter of the rod.
+
+        Returns
+        -------
+        ndarray of shape (frames, n)
+            Standard deviations in SI units.
+
+        Raises
+        ------
+        ValueError
+            It was not an unknown of the fit.
+        """
         deviations = np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
         return np.asarray(deviations[:, self._place(rod, word)])
 
@@ -217,7 +247,18 @@ class Fit:
             unknown.write(simulation, coordinates[end - len(unknown) : end])
 
     def points(self, rod: Rod | str, frame: int = -1) -> FloatArray:
-        """Return the drawn nodes of a rod, shape (nodes, 3) [m], from its fitted ``points``.
+        """Return the drawn nodes of a rod from its fitted ``points``.
+
+        Parameters
+        ----------
+        rod : Rod or str
+            Rod to read.
+        frame : int
+            Frame of the fit. By default the last one.
+
+        Returns
+        -------
+        ndarray of shape (nodes, 3) [m]
 
         Raises
         ------

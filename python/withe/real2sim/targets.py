@@ -37,11 +37,35 @@ class Residual(ABC):
 
     @abstractmethod
     def value(self, positions: FloatArray, frame: int) -> FloatArray:
-        """Return the residual, shape (residuals,), of positions of shape (nodes, 3) [m]."""
+        """Return the residual of positions in a frame.
+
+        Parameters
+        ----------
+        positions : ndarray of shape (nodes, 3) [m]
+            Positions of the nodes of the simulation.
+        frame : int
+            Frame of the target.
+
+        Returns
+        -------
+        ndarray of shape (residuals,)
+        """
 
     @abstractmethod
     def derivative(self, positions: FloatArray, frame: int) -> FloatArray:
-        """Return the derivatives by positions, shape (residuals, nodes, 3)."""
+        """Return the derivatives of the residual by positions.
+
+        Parameters
+        ----------
+        positions : ndarray of shape (nodes, 3) [m]
+            Positions of the nodes of the simulation.
+        frame : int
+            Frame of the target.
+
+        Returns
+        -------
+        ndarray of shape (residuals, nodes, 3)
+        """
 
 
 class Target(ABC):
@@ -57,20 +81,50 @@ class Target(ABC):
 
     @abstractmethod
     def bind(self, simulation: Simulation) -> Residual:
-        """Return the residual for the nodes of a simulation."""
+        """Return the residual for the nodes of a simulation.
+
+        Parameters
+        ----------
+        simulation : Simulation
+            Simulation whose nodes are compared with the target.
+
+        Returns
+        -------
+        Residual
+
+        Raises
+        ------
+        ValueError
+            The target does not fit the simulation.
+        """
 
     @abstractmethod
     def told(self, frame: int) -> int:
-        """Number of observations in a frame."""
+        """Return the number of observations in a frame.
+
+        Parameters
+        ----------
+        frame : int
+            Frame of the target.
+
+        Returns
+        -------
+        int
+        """
 
     @abstractmethod
     def across(self, normal: FloatArray) -> FloatArray:
-        """Directions of a frame's residual that no motion in a plane changes, as columns: (residuals, n), orthonormal.
+        """Return the directions of a frame's residual that no motion in a plane changes.
 
         Parameters
         ----------
         normal : ndarray of shape (3,)
             Normal of the plane.
+
+        Returns
+        -------
+        ndarray of shape (residuals, n)
+            Orthonormal columns.
         """
 
 
@@ -104,7 +158,7 @@ class Curvatures(ShortRepr, Target):
         Indices of the tags over which each value is averaged, from 0. The first and the last tag have no curvature.
     normal : array_like of shape (3,), optional
         Axis of positive rotations; not needed in a planar simulation.
-    sigma : float, optional
+    sigma : float [-], optional
         Standard deviation of the values. By default estimated from the residuals.
     times : array_like of shape (frames,), optional [s]
 
@@ -141,6 +195,15 @@ class Curvatures(ShortRepr, Target):
             positive.
         places, groups, **options
             Arguments of `Curvatures`.
+
+        Returns
+        -------
+        Curvatures
+
+        Raises
+        ------
+        ValueError
+            A wrong shape, or an argument that `Curvatures` refuses.
         """
         seen = _with_gaps(pixels, "pixels", (None, len(places), 2))
         curvature = 2.0 * np.tan(turns(seen * (1.0, -1.0)) / 2.0)
@@ -162,7 +225,13 @@ class Curvatures(ShortRepr, Target):
         return np.zeros((len(self.groups), 0))
 
     def bind(self, simulation: Simulation) -> Residual:
-        """Return the residual for the nodes of a simulation."""
+        """Return the residual for the nodes of a simulation.
+
+        Raises
+        ------
+        ValueError
+            A place that is not on a rod, or no `normal` for a simulation that is not planar.
+        """
         places = Places(simulation, self.places)
         axis = self.normal
         if axis is None:
@@ -265,6 +334,10 @@ class Tags(ShortRepr, Target):
         ----------
         outliers : sequence of (frame, tag)
             Frames and tags to leave out, such as `Fit.outliers`.
+
+        Returns
+        -------
+        Tags
         """
         points = np.array(self.points)
         for frame, tag, *_ in outliers:
@@ -272,7 +345,13 @@ class Tags(ShortRepr, Target):
         return Tags(points, self.places, self.camera, self.sigma, self.times)
 
     def bind(self, simulation: Simulation) -> Residual:
-        """Return the residual for the nodes of a simulation."""
+        """Return the residual for the nodes of a simulation.
+
+        Raises
+        ------
+        ValueError
+            A place that is not on a rod, or no camera for tags in pixels.
+        """
         if self.camera is None and np.shape(self.points)[2] == 2:
             raise ValueError("camera must be given for tags in pixels; real2sim.calibrate finds one")
         return _TagResidual(self, Places(simulation, self.places))

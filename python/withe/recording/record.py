@@ -53,7 +53,22 @@ class RunGradient(Protocol):
 class Record:
     """Frames of a run, made by `Simulation.run` or read with `Record.load`.
 
+    Methods and properties by purpose:
+
+    * read the scene: `times`, `rods`, `obstacles`, `springs`, `tendons`, `energy`, `keys`, `units`
+    * read rods: `positions`, `velocities`, `directors`, `spins`, `curvatures`, `twists`, `tensions`
+    * read parts: `obstacle_position`
+    * read pictures: `plot`, `view`, `picture`, `animate`
+    * read files: `save`, `load`, `to_vtk`
+    * differentiate: `gradient`
+
     Arrays that methods return are copies, with the frame as first axis. Rods are given by handle or by name.
+
+    See Also
+    --------
+    Simulation.run : Run a simulation and record its frames.
+    withe.view.animate : Render a record into a film.
+    BatchRecord : Records of a batch.
 
     Examples
     --------
@@ -128,6 +143,12 @@ class Record:
             A run without ``differentiable=True``. A run without a gradient, with the reason (contact without a given
             stiffness, anchored friction, restitution below 1, Stokeslets, integrator "verlet"). A wrong shape, a
             derivative out of the plane of a planar scene, or a friction of 0.
+
+        See Also
+        --------
+        Simulation.run : Run with ``differentiable=True``.
+        Equilibrium.gradient : Derivatives of an equilibrium.
+        withe.learning.rollout : A run as a function of torch.
 
         Notes
         -----
@@ -239,6 +260,11 @@ class Record:
     def positions(self, rod: Named | None = None) -> FloatArray:
         """Return the positions of the nodes of a rod, or of all nodes of the scene.
 
+        Parameters
+        ----------
+        rod : Rod, RodOutline or str, optional
+            Rod to read. By default every node of the scene.
+
         Returns
         -------
         ndarray of shape (frames, nodes, 3) [m]
@@ -247,13 +273,27 @@ class Record:
         ------
         ValueError
             No rod of that name.
+
+        See Also
+        --------
+        times : Times of the frames.
+        velocities : Velocities of the same nodes.
         """
         return self._nodal("positions", rod)
 
     def obstacle_position(self, obstacle: Named) -> FloatArray:
-        """Return the positions of an obstacle, shape (frames, 3) [m].
+        """Return the positions of an obstacle.
 
         This is the point of a plane, the centre of a sphere, or the start of a capsule.
+
+        Parameters
+        ----------
+        obstacle : Obstacle, ObstacleOutline or str
+            Obstacle to read.
+
+        Returns
+        -------
+        ndarray of shape (frames, 3) [m]
 
         Raises
         ------
@@ -264,27 +304,112 @@ class Record:
         return self._arrays[f"obstacle_{index}_place"].copy()
 
     def velocities(self, rod: Named | None = None) -> FloatArray:
-        """Return the velocities of the nodes of a rod, or of all nodes, shape (frames, nodes, 3) [m/s]."""
+        """Return the velocities of the nodes of a rod, or of all nodes of the scene.
+
+        Parameters
+        ----------
+        rod : Rod, RodOutline or str, optional
+            Rod to read. By default every node of the scene.
+
+        Returns
+        -------
+        ndarray of shape (frames, nodes, 3) [m/s]
+
+        Raises
+        ------
+        ValueError
+            No rod of that name.
+        """
         return self._nodal("velocities", rod)
 
     def directors(self, rod: Named) -> FloatArray:
-        """Return the material frames of the edges, shape (frames, edges, 3, 3), with rows d1, d2, tangent."""
+        """Return the material frames of the edges of a rod.
+
+        Parameters
+        ----------
+        rod : Rod, RodOutline or str
+            Rod to read.
+
+        Returns
+        -------
+        ndarray of shape (frames, edges, 3, 3)
+            The rows of each frame are the unit vectors d1, d2 and the tangent.
+
+        Raises
+        ------
+        ValueError
+            No rod of that name.
+        """
         return self._of_rod("directors", rod)
 
     def curvatures(self, rod: Named) -> FloatArray:
-        """Return the curvatures towards d1 and d2, shape (frames, stencils, 2) [1/m]."""
+        """Return the curvatures of a rod towards its directors d1 and d2.
+
+        Parameters
+        ----------
+        rod : Rod, RodOutline or str
+            Rod to read.
+
+        Returns
+        -------
+        ndarray of shape (frames, stencils, 2) [1/m]
+
+        Raises
+        ------
+        ValueError
+            No rod of that name.
+        """
         return self._of_rod("curvatures", rod)
 
     def twists(self, rod: Named) -> FloatArray:
-        """Return the twists per length, shape (frames, stencils) [rad/m]."""
+        """Return the twists per length of a rod.
+
+        Parameters
+        ----------
+        rod : Rod, RodOutline or str
+            Rod to read.
+
+        Returns
+        -------
+        ndarray of shape (frames, stencils) [rad/m]
+
+        Raises
+        ------
+        ValueError
+            No rod of that name.
+        """
         return self._of_rod("twists", rod)
 
     def tensions(self, rod: Named) -> FloatArray:
-        """Return the tension of each edge, as `Simulation.tensions`, shape (frames, edges) [N]."""
+        """Return the tension of each edge of a rod. See `Simulation.tensions`.
+
+        Parameters
+        ----------
+        rod : Rod, RodOutline or str
+            Rod to read.
+
+        Returns
+        -------
+        ndarray of shape (frames, edges) [N]
+
+        Raises
+        ------
+        ValueError
+            No rod of that name.
+        """
         return self._of_rod("tensions", rod)
 
     def spins(self, rod: Named) -> FloatArray:
-        """Return the angular velocities of the edges about their tangents, shape (frames, edges) [rad/s].
+        """Return the angular velocities of the edges of a rod about their tangents.
+
+        Parameters
+        ----------
+        rod : Rod, RodOutline or str
+            Rod to read.
+
+        Returns
+        -------
+        ndarray of shape (frames, edges) [rad/s]
 
         Raises
         ------
@@ -296,11 +421,26 @@ class Record:
         return self._of_rod("spins", rod)
 
     def energy(self) -> EnergyHistory:
-        """Return the energies, each an array of shape (frames,) [J]."""
+        """Return the energies of every frame.
+
+        Returns
+        -------
+        EnergyHistory
+            Each field is an array of shape (frames,) [J].
+
+        See Also
+        --------
+        Simulation.energy : Energies at one moment.
+        """
         return EnergyHistory(*(self._arrays[f"energy_{name}"].copy() for name in ENERGIES))
 
     def keys(self) -> tuple[str, ...]:
-        """Return the names of the quantities that ``run(record=)`` added."""
+        """Return the names of the quantities that ``run(record=)`` added.
+
+        Returns
+        -------
+        tuple of str
+        """
         return self._extras
 
     def __iter__(self) -> Iterator[str]:
@@ -347,12 +487,27 @@ class Record:
         Use `to_vtk` for ParaView. To write a table, choose its columns, for example
         ``numpy.savetxt("tip.csv", numpy.column_stack([record.times, record.positions("arm")[:, -1]]), delimiter=",")``.
 
+        Parameters
+        ----------
+        path : str or path
+            File to write, with the suffix .npz.
+
+        Returns
+        -------
+        pathlib.Path
+            Path of the file.
+
         Raises
         ------
         ValueError
             A path with another suffix.
         OSError
             The file cannot be written.
+
+        See Also
+        --------
+        load : Read the file.
+        to_vtk : Write files for ParaView.
         """
         path = validation.file_path(path, ".npz", instead=_OTHER_FORMATS)
         header = {
@@ -381,12 +536,25 @@ class Record:
     def load(cls, path: str | os.PathLike[str]) -> Record:
         """Read a record that `save` wrote.
 
+        Parameters
+        ----------
+        path : str or path
+            File to read.
+
+        Returns
+        -------
+        Record
+
         Raises
         ------
         ValueError
             A file that is damaged, not a record, or of another version.
         OSError
             The file cannot be opened.
+
+        See Also
+        --------
+        save : Write a record.
         """
         header, arrays = io.load_arrays(path, "record", _FILE_VERSION)
         try:
@@ -426,15 +594,56 @@ class Record:
         """Write the frames for ParaView; open the .pvd file whose path is returned.
 
         See `withe.io.write_vtk` for what the files hold.
+
+        Parameters
+        ----------
+        folder : str or path
+            Folder for the files. It is made if it does not exist.
+
+        Returns
+        -------
+        pathlib.Path
+            Path of the .pvd file.
+
+        Raises
+        ------
+        ValueError
+            A path with the suffix of a file.
+        OSError
+            The files cannot be written.
+
+        See Also
+        --------
+        save : Write one file that `load` reads.
         """
         return io.write_vtk(self, folder)
 
     # Pictures
 
     def plot(self, **options: Any) -> Any:
-        """Shapes at several times and energies over time, as a matplotlib figure.
+        """Plot shapes at several times and energies over time, as a matplotlib figure.
 
         See `withe.view.plot` for the options.
+
+        Parameters
+        ----------
+        **options
+            Options of `withe.view.plot`.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        Raises
+        ------
+        ValueError
+            An option out of range.
+        ImportError
+            matplotlib is not installed.
+
+        See Also
+        --------
+        withe.view.plot : All options.
         """
         return view.plot(self, **options)
 
@@ -442,6 +651,20 @@ class Record:
         """Show the rods in a notebook or a window, with controls for the view and the time.
 
         See `withe.view.view` for the options.
+
+        Parameters
+        ----------
+        **options
+            Options of `withe.view.view`.
+
+        Returns
+        -------
+        object
+            The widget in a notebook, else the window, as `withe.view.view` returns it.
+
+        See Also
+        --------
+        withe.view.view : All options, and what they raise.
         """
         return view.view(self, **options)
 
@@ -449,6 +672,28 @@ class Record:
         """Render the rods as tubes into a film, .mp4 or .gif.
 
         See `withe.view.animate` for the options.
+
+        Parameters
+        ----------
+        path : str or path
+            File to write, with the suffix .mp4 or .gif.
+        **options
+            Options of `withe.view.animate`.
+
+        Returns
+        -------
+        pathlib.Path
+            Path of the film.
+
+        Raises
+        ------
+        ValueError
+            An option out of range, or a path with another suffix.
+
+        See Also
+        --------
+        withe.view.animate : All options.
+        picture : Render one frame.
         """
         return view.animate(self, path, **options)
 
@@ -456,5 +701,22 @@ class Record:
         """Render one frame into a .png file, by default the last one.
 
         See `withe.view.picture` for the options.
+
+        Parameters
+        ----------
+        path : str or path
+            File to write, with the suffix .png.
+        **options
+            Options of `withe.view.picture`.
+
+        Returns
+        -------
+        pathlib.Path
+            Path of the picture.
+
+        See Also
+        --------
+        withe.view.picture : All options, and what they raise.
+        animate : Render a film.
         """
         return view.picture(self, path, **options)

@@ -45,7 +45,7 @@ class Contacts:
         ----------
         height : float [m]
             Height of the floor.
-        friction : float, pair or tuple of three of float, or callable
+        friction : float, pair or tuple of three of float [-], or callable
             Friction coefficient between the floor and every rod; `set_friction` sets it for one rod.
 
             * Two coefficients act along and across a rod. For slip in direction s on a rod with tangent t, friction is
@@ -54,9 +54,9 @@ class Contacts:
             * A callable varies friction over the floor: ``f(points)``, with points of shape (n, 3) [m], returns n
               coefficients. It is called before each step, and moves and turns with the obstacle. A `FrictionMap` is
               such a callable, made from an image.
-        restitution : float
+        restitution : float [-]
             Speed after an impact over the speed before, from 0 to 1; see `enable_contact`.
-        rolling_friction : float
+        rolling_friction : float [-]
             Coefficient of rolling friction. The resisting couple is at most the coefficient times the radius of the
             rod times the normal force [Johnson 1985, Contact Mechanics, section 9.1]. Needs "anchored" or "implicit"
             friction.
@@ -71,6 +71,11 @@ class Contacts:
         ------
         ValueError
             A height that is not a number, negative friction, or a restitution outside of 0 to 1.
+
+        See Also
+        --------
+        add_plane : Add a plane in any direction.
+        set_friction : Set the friction between the floor and one rod.
         """
         height = validation.number(height, "height of the floor")
         name = self._directory.new_name(name, "floor")
@@ -104,9 +109,9 @@ class Contacts:
             A point of the plane.
         normal : array_like of shape (3,)
             Normal of any length, out of the solid.
-        friction : float, pair or tuple of three of float, or callable
+        friction : float, pair or tuple of three of float [-], or callable
             Friction coefficient, as in `add_floor`.
-        restitution, rolling_friction : float
+        restitution, rolling_friction : float [-]
             Coefficients of restitution and rolling friction, as in `add_floor`.
         name : str
             Name of the plane. By default "plane 1", ...
@@ -114,6 +119,17 @@ class Contacts:
         Returns
         -------
         Obstacle
+
+        Raises
+        ------
+        ValueError
+            A point or normal that is not finite, a normal of length zero, negative friction, or a restitution outside
+            of 0 to 1.
+
+        See Also
+        --------
+        add_floor : Add a horizontal plane.
+        Simulation.move : Move the plane.
         """
         name = self._directory.new_name(name, "plane")
         where = validation.vector(point, f"point of {name!r}")
@@ -146,9 +162,9 @@ class Contacts:
             Center of the sphere.
         radius : float [m]
             Radius of the sphere.
-        friction : float, pair or tuple of three of float, or callable
+        friction : float, pair or tuple of three of float [-], or callable
             Friction coefficient, as in `add_floor`.
-        restitution, rolling_friction : float
+        restitution, rolling_friction : float [-]
             Coefficients of restitution and rolling friction, as in `add_floor`.
         name : str
             Name of the sphere. By default "sphere 1", ...
@@ -156,6 +172,17 @@ class Contacts:
         Returns
         -------
         Obstacle
+
+        Raises
+        ------
+        ValueError
+            A center that is not finite, a radius that is not positive, negative friction, or a restitution outside of
+            0 to 1.
+
+        See Also
+        --------
+        add_capsule : Add a cylinder with round ends.
+        Simulation.move : Move the sphere.
         """
         name = self._directory.new_name(name, "sphere")
         where = validation.vector(center, f"center of {name!r}")
@@ -189,9 +216,9 @@ class Contacts:
             Ends of the axis.
         radius : float [m]
             Radius of the capsule.
-        friction : float, pair or tuple of three of float, or callable
+        friction : float, pair or tuple of three of float [-], or callable
             Friction coefficient, as in `add_floor`.
-        restitution, rolling_friction : float
+        restitution, rolling_friction : float [-]
             Coefficients of restitution and rolling friction, as in `add_floor`.
         name : str
             Name of the capsule. By default "capsule 1", ...
@@ -199,6 +226,17 @@ class Contacts:
         Returns
         -------
         Obstacle
+
+        Raises
+        ------
+        ValueError
+            An end that is not finite, a radius that is not positive, negative friction, or a restitution outside of 0
+            to 1.
+
+        See Also
+        --------
+        add_sphere : Add a sphere.
+        Simulation.move : Move the capsule.
         """
         name = self._directory.new_name(name, "capsule")
         first, last = validation.vector(start, f"start of {name!r}"), validation.vector(end, f"end of {name!r}")
@@ -233,9 +271,9 @@ class Contacts:
         ----------
         rods : bool
             True if rods touch each other and themselves. False enables contact with obstacles only.
-        friction : float
+        friction : float [-]
             Friction coefficient between rods.
-        restitution : float
+        restitution : float [-]
             Speed after an impact between rods over the speed before, from 0 to 1; see Notes.
         model : {"imcv2", "barrier", "imcv1", "spillmann_teschner"}
             Contact energy: the smooth penalty (5.2) of Choi's dissertation, or its barrier (5.1). For comparison, its
@@ -271,6 +309,12 @@ class Contacts:
             Negative friction, a restitution outside of 0 to 1, a tolerance or stiffness that is not positive, or a
             tolerance above a radius. `build` raises it for overlapping surfaces, naming both edges and the depth, and
             for a restitution below 1 with integrator "verlet".
+
+        See Also
+        --------
+        set_friction : Set the friction of two bodies.
+        ignore_contact : Disable contact of two bodies.
+        Simulation.contacts : Places and forces of contacts.
 
         Notes
         -----
@@ -329,7 +373,7 @@ class Contacts:
         ----------
         a, b : Rod, Obstacle or str
             The two bodies.
-        friction : float, pair or tuple of three of float, array_like of shape (edges,), or callable
+        friction : float, pair or tuple of three of float [-], array_like of shape (edges,), or callable
             One coefficient. For a rod and an obstacle also two or three coefficients by direction, or a function of
             position on the obstacle, as in `add_floor`. Also one coefficient per edge of the rod (as an array if the
             rod has three edges).
@@ -338,6 +382,11 @@ class Contacts:
         ------
         ValueError
             Two obstacles, friction that is negative or not finite, or more than one coefficient for two rods.
+
+        See Also
+        --------
+        Simulation.set : Change the friction during a simulation.
+        enable_contact : Set the friction between all rods.
 
         Examples
         --------
@@ -352,27 +401,86 @@ class Contacts:
         _set_pair(self._directory, a, b, friction=own)
 
     def set_restitution(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, restitution: float) -> None:
-        """Set the coefficient of restitution of two rods, or of a rod and an obstacle, from 0 to 1."""
+        """Set the coefficient of restitution of two rods, or of a rod and an obstacle.
+
+        Parameters
+        ----------
+        a, b : Rod, Obstacle or str
+            The two bodies.
+        restitution : float [-]
+            Speed after an impact over the speed before, from 0 to 1; see `enable_contact`.
+
+        Raises
+        ------
+        ValueError
+            Two obstacles, or a restitution outside of 0 to 1.
+
+        See Also
+        --------
+        enable_contact : Set the restitution between all rods.
+        """
         _set_pair(self._directory, a, b, restitution=validation.share(restitution, "restitution"))
 
     def set_contact_stiffness(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, stiffness: float) -> None:
-        """Set the contact stiffness of two rods, or of a rod and an obstacle [N/m].
+        """Set the contact stiffness of two rods, or of a rod and an obstacle.
 
         The stiffness is constant, except that it grows if surfaces would penetrate each other too deeply in a step.
+
+        Parameters
+        ----------
+        a, b : Rod, Obstacle or str
+            The two bodies.
+        stiffness : float [N/m]
+            Contact force per penetration of the surfaces.
+
+        Raises
+        ------
+        ValueError
+            Two obstacles, or a stiffness that is not positive.
+
+        See Also
+        --------
+        enable_contact : Set the stiffness of all contacts.
         """
         _set_pair(self._directory, a, b, stiffness=validation.positive(stiffness, "stiffness of contact"))
 
     def ignore_contact(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str) -> None:
-        """Disable contact of two rods, of a rod and an obstacle, or of a rod with itself."""
+        """Disable contact of two rods, of a rod and an obstacle, or of a rod with itself.
+
+        Parameters
+        ----------
+        a, b : Rod, Obstacle or str
+            The two bodies, or one rod twice.
+
+        Raises
+        ------
+        ValueError
+            Two obstacles, or a body that is not in the scene.
+
+        See Also
+        --------
+        set_contact_group : Disable contact within a group of rods.
+        """
         _set_pair(self._directory, a, b, ignored=True)
 
     def set_contact_group(self, rod: Rod | str, group: str) -> None:
         """Put a rod into a group. Rods of one group do not touch each other or themselves.
 
+        Parameters
+        ----------
+        rod : Rod or str
+            Rod to put into the group.
+        group : str
+            Name of the group.
+
         Raises
         ------
         ValueError
             The first argument is not a rod, or the group is not text.
+
+        See Also
+        --------
+        ignore_contact : Disable contact of two bodies.
         """
         part = self._directory.rod(rod)
         if not isinstance(group, str) or not group:

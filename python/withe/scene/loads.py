@@ -30,7 +30,30 @@ class Loads:
     _directory: Directory
 
     def add_mass(self, node: NodeHandle | str, mass: float, *, name: str | None = None) -> Mass:
-        """Add a point mass [kg] to a node."""
+        """Add a point mass to a node.
+
+        Parameters
+        ----------
+        node : NodeHandle or str
+            Node that carries the mass.
+        mass : float [kg]
+            The mass, zero or more.
+        name : str
+            Name of the mass. By default "mass 1", ...
+
+        Returns
+        -------
+        Mass
+
+        Raises
+        ------
+        ValueError
+            Not a node of this scene, or a mass that is negative or not finite.
+
+        See Also
+        --------
+        Simulation.set : Change the mass.
+        """
         name = self._directory.new_name(name, "mass")
         place, node_name = self._directory.node(node, "node of the mass")
         part = MassPart(name, place, validation.non_negative(mass, f"mass at {node_name!r}"))
@@ -76,6 +99,11 @@ class Loads:
         ValueError
             A node given twice, a number that is negative or not finite, or a positive rest_length between nodes that
             coincide.
+
+        See Also
+        --------
+        add_torsion_spring : Add a spring between the directions of two edges.
+        Simulation.spring_tension : Force of a spring.
 
         Examples
         --------
@@ -127,6 +155,11 @@ class Loads:
         ValueError
             If `a` and `b` are the same edge, if both lie along one line and `axis` is not given, or if a number is out
             of range.
+
+        See Also
+        --------
+        add_spring : Add a spring between two nodes.
+        join : Join rods by a revolute joint with a spring.
 
         Notes
         -----
@@ -197,6 +230,11 @@ class Loads:
             Fewer than two guides, two consecutive guides at one point, an inner node, a number that is not finite, or a
             negative tension.
 
+        See Also
+        --------
+        Simulation.tendon_length : Length of a tendon.
+        Simulation.set : Change the tension.
+
         Examples
         --------
         A tendon 6 mm beside the centreline, and one through four disks:
@@ -225,6 +263,15 @@ class Loads:
         Returns
         -------
         Drag
+
+        Raises
+        ------
+        ValueError
+            A coefficient that is negative or not finite, or rods that are not rods of this scene.
+
+        See Also
+        --------
+        add_fluid : Drag of a viscous fluid, from its viscosity.
         """
         name = self._directory.new_name(name, "drag")
         coefficient = validation.non_negative(coefficient, "drag coefficient")
@@ -269,6 +316,15 @@ class Loads:
         Returns
         -------
         CustomForce
+
+        Raises
+        ------
+        ValueError
+            A function or jacobian that cannot be called.
+
+        See Also
+        --------
+        Simulation.check_jacobian : Compare the jacobian with finite differences.
 
         Notes
         -----
@@ -353,6 +409,10 @@ class Loads:
         ------
         ValueError
             A second fluid, a number out of range, or an unknown model.
+
+        See Also
+        --------
+        add_drag : Drag by coefficients.
 
         Examples
         --------

@@ -66,6 +66,12 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
     gravity : array_like of shape (3,) [m/s^2]
         Acceleration of free fall.
 
+    See Also
+    --------
+    Simulation : A running scene, made by `build`.
+    Batch : Many simulations that step together, made by `build_batch`.
+    Material : Elasticity and density of a rod.
+
     Examples
     --------
     >>> import withe
@@ -196,6 +202,13 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         ValueError
             An argument is out of range or contradicts another one. The message names the argument.
 
+        See Also
+        --------
+        withe.shapes.helix : Centreline of a helix; `withe.shapes` has other shapes.
+        join : Join nodes of rods.
+        Material : Elasticity and density.
+        clamp : Clamp a node.
+
         Examples
         --------
         >>> scene = Scene()
@@ -322,6 +335,11 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         ValueError
             Nodes further apart than 1e-9 of the scene, a node given twice, contradicting joints at one node, or an
             axis, stiffness, rest_angle, damping or moment without ``kind="revolute"``. Then no node is joined.
+
+        See Also
+        --------
+        add_torsion_spring : Add a torsion spring without a joint.
+        Simulation.joint_angle : Angle of a revolute joint.
 
         Examples
         --------
@@ -531,6 +549,12 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         ValueError
             A scene without rods, planar=True for a scene that is not planar, an explicit step above the stable limit,
             "fourth_order" with viscosity or strong drag, or an option out of range.
+
+        See Also
+        --------
+        build_batch : Build many simulations that step together.
+        Solver : Options of Newton's method and of the subdivision of steps.
+        Simulation.plan : Decisions of `build`.
         """
         options = BuildOptions(
             integrator=integrator,
@@ -570,6 +594,11 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         ------
         ValueError
             See `build`; or count or workers below 1.
+
+        See Also
+        --------
+        build : The options of each simulation.
+        Batch : Methods of a batch.
 
         Examples
         --------

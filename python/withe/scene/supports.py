@@ -55,6 +55,13 @@ class Supports:
         ------
         ValueError
             The node already has a support.
+
+        See Also
+        --------
+        pin : Fix the position only.
+        grasp : Hold a length of a rod by a hand.
+        Simulation.move : Move the clamp.
+        Simulation.reaction : Force and moment of the clamp.
         """
         return _hold(self._directory, make_clamp(self._directory, node, hold, free, spin, name))
 
@@ -62,6 +69,29 @@ class Supports:
         """Fix the position of a node. The rod is free to turn.
 
         Arguments, return value and errors are those of `clamp`.
+
+        Parameters
+        ----------
+        node : NodeHandle or str
+            Node to pin.
+        free : array_like of shape (3,) or (2, 3)
+            Directions along which the pin may slide.
+        name : str
+            Name of the support. By default "pin 1", ...
+
+        Returns
+        -------
+        Support
+
+        Raises
+        ------
+        ValueError
+            The node already has a support.
+
+        See Also
+        --------
+        clamp : Hold the direction of the rod too.
+        Simulation.move : Move the pin.
         """
         return _hold(self._directory, make_pin(self._directory, node, free, name))
 
@@ -108,7 +138,7 @@ class Supports:
             True for a ring, through which the rod slides. A ring holds the rod across by one stiffness [N/m], by
             default the stretching stiffness of an edge, but neither along the rod nor its direction. If the end of the
             rod passes the ring, the ring is released with a `RingLeftWarning`.
-        friction : float
+        friction : float [-]
             Coulomb friction coefficient of a ring without a drive.
         feed_rate : float [m/s]
             Undeformed length per time that a drive in the ring feeds towards the end of the rod. 0 holds the rod;
@@ -126,6 +156,12 @@ class Supports:
             A place off the rod, an edge that is already held, or a node that a clamp or pin holds. A stiffness or
             force limit that is not positive, negative friction, friction of a driven ring, or a ring option without
             ``slides=True``. Two hands may hold neighbouring edges; the first hand holds their common node.
+
+        See Also
+        --------
+        clamp : Clamp a node.
+        Simulation.wrench : Force and moment of a hand.
+        Simulation.feed : Change the feed rate of a drive.
 
         Examples
         --------

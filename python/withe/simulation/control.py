@@ -2,20 +2,71 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal, Unpack, overload
 
+import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
 from withe.common.deprecation import old_word
 from withe.common.keywords import keyword_hints
-from withe.parts.handles import CustomForce, Load, Rod, Support
+from withe.parts.applied_loads import Value
+from withe.parts.friction import Friction
+from withe.parts.handles import (
+    CustomForce,
+    Drag,
+    Fluid,
+    Joint,
+    Load,
+    Mass,
+    Obstacle,
+    Rod,
+    Spring,
+    Support,
+    Tendon,
+)
+from withe.parts.torsion_springs import TorsionSpring
 from withe.simulation.functions import check_jacobian
 from withe.simulation.loads import remove_load
+from withe.simulation.motion import RotationLike
 from withe.simulation.parameters import Settable, get_value, set_values
 from withe.simulation.session import Session
+from withe.simulation.typed_words import (
+    Body,
+    DragWord,
+    DragWords,
+    FluidNumber,
+    FluidWords,
+    JointWord,
+    JointWords,
+    LoadVector,
+    LoadWords,
+    MassWord,
+    MassWords,
+    MaterialWord,
+    Number,
+    ObstacleNumber,
+    ObstacleVector,
+    ObstacleWords,
+    PairNumber,
+    PairWords,
+    RodArray,
+    RodWords,
+    SceneNumber,
+    SceneWords,
+    SpringWord,
+    SpringWords,
+    SupportVector,
+    SupportWords,
+    TendonWord,
+    TendonWords,
+    TorsionWord,
+    TorsionWords,
+)
 
 __all__ = ["Control"]
+
+FloatArray = npt.NDArray[np.float64]
 
 
 @keyword_hints
@@ -41,6 +92,15 @@ class Control:
             Duration of a linear ramp to the value. By default the change is immediate.
         discrete : bool
             True if the curvature is given as 2 tan(phi / 2) [-], with phi the angle between two edges.
+
+        Raises
+        ------
+        ValueError
+            Not a rod of this scene, a wrong shape, or a value that is not finite.
+
+        See Also
+        --------
+        set : The method to use instead.
         """
         word = "discrete_curvature" if validation.truth(discrete, "discrete") else "natural_curvature"
         _set_rod(self._session, "set_natural_curvature", rod, word, curvature, over)
@@ -56,6 +116,10 @@ class Control:
             Natural twist: one value for the whole rod, or one per stencil.
         over : float [s]
             Duration of a linear ramp to the value. By default the change is immediate.
+
+        See Also
+        --------
+        set : The method to use instead.
         """
         _set_rod(self._session, "set_natural_twist", rod, "natural_twist", twist, over)
 
@@ -70,10 +134,62 @@ class Control:
             Natural length over drawn length.
         over : float [s]
             Duration of a linear ramp to the value. By default the change is immediate.
+
+        See Also
+        --------
+        set : The method to use instead.
         """
         _set_rod(self._session, "set_natural_stretch", rod, "natural_stretch", stretch, over)
 
     # Parameters
+
+    @overload
+    def set(self, target: Rod, /, *, over: float = 0.0, **values: Unpack[RodWords]) -> None: ...
+
+    @overload
+    def set(self, target: Load, /, *, over: float = 0.0, **values: Unpack[LoadWords[Value]]) -> None: ...
+
+    @overload
+    def set(self, target: Mass, /, *, over: float = 0.0, **values: Unpack[MassWords[Number]]) -> None: ...
+
+    @overload
+    def set(self, target: Spring, /, *, over: float = 0.0, **values: Unpack[SpringWords[Number]]) -> None: ...
+
+    @overload
+    def set(self, target: Tendon, /, *, over: float = 0.0, **values: Unpack[TendonWords[Number]]) -> None: ...
+
+    @overload
+    def set(self, target: Joint, /, *, over: float = 0.0, **values: Unpack[JointWords[Number]]) -> None: ...
+
+    @overload
+    def set(self, target: TorsionSpring, /, *, over: float = 0.0, **values: Unpack[TorsionWords[Number]]) -> None: ...
+
+    @overload
+    def set(self, target: Drag, /, *, over: float = 0.0, **values: Unpack[DragWords[Number]]) -> None: ...
+
+    @overload
+    def set(self, target: Fluid, /, *, over: float = 0.0, **values: Unpack[FluidWords[Number]]) -> None: ...
+
+    @overload
+    def set(
+        self, target: Obstacle, /, *, over: float = 0.0, **values: Unpack[ObstacleWords[Number, Friction]]
+    ) -> None: ...
+
+    @overload
+    def set(
+        self, target: Support, /, *, over: float = 0.0, **values: Unpack[SupportWords[Number, RotationLike]]
+    ) -> None: ...
+
+    @overload
+    def set(
+        self, target: tuple[Body, Body], /, *, over: float = 0.0, **values: Unpack[PairWords[Number, Friction]]
+    ) -> None: ...
+
+    @overload
+    def set(self, target: None = None, /, *, over: float = 0.0, **values: Unpack[SceneWords[Number]]) -> None: ...
+
+    @overload
+    def set(self, target: str, /, *, over: float = 0.0, **values: Any) -> None: ...
 
     def set(self, target: Settable | str | None = None, /, *, over: float = 0.0, **values: Any) -> None:
         """Set parameters of a part or of the scene.
@@ -119,6 +235,12 @@ class Control:
             A parameter that the target does not have, a parameter that `over` does not ramp, or a value out of range.
             Then nothing is changed.
 
+        See Also
+        --------
+        get : Return the present value of a parameter.
+        move : Move a support or an obstacle.
+        Batch.set : Set parameters of many simulations.
+
         Examples
         --------
         >>> simulation.set(arm, youngs_modulus=2e6, natural_stretch=1.01)
@@ -126,6 +248,75 @@ class Control:
         >>> simulation.set(arm, natural_curvature=(0.0, 12.5), over=0.2)
         """
         set_values(self._session, target, values, over)
+
+    @overload
+    def get(self, target: Rod, word: MaterialWord) -> Any: ...
+
+    @overload
+    def get(self, target: Rod, word: RodArray) -> FloatArray: ...
+
+    @overload
+    def get(self, target: Load, word: LoadVector) -> FloatArray: ...
+
+    @overload
+    def get(self, target: Load, word: Literal["pressure"]) -> float | FloatArray: ...
+
+    @overload
+    def get(self, target: Mass, word: MassWord) -> float: ...
+
+    @overload
+    def get(self, target: Spring, word: SpringWord) -> float: ...
+
+    @overload
+    def get(self, target: Tendon, word: TendonWord) -> float: ...
+
+    @overload
+    def get(self, target: Joint, word: JointWord) -> float: ...
+
+    @overload
+    def get(self, target: TorsionSpring, word: TorsionWord) -> float: ...
+
+    @overload
+    def get(self, target: Drag, word: DragWord) -> float: ...
+
+    @overload
+    def get(self, target: Fluid, word: FluidNumber) -> float: ...
+
+    @overload
+    def get(self, target: Fluid, word: Literal["regularization"]) -> float | None: ...
+
+    @overload
+    def get(self, target: Obstacle, word: ObstacleNumber) -> float: ...
+
+    @overload
+    def get(self, target: Obstacle, word: ObstacleVector) -> FloatArray: ...
+
+    @overload
+    def get(self, target: Obstacle, word: Literal["friction"]) -> Any: ...
+
+    @overload
+    def get(self, target: Support, word: SupportVector) -> FloatArray: ...
+
+    @overload
+    def get(self, target: Support, word: Literal["friction"]) -> float: ...
+
+    @overload
+    def get(self, target: tuple[Body, Body], word: PairNumber) -> float: ...
+
+    @overload
+    def get(self, target: tuple[Body, Body], word: Literal["friction", "contact_stiffness"]) -> Any: ...
+
+    @overload
+    def get(self, target: Literal["gravity"], word: None = None) -> FloatArray: ...
+
+    @overload
+    def get(self, target: SceneNumber, word: None = None) -> float: ...
+
+    @overload
+    def get(self, target: Literal["contact_stiffness"], word: None = None) -> float | None: ...
+
+    @overload
+    def get(self, target: str, word: str | None = None) -> Any: ...
 
     def get(self, target: Settable | Support | str, word: str | None = None) -> Any:
         """Return the present value of a parameter of `set`.
@@ -152,6 +343,11 @@ class Control:
         ValueError
             A parameter that the target does not have.
 
+        See Also
+        --------
+        set : Change a parameter.
+        positions : Positions of nodes, and other read-outs of the motion.
+
         Examples
         --------
         >>> simulation.get(arm, "natural_curvature").shape
@@ -173,6 +369,10 @@ class Control:
         ------
         ValueError
             The load was already removed, or belongs to the scene.
+
+        See Also
+        --------
+        add_force : Add a force, as one of four kinds of loads.
 
         Examples
         --------

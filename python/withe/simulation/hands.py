@@ -103,6 +103,11 @@ class RunningHand(Hand):
     Copies and pickles are plain handles. A copy of the simulation has a hand of the same name:
     ``copy.hand(hand.name)``.
 
+    See Also
+    --------
+    Simulation.grasp : Make a hand.
+    Hand : The plain handle, which scenes return.
+
     Examples
     --------
     >>> hand = simulation.grasp(arm, at=0.2, length=0.02)
@@ -133,11 +138,48 @@ class RunningHand(Hand):
         over: float = 0.0,
         path: PathLike | None = None,
     ) -> None:
-        """Move the hand. See `Simulation.move`; `rotation` has the axes of the hand in the world."""
+        """Move the hand. See `Simulation.move`; `rotation` has the axes of the hand in the world.
+
+        Parameters
+        ----------
+        position : array_like of shape (3,) [m]
+            Target position.
+        rotation : array_like of shape (4,) or (3, 3), or a SciPy Rotation
+            Axes of the hand in the world: a unit quaternion (w, x, y, z), a matrix or a Rotation.
+        tangent : array_like of shape (3,)
+            Target direction of the rod, instead of a rotation.
+        roll : float [rad]
+            Rotation about the tangent.
+        over : float [s]
+            Duration of the ramp to the target. By default the target is reached within the next step.
+        path : callable, pair of callables, or array_like of shape (poses, 4) or (poses, 8)
+            Path, instead of the targets above.
+
+        Raises
+        ------
+        ValueError
+            The hand was released, or arguments contradict each other.
+        """
         move_support(self.session, self, position, rotation, tangent, roll, over, path)
 
     def wrench(self, about: npt.ArrayLike | None = None) -> Reaction:
-        """Return the total force and moment of the hand on the rod. See `Simulation.wrench`."""
+        """Return the total force and moment of the hand on the rod. See `Simulation.wrench`.
+
+        Parameters
+        ----------
+        about : array_like of shape (3,) [m]
+            Point about which the moment is taken. By default the position of the hand.
+
+        Returns
+        -------
+        Reaction
+            Force of shape (3,) [N] and moment of shape (3,) [N m].
+
+        Raises
+        ------
+        ValueError
+            The hand was released.
+        """
         return hand_wrench(self.session, self, about)
 
     @property
@@ -151,11 +193,28 @@ class RunningHand(Hand):
         return ring_passage(self.session, self)
 
     def feed(self, rate: float) -> None:
-        """Set the feed rate. See `Simulation.feed`."""
+        """Set the feed rate. See `Simulation.feed`.
+
+        Parameters
+        ----------
+        rate : float [m/s]
+            Undeformed length per time that is fed towards the end of the rod.
+
+        Raises
+        ------
+        ValueError
+            A hand without a drive, or a released one.
+        """
         feed_ring(self.session, self, rate)
 
     def release(self) -> None:
-        """Release the rod. See `Simulation.release`."""
+        """Release the rod. See `Simulation.release`.
+
+        Raises
+        ------
+        ValueError
+            The hand was released before.
+        """
         release(self.session, self)
 
 

@@ -58,6 +58,10 @@ class Linearisation:
         nodes of an edge. With integrator "verlet" half of each edge's mass is at either node.
     displacement : ndarray of shape (3 nodes, unknowns)
         Displacement of every node [m] for each unknown.
+
+    See Also
+    --------
+    Simulation.linearise : Linearise the equations of a simulation.
     """
 
     _geometric: Any
@@ -74,21 +78,21 @@ class Linearisation:
 
     @property
     def stiffness(self) -> FloatArray:
-        """See the class."""
+        """Return the tangent stiffness of the unknowns, shape (unknowns, unknowns) [N/m for node positions]."""
         return np.asarray(self._assembled.toarray())
 
     @property
     def mass(self) -> FloatArray:
-        """See the class."""
+        """Return the mass matrix of the unknowns, shape (unknowns, unknowns) [kg for node positions]."""
         return np.asarray(self._mass.toarray())
 
     @property
     def displacement(self) -> FloatArray:
-        """See the class."""
+        """Return the displacement of every node for each unknown, shape (3 nodes, unknowns) [m]."""
         return np.asarray(self._displacement.toarray())
 
     def frequencies(self, count: int = 6) -> npt.NDArray[Any]:
-        """Return the lowest natural frequencies, shape (count,) [Hz].
+        """Return the lowest natural frequencies.
 
         For a scene that is solved in a plane, these are the frequencies of motions in the plane;
         ``build(planar=False)`` gives all. A negative frequency f means divergence: the mode grows with
@@ -96,10 +100,25 @@ class Linearisation:
         and grow with the imaginary part in the place of f. The order is by the real part of the square, so diverging
         modes come first.
 
+        Parameters
+        ----------
+        count : int
+            Number of frequencies.
+
+        Returns
+        -------
+        ndarray of shape (count,) [Hz]
+            Complex for a scene that flutters.
+
         Raises
         ------
         ValueError
             `count` is not between 1 and the number of unknowns.
+
+        See Also
+        --------
+        modes : Shapes of the motions.
+        stability : Kind of the fastest growing motion.
         """
         squares, _ = self._solve(count)
         if np.iscomplexobj(squares):
@@ -109,14 +128,28 @@ class Linearisation:
         return np.asarray(np.sign(squares) * np.sqrt(np.abs(squares)) / (2.0 * np.pi))
 
     def modes(self, count: int = 6) -> npt.NDArray[Any]:
-        """Return node displacements of the lowest modes, with the greatest scaled to 1, shape (count, nodes, 3).
+        """Return node displacements of the lowest modes, with the greatest scaled to 1.
 
         Modes that flutter are complex: their nodes oscillate with different phases.
+
+        Parameters
+        ----------
+        count : int
+            Number of modes.
+
+        Returns
+        -------
+        ndarray of shape (count, nodes, 3)
+            Complex for modes that flutter.
 
         Raises
         ------
         ValueError
             `count` is not between 1 and the number of unknowns.
+
+        See Also
+        --------
+        frequencies : Frequencies of the modes.
         """
         _, shapes = self._solve(count)
         displaced = (self._displacement @ shapes).T.reshape(count, -1, 3)

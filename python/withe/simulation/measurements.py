@@ -45,6 +45,11 @@ class Measurements:
     def positions(self, rod: Rod | str | None = None) -> FloatArray:
         """Return the positions of the nodes of a rod, or of all nodes of the scene.
 
+        Parameters
+        ----------
+        rod : Rod or str, optional
+            Rod to read. By default every node of the scene.
+
         Returns
         -------
         ndarray of shape (nodes, 3) [m]
@@ -54,6 +59,12 @@ class Measurements:
         ------
         ValueError
             Not a rod of this scene.
+
+        See Also
+        --------
+        velocities : Velocities of the same nodes.
+        directors : Material frames of the edges.
+        Record.positions : Positions at every frame of a run.
         """
         positions = self._session.world.positions()
         return (
@@ -63,20 +74,53 @@ class Measurements:
         )
 
     def obstacle_position(self, obstacle: Obstacle | str) -> FloatArray:
-        """Return the position of an obstacle, shape (3,) [m].
+        """Return the position of an obstacle.
 
         This is the point of a plane, the centre of a sphere, or the start of a capsule.
+
+        Parameters
+        ----------
+        obstacle : Obstacle or str
+            Obstacle to read.
+
+        Returns
+        -------
+        ndarray of shape (3,) [m]
 
         Raises
         ------
         ValueError
             Not an obstacle of this scene.
+
+        See Also
+        --------
+        move : Move an obstacle.
         """
         part = self._session.directory.find(obstacle, ObstaclePart, "obstacle")
         return np.array(self._session.world.obstacle_position(self._session.directory.all(ObstaclePart).index(part)))
 
     def velocities(self, rod: Rod | str | None = None) -> FloatArray:
-        """Return the velocities of the nodes of a rod, or of all nodes of the scene, shape (nodes, 3) [m/s]."""
+        """Return the velocities of the nodes of a rod, or of all nodes of the scene.
+
+        Parameters
+        ----------
+        rod : Rod or str, optional
+            Rod to read. By default every node of the scene.
+
+        Returns
+        -------
+        ndarray of shape (nodes, 3) [m/s]
+
+        Raises
+        ------
+        ValueError
+            Not a rod of this scene.
+
+        See Also
+        --------
+        positions : Positions of the same nodes.
+        set_velocities : Set the velocities.
+        """
         velocities = self._session.world.velocities()
         return (
             velocities
@@ -85,96 +129,276 @@ class Measurements:
         )
 
     def directors(self, rod: Rod | str) -> FloatArray:
-        """Return the material frames of the edges, shape (edges, 3, 3), with rows d1, d2, tangent."""
+        """Return the material frames of the edges of a rod.
+
+        Parameters
+        ----------
+        rod : Rod or str
+            Rod to read.
+
+        Returns
+        -------
+        ndarray of shape (edges, 3, 3)
+            The rows of each frame are the unit vectors d1, d2 and the tangent.
+
+        Raises
+        ------
+        ValueError
+            Not a rod of this scene.
+
+        See Also
+        --------
+        curvatures : Curvatures towards d1 and d2.
+        twists : Twist of the frames about the tangent.
+        """
         return self._session.world.directors(self._session.directory.rod(rod).index).reshape(-1, 3, 3)
 
     def curvatures(self, rod: Rod | str) -> FloatArray:
-        """Return the curvatures towards d1 and d2, shape (stencils, 2) [1/m]."""
+        """Return the curvatures of a rod towards its directors d1 and d2.
+
+        Parameters
+        ----------
+        rod : Rod or str
+            Rod to read.
+
+        Returns
+        -------
+        ndarray of shape (stencils, 2) [1/m]
+
+        Raises
+        ------
+        ValueError
+            Not a rod of this scene.
+
+        See Also
+        --------
+        get : Return the natural curvature, ``get(rod, "natural_curvature")``.
+        twists : Twists per length.
+        """
         return self._session.world.curvatures(self._session.directory.rod(rod).index)
 
     def twists(self, rod: Rod | str) -> FloatArray:
-        """Return the twists per length, shape (stencils,) [rad/m]."""
+        """Return the twists per length of a rod.
+
+        Parameters
+        ----------
+        rod : Rod or str
+            Rod to read.
+
+        Returns
+        -------
+        ndarray of shape (stencils,) [rad/m]
+
+        Raises
+        ------
+        ValueError
+            Not a rod of this scene.
+
+        See Also
+        --------
+        link : Link of a rod, the sum of its twist and writhe.
+        curvatures : Curvatures towards d1 and d2.
+        """
         return self._session.world.twists(self._session.directory.rod(rod).index)
 
     def tensions(self, rod: Rod | str) -> FloatArray:
-        """Return the tension of each edge, positive in tension, shape (edges,) [N].
+        """Return the tension of each edge of a rod, positive in tension.
 
         After an implicit midpoint step, the tension is the one in the middle of the step, where the forces balance. An
         edge that turns by w in a step ends with the spurious strain w^2 / 8. After other steps the tension is the one
         of the state.
+
+        Parameters
+        ----------
+        rod : Rod or str
+            Rod to read.
+
+        Returns
+        -------
+        ndarray of shape (edges,) [N]
+
+        Raises
+        ------
+        ValueError
+            Not a rod of this scene.
+
+        See Also
+        --------
+        reaction : Force and moment of a support.
         """
         return self._session.world.tensions(self._session.directory.rod(rod).index)
 
     def spring_tension(self, spring: Spring | str) -> float:
-        """Return the force of a spring and its damper, positive in tension [N].
+        """Return the force of a spring and its damper, positive in tension.
+
+        Parameters
+        ----------
+        spring : Spring or str
+            Spring to read.
+
+        Returns
+        -------
+        float [N]
 
         Raises
         ------
         ValueError
             Not a spring of this scene.
+
+        See Also
+        --------
+        Scene.add_spring : Add a spring.
         """
         return spring_tension(self._session, self._session.directory.find(spring, SpringPart, "spring"))
 
     def tendon_length(self, tendon: Tendon | str) -> float:
-        """Return the length of a tendon from its first guide to its last [m].
+        """Return the length of a tendon from its first guide to its last.
 
         The forces of a tendon are minus the gradient of its tension times this length. At a free end, the last half
         edge of length l / 2 counts as bent by the tension T at the offset r, which adds T r^2 l / (2 EI).
 
+        Parameters
+        ----------
+        tendon : Tendon or str
+            Tendon to read.
+
+        Returns
+        -------
+        float [m]
+
         Raises
         ------
         ValueError
             Not a tendon of this scene.
+
+        See Also
+        --------
+        Scene.add_tendon : Add a tendon.
+        tendon_points : Positions of its guides.
         """
         return tendon_length(self._session, self._session.directory.find(tendon, TendonPart, "tendon"))
 
     def tendon_points(self, tendon: Tendon | str) -> FloatArray:
-        """Return the positions of the guides of a tendon, shape (guides, 3) [m].
+        """Return the positions of the guides of a tendon.
+
+        Parameters
+        ----------
+        tendon : Tendon or str
+            Tendon to read.
+
+        Returns
+        -------
+        ndarray of shape (guides, 3) [m]
 
         Raises
         ------
         ValueError
             Not a tendon of this scene.
+
+        See Also
+        --------
+        tendon_length : Length of the tendon.
         """
         return tendon_points(self._session, self._session.directory.find(tendon, TendonPart, "tendon"))
 
     def joint_angle(self, joint: Joint | str) -> float:
-        """Return the angle of a revolute joint since the drawing [rad].
+        """Return the angle of a revolute joint since the drawing.
 
         The angle is the rotation of the second rod relative to the first, by the right-hand rule, whole turns included.
+
+        Parameters
+        ----------
+        joint : Joint or str
+            Revolute joint to read.
+
+        Returns
+        -------
+        float [rad]
 
         Raises
         ------
         ValueError
             Not a revolute joint of this scene.
+
+        See Also
+        --------
+        joint_rate : Rate of this angle.
+        joint_torque : Torque of the joint.
+        Scene.join : Join nodes, also by a revolute joint.
         """
         return self._session.world.joint_angle(find_joint(self._session, joint))
 
     def joint_rate(self, joint: Joint | str) -> float:
-        """Return the rate of `joint_angle` [rad/s].
+        """Return the rate of `joint_angle`.
 
         The rate is the mean over the last step; with "fourth_order", over its last inner step. Before the first step,
         and after a state was set, the rate follows from the velocities of the edges at the joint.
 
+        Parameters
+        ----------
+        joint : Joint or str
+            Revolute joint to read.
+
+        Returns
+        -------
+        float [rad/s]
+
         Raises
         ------
         ValueError
             Not a revolute joint of this scene.
+
+        See Also
+        --------
+        joint_angle : The angle.
         """
         return self._session.world.joint_rate(find_joint(self._session, joint))
 
     def joint_torque(self, joint: Joint | str) -> float:
-        """Return the torque of motor, spring and damper on the second rod of a revolute joint [N m]. See `Scene.join`.
+        """Return the torque of motor, spring and damper on the second rod of a revolute joint. See `Scene.join`.
+
+        Parameters
+        ----------
+        joint : Joint or str
+            Revolute joint to read.
+
+        Returns
+        -------
+        float [N m]
 
         Raises
         ------
         ValueError
             Not a revolute joint of this scene.
+
+        See Also
+        --------
+        joint_angle : The angle on which the torque depends.
+        Scene.join : The equation of the torque.
         """
         return self._session.world.joint_torque(find_joint(self._session, joint))
 
     def spins(self, rod: Rod | str) -> FloatArray:
-        """Return the angular velocities of the edges about their tangents, shape (edges,) [rad/s]."""
+        """Return the angular velocities of the edges of a rod about their tangents.
+
+        Parameters
+        ----------
+        rod : Rod or str
+            Rod to read.
+
+        Returns
+        -------
+        ndarray of shape (edges,) [rad/s]
+
+        Raises
+        ------
+        ValueError
+            Not a rod of this scene.
+
+        See Also
+        --------
+        set_state : Set the spins.
+        """
         return self._session.world.spins(self._session.directory.rod(rod).index)
 
     @overload
@@ -196,6 +420,16 @@ class Measurements:
         Energy or RodEnergy
             Energies of the scene without a rod, or of the rod. Loads, contact, work and dissipation belong to the scene
             only.
+
+        Raises
+        ------
+        ValueError
+            Not a rod of this scene.
+
+        See Also
+        --------
+        Record.energy : Energies at every frame of a run.
+        momentum : Linear and angular momentum.
         """
         if rod is not None:
             part = self._session.world.rod_energy(self._session.directory.rod(rod).index)
@@ -213,6 +447,10 @@ class Measurements:
         Returns
         -------
         Momentum
+
+        See Also
+        --------
+        energy : Energies.
 
         Examples
         --------
@@ -239,10 +477,21 @@ class Measurements:
         support : Support, NodeHandle or str
             The support, or its node.
 
+        Returns
+        -------
+        Reaction
+            Force of shape (3,) [N] and moment of shape (3,) [N m].
+
         Raises
         ------
         ValueError
             The node has no support.
+
+        See Also
+        --------
+        wrench : Total force and moment of a hand.
+        tensions : Tensions of the edges of a rod.
+        contacts : Forces of contacts.
 
         Notes
         -----
@@ -268,30 +517,70 @@ class Measurements:
         about : array_like of shape (3,) [m]
             Point about which the moment is taken. By default the position of the hand.
 
+        Returns
+        -------
+        Reaction
+            Force of shape (3,) [N] and moment of shape (3,) [N m].
+
         Raises
         ------
         ValueError
             Not a hand, or a released one.
+
+        See Also
+        --------
+        grasp : Grasp a rod by a hand.
+        deflection : Displacement of the rod in a compliant hand.
+        reaction : Force and moment of any support, about its node.
         """
         return hand_wrench(self._session, hand, about)
 
     def deflection(self, hand: Hand | str) -> Deflection:
         """Return the displacement of the held part of the rod relative to the hand. Zero for a rigid hand.
 
+        Parameters
+        ----------
+        hand : Hand or str
+            Hand to read.
+
+        Returns
+        -------
+        Deflection
+            Shift [m], turn [rad] and slip [m], each of shape (3,), in the axes of the hand.
+
         Raises
         ------
         ValueError
             Not a hand, or a released one.
+
+        See Also
+        --------
+        wrench : Force and moment of the hand.
         """
         return hand_deflection(self._session, hand)
 
     def passage(self, ring: Hand | str) -> Passage:
         """Return the place where a rod passes a ring, and the forces of the ring on the rod.
 
+        Parameters
+        ----------
+        ring : Hand or str
+            Ring to read, a hand with ``slides=True``.
+
+        Returns
+        -------
+        Passage
+            Arc length [m], forces [N] and feed rate [m/s].
+
         Raises
         ------
         ValueError
             Not a ring, or one that was released or left by its rod.
+
+        See Also
+        --------
+        grasp : Make a ring by ``slides=True``.
+        feed : Set the feed rate.
 
         Examples
         --------
@@ -306,10 +595,24 @@ class Measurements:
 
         For a support with `free`, the position is the one from which its node slides.
 
+        Parameters
+        ----------
+        support : Support, NodeHandle or str
+            Support or hand to read, or its node.
+
+        Returns
+        -------
+        HeldPose
+            Position of shape (3,) [m] and rotation matrix of shape (3, 3).
+
         Raises
         ------
         ValueError
             The node has no support.
+
+        See Also
+        --------
+        move : Move a support.
         """
         return support_pose(self._session, support)
 
@@ -325,18 +628,38 @@ class Measurements:
             * "normal": unit vector from the second body to the first
             * "normal_force", "friction": forces on the first body [N]
             * "sticking": True if the contact does not slip
+
+        See Also
+        --------
+        reaction : Force and moment of a support.
+        Scene.enable_contact : Enable contact between rods.
         """
         return contact_table(self._session.directory, self._session.world.contacts())
 
     def link(self, rod: Rod | str) -> float:
-        """Return the link of a rod, which is the sum of its twist and writhe [turns].
+        """Return the link of a rod, which is the sum of its twist and writhe.
 
         The link of a closed rod is constant as long as no rod passes through it; so is the link of an open rod whose
         ends are held and do not spin [Calugareanu 1961]. An open rod is extended straight at both ends.
 
+        Parameters
+        ----------
+        rod : Rod or str
+            Rod to read.
+
         Returns
         -------
-        float
+        float [turns]
+
+        Raises
+        ------
+        ValueError
+            Not a rod of this scene.
+
+        See Also
+        --------
+        withe.knots.link : Link of any centreline with directors.
+        withe.knots.writhe : Writhe alone.
         """
         index = self._session.directory.rod(rod).index
         closed = self._session.directory.layout.rods[index].closed

@@ -42,6 +42,10 @@ class EquilibriumPath(ShortRepr):
         True if the path reached the requested load factor or number of points. False if the solver lost the path.
     iterations : int
         Number of iterations of Newton's method.
+
+    See Also
+    --------
+    Simulation.equilibrium : Follow a path by ``path="arc_length"``.
     """
 
     load_factors: FloatArray
@@ -55,15 +59,60 @@ class EquilibriumPath(ShortRepr):
     _support: Callable[[Support | NodeHandle | str], int] = field(repr=False)
 
     def positions(self, rod: Rod | str | None = None) -> FloatArray:
-        """Positions of the nodes of a rod, or of every node once, shape (points, nodes, 3) [m]."""
+        """Return the positions of the nodes of a rod, or of every node once.
+
+        Parameters
+        ----------
+        rod : Rod or str, optional
+            Rod to read. By default every node of the scene.
+
+        Returns
+        -------
+        ndarray of shape (points, nodes, 3) [m]
+
+        Raises
+        ------
+        ValueError
+            Not a rod of this scene.
+        """
         return self._positions.copy() if rod is None else self._positions[:, self._rows(rod)]
 
     def forces(self, support: Support | NodeHandle | str) -> FloatArray:
-        """Force of a support on the rod, shape (points, 3) [N]."""
+        """Return the force of a support on the rod.
+
+        Parameters
+        ----------
+        support : Support, NodeHandle or str
+            The support, or its node.
+
+        Returns
+        -------
+        ndarray of shape (points, 3) [N]
+
+        Raises
+        ------
+        ValueError
+            The node has no support.
+        """
         return self._reactions[0][:, self._support(support)].copy()
 
     def moments(self, support: Support | NodeHandle | str) -> FloatArray:
-        """Moment of a support on the rod, about its node, shape (points, 3) [N m]."""
+        """Return the moment of a support on the rod, about its node.
+
+        Parameters
+        ----------
+        support : Support, NodeHandle or str
+            The support, or its node.
+
+        Returns
+        -------
+        ndarray of shape (points, 3) [N m]
+
+        Raises
+        ------
+        ValueError
+            The node has no support.
+        """
         return self._reactions[1][:, self._support(support)].copy()
 
 

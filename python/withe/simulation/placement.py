@@ -41,20 +41,62 @@ class Placement:
     ) -> Support:
         """Clamp a node in its present position and direction. See `Scene.clamp`.
 
+        Parameters
+        ----------
+        node : NodeHandle or str
+            Node to clamp.
+        hold : {"frame", "edge"}
+            "frame" clamps the rod at the node, as a wall does. "edge" holds the end edge: both of its nodes and its
+            angle.
+        free : array_like of shape (3,) or (2, 3)
+            Directions along which the clamp may slide.
+        spin : bool
+            True if the rod may spin about its tangent, whose direction stays held.
+        name : str
+            Name of the support. By default "clamp 1", ...
+
+        Returns
+        -------
+        Support
+
         Raises
         ------
         ValueError
             The node already has a support.
+
+        See Also
+        --------
+        Scene.clamp : Clamp a node before the simulation is built.
+        move : Move the clamp.
+        release : Remove the clamp.
         """
         return put_on(self._session, make_clamp(self._session.directory, node, hold, free, spin, name))
 
     def pin(self, node: NodeHandle | str, *, free: npt.ArrayLike | None = None, name: str | None = None) -> Support:
         """Pin a node in its present position. See `Scene.pin`.
 
+        Parameters
+        ----------
+        node : NodeHandle or str
+            Node to pin.
+        free : array_like of shape (3,) or (2, 3)
+            Directions along which the pin may slide.
+        name : str
+            Name of the support. By default "pin 1", ...
+
+        Returns
+        -------
+        Support
+
         Raises
         ------
         ValueError
             The node already has a support.
+
+        See Also
+        --------
+        clamp : Hold the direction of the rod too.
+        release : Remove the pin.
         """
         return put_on(self._session, make_pin(self._session.directory, node, free, name))
 
@@ -76,6 +118,29 @@ class Placement:
 
         A rigid hand brings the held edges to rest, or to its own motion, within the next time step.
 
+        Parameters
+        ----------
+        rod : Rod or str
+            Rod to grasp.
+        at : float [m]
+            Undeformed arc length from the start of the rod to the middle of the hand.
+        length : float [m]
+            Undeformed length of the rod that is held. With 0 the hand holds one point.
+        pose : pair of array_like of shape (3,) [m] and rotation, array_like of shape (7,) or (4, 4)
+            Position and axes of the hand in the world. By default the hand is at the point of the rod, with its frame.
+        stiffness : pair, or array_like of shape (6,) [N/m, N m/rad]
+            Stiffness along d1, d2 and the tangent of the held rod, and about these axes. By default the hand is rigid.
+        force_limit : float [N]
+            Force above which the rod slips through a compliant hand, or a drive slips.
+        slides : bool
+            True for a ring, through which the rod slides.
+        friction : float [-]
+            Coulomb friction coefficient of a ring without a drive.
+        feed_rate : float [m/s]
+            Undeformed length per time that a drive in the ring feeds towards the end of the rod.
+        name : str
+            Name of the hand. By default "hand 1", ...
+
         Returns
         -------
         RunningHand
@@ -86,6 +151,12 @@ class Placement:
         ------
         ValueError
             See `Scene.grasp`.
+
+        See Also
+        --------
+        Scene.grasp : Details of each argument.
+        hand : Return a hand by its name.
+        wrench : Force and moment of a hand.
 
         Examples
         --------
@@ -102,10 +173,23 @@ class Placement:
     def hand(self, hand: Support | str) -> RunningHand:
         """Return a hand of this simulation by its handle or name, with the methods of `RunningHand`.
 
+        Parameters
+        ----------
+        hand : Hand or str
+            Hand to return.
+
+        Returns
+        -------
+        RunningHand
+
         Raises
         ------
         ValueError
             Not a hand of this simulation, or a released one.
+
+        See Also
+        --------
+        grasp : Make a hand.
 
         Examples
         --------
@@ -130,6 +214,10 @@ class Placement:
         ------
         ValueError
             A ring without a drive, or released.
+
+        See Also
+        --------
+        passage : Place of the rod in the ring.
         """
         feed_ring(self._session, ring, rate)
 
@@ -145,6 +233,10 @@ class Placement:
         ------
         ValueError
             The node has no support.
+
+        See Also
+        --------
+        clamp : Clamp a node again.
         """
         release(self._session, support)
 
@@ -200,6 +292,12 @@ class Placement:
         ValueError
             The node has no support, a direction is given for a pin or an obstacle, or arguments contradict each other.
 
+        See Also
+        --------
+        pose : Present pose of a support.
+        set : Set parameters other than poses.
+        Batch.move : Move supports of many simulations.
+
         Examples
         --------
         >>> hand = simulation.clamp(arm.end)
@@ -218,17 +316,68 @@ class Placement:
         move_obstacle(self._session, *obstacle, position, tangent, roll, over, path)
 
     def set_friction(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, friction: Friction) -> None:
-        """Deprecated: use ``set((a, b), friction=...)``."""
+        """Deprecated: use ``set((a, b), friction=...)``.
+
+        Parameters
+        ----------
+        a, b : Rod, Obstacle or str
+            The two bodies.
+        friction : float, pair or tuple of three of float [-], array_like of shape (edges,), or callable
+            Friction coefficient, as in `Scene.set_friction`.
+
+        Raises
+        ------
+        ValueError
+            See `set`.
+
+        See Also
+        --------
+        set : The method to use instead.
+        """
         old_word("set_friction", "set((a, b), friction=...)")
         set_values(self._session, (a, b), {"friction": friction})
 
     def set_restitution(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, restitution: float) -> None:
-        """Deprecated: use ``set((a, b), restitution=...)``."""
+        """Deprecated: use ``set((a, b), restitution=...)``.
+
+        Parameters
+        ----------
+        a, b : Rod, Obstacle or str
+            The two bodies.
+        restitution : float [-]
+            Coefficient of restitution, from 0 to 1.
+
+        Raises
+        ------
+        ValueError
+            See `set`.
+
+        See Also
+        --------
+        set : The method to use instead.
+        """
         old_word("set_restitution", "set((a, b), restitution=...)")
         set_values(self._session, (a, b), {"restitution": restitution})
 
     def set_contact_stiffness(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, stiffness: float) -> None:
-        """Deprecated: use ``set((a, b), contact_stiffness=...)``."""
+        """Deprecated: use ``set((a, b), contact_stiffness=...)``.
+
+        Parameters
+        ----------
+        a, b : Rod, Obstacle or str
+            The two bodies.
+        stiffness : float [N/m]
+            Contact stiffness.
+
+        Raises
+        ------
+        ValueError
+            See `set`.
+
+        See Also
+        --------
+        set : The method to use instead.
+        """
         old_word("set_contact_stiffness", "set((a, b), contact_stiffness=...)")
         set_values(self._session, (a, b), {"contact_stiffness": stiffness})
 
@@ -274,6 +423,11 @@ class Placement:
             does not close a closed rod. An edge of zero length or folded back, a moved supported node, or overlapping
             surfaces. A state out of the plane with planar=True. In all these cases nothing is changed.
 
+        See Also
+        --------
+        set_velocities : Set velocities only.
+        restore : Restore the whole state of a snapshot.
+
         Examples
         --------
         >>> simulation.set_state(arm, spins=np.linspace(0.0, 5.0, 30))
@@ -298,5 +452,9 @@ class Placement:
         ------
         ValueError
             A wrong shape, or a value that is not finite.
+
+        See Also
+        --------
+        set_state : Set positions, velocities and directors.
         """
         set_velocities(self._session, rod, velocities)

@@ -264,8 +264,8 @@ class Plan:
         Number of unknowns.
     solver : str
         Solver of the linear equations.
-    stable_step : float or None
-        Stable step of the explicit scheme in the drawn state [s].
+    stable_step : float or None [s]
+        Stable step of the explicit scheme in the drawn state.
     notes : tuple of str
         Decisions and their reasons.
     """

@@ -69,6 +69,17 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
 
     Arrays that methods return are copies. Rods, nodes, supports and loads are given by handle or by name.
 
+    Raises
+    ------
+    TypeError
+        The class is called: use `Scene.build`.
+
+    See Also
+    --------
+    Scene.build : Build a simulation.
+    Batch : Many simulations that step together.
+    Record : Frames of a run.
+
     Examples
     --------
     >>> import withe
@@ -127,6 +138,11 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
     def step(self, count: int = 1) -> None:
         """Advance by `count` time steps. Subdivision inside a step does not change the count.
 
+        Parameters
+        ----------
+        count : int
+            Number of time steps.
+
         Raises
         ------
         ConvergenceError
@@ -135,6 +151,12 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
             `count` is negative or not a whole number.
         RuntimeError
             Called by a callback of `run`, or while another thread runs the simulation.
+
+        See Also
+        --------
+        run : Advance by a duration and record frames.
+        equilibrium : Move to the static equilibrium.
+        Batch.step : Advance many simulations.
         """
         self._stepping.refuse_in_run("step")
         self._stepping.step(validation.integer(count, "number of steps", 0, _MAX_STEPS))
@@ -206,9 +228,9 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
             Loads whose present values are multiplied by the load factor. Without loads, the factor multiplies all
             changes since the last equilibrium (in the drawn state: all loads), from 0 to 1. Changed loads, gravity and
             natural shapes then act as residual forces.
-        start : float
+        start : float [-]
             Load factor at the start of the path. Needs loads.
-        to : float
+        to : float [-]
             Load factor at the end of the path. The loads keep this factor.
         steps : int
             Maximum number of steps of the path.
@@ -226,6 +248,12 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
             No equilibrium was found, or none exists (a free rod under gravity).
         ValueError
             A load that is a function of time, or a load factor or number of steps out of range.
+
+        See Also
+        --------
+        step : Advance in time.
+        linearise : Stiffness, masses and modes about the equilibrium.
+        Equilibrium.gradient : Derivatives of the equilibrium.
 
         Examples
         --------
@@ -305,6 +333,13 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
         RuntimeError
             Called by a callback of a run. Callbacks may read, set, hold and copy the simulation, but neither advance
             nor restore it.
+
+        See Also
+        --------
+        step : Advance without a record.
+        Record : The frames of the run.
+        Record.gradient : Derivatives of a differentiable run.
+        run_many : Run many simulations in processes or on a cluster.
         """
         self._stepping.refuse_in_run("run")
         loop = Run(
@@ -322,6 +357,10 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
         ------
         RuntimeError
             The simulation has not run yet.
+
+        See Also
+        --------
+        run : Make a record.
         """
         if self._stepping.recorder is None:
             raise RuntimeError("simulation has no record: call run first")
@@ -336,6 +375,11 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
         -------
         Linearisation
             Tangent stiffness, masses, natural frequencies and modes. They are meaningful at an equilibrium.
+
+        See Also
+        --------
+        equilibrium : Find the equilibrium to linearise about.
+        step_jacobian : Derivatives of a time step by the state.
 
         Examples
         --------
@@ -360,7 +404,18 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
     # State
 
     def snapshot(self) -> Snapshot:
-        """Return the whole state. `restore` continues from it bit for bit."""
+        """Return the whole state. `restore` continues from it bit for bit.
+
+        Returns
+        -------
+        Snapshot
+
+        See Also
+        --------
+        restore : Return to the state.
+        copy : Make a second simulation in this state.
+        Snapshot.save : Write the state to a file.
+        """
         session = self._session
         return Snapshot(session.world.snapshot(), session.world.time, session.settings.copy(), scene=session.scene)
 
@@ -386,6 +441,11 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
             this simulation does not have; or a record with supported nodes in other places.
         RuntimeError
             Called by a callback of `run`.
+
+        See Also
+        --------
+        snapshot : Keep the present state.
+        reset : Return to the state after `Scene.build`.
         """
         self._stepping.refuse_in_run("restore")
         if isinstance(snapshot, Record):
@@ -404,12 +464,27 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
         ------
         RuntimeError
             Called by a callback of `run`.
+
+        See Also
+        --------
+        restore : Return to any snapshot.
         """
         self._stepping.refuse_in_run("reset")
         self.restore(self._initial)
 
     def copy(self) -> Simulation:
-        """Return an independent simulation in the same state."""
+        """Return an independent simulation in the same state.
+
+        Returns
+        -------
+        Simulation
+            A change of one of the two does not affect the other.
+
+        See Also
+        --------
+        snapshot : Keep the state of one simulation.
+        Batch : Step many simulations in one call.
+        """
         return Simulation._of(self._stepping.copy(), self._initial)
 
     def __copy__(self) -> Simulation:
@@ -443,15 +518,62 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
     # Pictures
 
     def plot(self, **options: Any) -> Any:
-        """Plot the present shape as a matplotlib figure; see `withe.view.plot` for the options."""
+        """Plot the present shape as a matplotlib figure.
+
+        Parameters
+        ----------
+        **options
+            Options of `withe.view.plot`.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        See Also
+        --------
+        withe.view.plot : All options, and what they raise.
+        """
         return self._frame().plot(**options)
 
     def view(self, **options: Any) -> Any:
-        """Show the present shape interactively in a notebook or a window; see `withe.view.view`."""
+        """Show the present shape interactively in a notebook or a window.
+
+        Parameters
+        ----------
+        **options
+            Options of `withe.view.view`.
+
+        Returns
+        -------
+        object
+            The widget in a notebook, else the window, as `withe.view.view` returns it.
+
+        See Also
+        --------
+        withe.view.view : All options, and what they raise.
+        """
         return self._frame().view(**options)
 
     def picture(self, path: str | os.PathLike[str], **options: Any) -> FilePath:
-        """Render the present shape into a .png file; see `withe.view.picture`."""
+        """Render the present shape into a .png file.
+
+        Parameters
+        ----------
+        path : str or path
+            File to write.
+        **options
+            Options of `withe.view.picture`.
+
+        Returns
+        -------
+        pathlib.Path
+            Path of the file.
+
+        See Also
+        --------
+        withe.view.picture : All options, and what they raise.
+        plot : Figure by matplotlib, which needs no rendering.
+        """
         return self._frame().picture(path, **options)
 
     def _frame(self) -> Record:

@@ -98,12 +98,26 @@ class Snapshot:
     def save(self, path: str | os.PathLike[str]) -> FilePath:
         """Write the snapshot to one .npz file.
 
+        Parameters
+        ----------
+        path : str or path
+            File to write, with the suffix .npz.
+
+        Returns
+        -------
+        pathlib.Path
+            Path of the file.
+
         Raises
         ------
         ValueError
             A path with another suffix.
         OSError
             The file cannot be written.
+
+        See Also
+        --------
+        load : Read the file.
         """
         settings = self._settings
         arrays: dict[str, npt.NDArray[Any]] = {
@@ -145,12 +159,26 @@ class Snapshot:
     def load(cls, path: str | os.PathLike[str]) -> Snapshot:
         """Read a snapshot that `save` wrote. The file cannot execute code.
 
+        Parameters
+        ----------
+        path : str or path
+            File to read.
+
+        Returns
+        -------
+        Snapshot
+
         Raises
         ------
         ValueError
             A file that is damaged, not a snapshot, or of another version.
         OSError
             The file cannot be opened.
+
+        See Also
+        --------
+        save : Write a snapshot.
+        Simulation.restore : Restore the state.
         """
         header, arrays = io.load_arrays(path, "snapshot", _FILE_VERSION)
         try:

@@ -56,6 +56,11 @@ class StateSpace:
         ValueError
             A parameter or scene without a gradient, as in `Record.gradient`, or a ramp of a natural shape (`over=`).
 
+        See Also
+        --------
+        state_difference : Differences of states on which A acts.
+        Record.gradient : Derivatives of a whole run.
+
         Notes
         -----
         The matrices follow from the adjoint method with one solve per row, exact to rounding, inner steps included. An
@@ -100,7 +105,7 @@ class StateSpace:
         return csr_array(found.state), csr_array(inputs)
 
     def state_difference(self, reference: Any) -> FloatArray:
-        """Return the difference of the present state from that of a copy of this simulation, shape (2 unknowns,).
+        """Return the difference of the present state from that of a copy of this simulation.
 
         Positions and velocities are subtracted. Rotations of directors are relative to the reference after parallel
         transport between the two tangents, and at most half a turn. Joints count by 2 tan(angle / 2) about their axis.
@@ -111,10 +116,19 @@ class StateSpace:
         reference : Simulation
             A copy of this one at another state, with the same supports.
 
+        Returns
+        -------
+        ndarray of shape (2 unknowns,)
+
         Raises
         ------
         ValueError
             A simulation of another scene, or with other supports.
+
+        See Also
+        --------
+        displace_state : Add a difference of states.
+        step_jacobian : Derivatives of a step by the state.
         """
         if not isinstance(reference, StateSpace):
             raise ValueError(f"reference must be a copy() of this simulation, got {type(reference).__name__}")
@@ -134,5 +148,9 @@ class StateSpace:
             A vector of another length, one that folds an edge right back onto the next, or rods that would overlap.
         RuntimeError
             Called while a step is being taken.
+
+        See Also
+        --------
+        state_difference : The inverse.
         """
         self._session.world.displace_state(validation.number_array(by, "by", ("2 unknowns",)))

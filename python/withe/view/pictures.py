@@ -78,6 +78,8 @@ def picture(
         PyVista is not installed.
     RuntimeError
         Rendering is not possible here; the message names the package to install.
+    OSError
+        The picture cannot be written.
     """
     path = validation.file_path(path, ".png")
     number = _frame(record, frame)
@@ -124,10 +126,10 @@ def animate(
     record : Record
     path : path
         File to write, ending in .mp4 or .gif.
-    fps : float, optional
+    fps : float, optional [1/s]
         Pictures per second of film; 30 for .mp4, 20 for .gif. The rods are interpolated between two frames of the
         record.
-    speed : float
+    speed : float [-]
         Seconds of the simulation shown in one second of film.
     size, color_by, camera, ground
         As in `picture`. The camera stands still, with all frames in view.
@@ -150,6 +152,8 @@ def animate(
     RuntimeError
         Rendering is not possible here, or ffmpeg fails, for example on a full disk. The message gives the reason, and
         the previous content of the file is kept.
+    OSError
+        The film cannot be written.
     """
     path = validation.file_path(path, ".mp4", ".gif")
     fps = float(fps if fps is not None else (30.0 if path.suffix.lower() == ".mp4" else 20.0))
