@@ -44,7 +44,7 @@ def reference(folder: Path) -> None:
         lines += [".. autosummary::", ""]
         lines += [f"   {name}" for name in names]
         lines += ["```", "", "```{toctree}", ":hidden:", ""]
-        lines += [f"{module}.{name}" for name in names]
+        lines += [f"{name} <{module}.{name}>" for name in names]
         put(folder / f"{module}.md", [*lines, "```"])
         for name in names:
             put(folder / f"{module}.{name}.md", name_page(module, name))
@@ -94,7 +94,8 @@ def member_sections(module: str, name: str, owner: type) -> list[str]:
     groups = purposes(owner)
     begin = ["", "```{eval-rst}", f".. currentmodule:: {module}", ""]
     lines = list(begin)
-    for purpose, names in groups.items():
+    few = len(groups) == 1 and len(*groups.values()) < 4  # the section itself is short
+    for purpose, names in () if few else groups.items():
         lines += [f".. rubric:: {purpose}", "", ".. autosummary::", "   :nosignatures:", ""]
         lines += [f"   ~{name}.{member}" for member in names] + [""]
     lines += ["```"]

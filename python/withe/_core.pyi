@@ -522,7 +522,7 @@ class Options:
     Choices of a simulation.
     """
 
-    heuristics: typing.ClassVar[tuple] = (
+    heuristics: typing.ClassVar[tuple[typing.Any, ...]] = (
         "reuse_across_steps",
         "reuse_within_step",
         "rest_from_reuse",
@@ -1170,7 +1170,7 @@ class World:
     def set(
         self,
         owner: typing.SupportsInt | typing.SupportsIndex,
-        values: dict,
+        values: dict[str, typing.Any],
         over: typing.SupportsFloat | typing.SupportsIndex = 0.0,
     ) -> None:
         """
@@ -1476,7 +1476,7 @@ def dragged_sheet(
     friction: typing.SupportsFloat | typing.SupportsIndex,
     sheet_length: typing.SupportsFloat | typing.SupportsIndex,
     width: SheetWidth,
-) -> tuple:
+) -> tuple[typing.Any, ...]:
     """
     A sheet moved from pose to pose, sliding by Coulomb's law: one row a pose, and how far it has slid.
     """
@@ -1553,7 +1553,7 @@ def trace_lines(
     mask: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8],
     image: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8] | None = None,
     method: str = "withe",
-) -> dict:
+) -> dict[str, typing.Any]:
     """
     Every line in a mask, in order, and labels.
     """

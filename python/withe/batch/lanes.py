@@ -31,7 +31,7 @@ class Lanes:
 
     def __init__(self, simulations: list[Simulation], workers: int) -> None:
         self.simulations = simulations
-        self.engine = _core.Batch([each._session.world for each in simulations], workers)
+        self.engine: _core.Batch = _core.Batch([each._session.world for each in simulations], workers)
         self._all = np.arange(len(simulations), dtype=np.intc)
         self._all.flags.writeable = False
         self._rods: dict[str, RodPart] = {}

@@ -47,7 +47,7 @@ class BatchRun(Generic[B]):
         until: Callable[[B], npt.ArrayLike] | None,
         record: Mapping[str, Callable[[B], npt.ArrayLike]] | None,
     ) -> None:
-        self.duration = validation.positive(duration, "duration")
+        self.duration: float = validation.positive(duration, "duration")
         self._batch, self._lanes = batch, lanes
         self._steps = self._whole(self.duration, "duration")
         every = None if record_every is None else validation.positive(record_every, "record_every")

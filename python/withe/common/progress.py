@@ -28,7 +28,7 @@ class Progress:
     def __init__(self, total: float, description: str = "", unit: str = "s") -> None:
         if not total >= 0.0:
             raise ValueError(f"total of a progress bar must be zero or more, got {total!r}")
-        self.total = float(total)
+        self.total: float = float(total)
         self.description = description
         self.unit = unit
         self._completed = 0.0

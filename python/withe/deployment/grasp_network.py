@@ -7,9 +7,10 @@ They do not predict forces. All quantities are in Lgb.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -107,9 +108,9 @@ class GraspNetwork(Surrogate):
     >>> network(5.0, 0.25).position  # doctest: +SKIP
     """
 
-    FORMS = FORMS
-    SHIPPED = SHIPPED
-    LEARNED = "grasps"
+    FORMS: ClassVar[Mapping[str, Form]] = FORMS
+    SHIPPED: ClassVar[Path] = SHIPPED
+    LEARNED: ClassVar[str] = "grasps"
 
     def __call__(
         self, suspended: npt.ArrayLike, curvature: npt.ArrayLike, stretch_stiffness: npt.ArrayLike = 2087.0

@@ -114,6 +114,11 @@ class Pattern:
     0.517 m, radius 0.21 m, True
     """
 
+    arc_length: FloatArray
+    points: FloatArray
+    deviation: float
+    lead_in: float
+
     def __init__(
         self,
         points: npt.ArrayLike | None = None,

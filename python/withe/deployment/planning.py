@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any, Literal, get_args
+from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -89,8 +89,8 @@ class LayPlan(PlanFile):
     needed_friction: FloatArray
     posts: tuple[Post, ...] = ()
 
-    KIND = KIND
-    VERSION = VERSION
+    KIND: ClassVar[str] = KIND
+    VERSION: ClassVar[int] = VERSION
     _parts_of = staticmethod(parts_of)
 
     @property

@@ -83,12 +83,15 @@ class StraightLine:
     x -3.657, force 4.913, stable: False
     """
 
+    gentle: StraightPose
+    folded: StraightPose
+
     def __init__(self, suspended: float, stretch_stiffness: float = 2087.0) -> None:
-        self.suspended = validation.number(suspended, "suspended")
+        self.suspended: float = validation.number(suspended, "suspended")
         if not StraightRod.shortest <= self.suspended <= StraightRod.longest:
             limits = f"from {StraightRod.shortest:g} to {StraightRod.longest:g} Lgb"
             raise ValueError(f"suspended must be {limits}, got {self.suspended:g}")
-        self.stretch_stiffness = validation.number(stretch_stiffness, "stretch_stiffness")
+        self.stretch_stiffness: float = validation.number(stretch_stiffness, "stretch_stiffness")
         require_stiff(np.array([self.suspended]), np.array([self.stretch_stiffness]))
         self._rod = StraightRod(self.suspended, 2.0 * self.stretch_stiffness)
         rows = self._rod.optima(TWIST_STIFFNESS)

@@ -39,6 +39,11 @@ class Watch:
         True if the fold has ended.
     """
 
+    max_speed: float
+    max_curvature: float
+    slip: float
+    over: bool
+
     def __init__(self, jaw: JawMotion, rods: Sequence[Rod]) -> None:
         self._jaw, self._rods = jaw, rods
         self._end: float | None = None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -109,8 +109,8 @@ class FoldPlan(PlanFile):
     blocked: str | None = None
     _foreseen: Elastica | None = field(default=None, repr=False)
 
-    KIND = KIND
-    VERSION = VERSION
+    KIND: ClassVar[str] = KIND
+    VERSION: ClassVar[int] = VERSION
     _parts_of = staticmethod(parts_of)
 
     @property

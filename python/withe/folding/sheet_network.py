@@ -7,9 +7,10 @@ time. Plans need neither. All quantities are in Lgb and w Lgb.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -99,9 +100,9 @@ class SheetNetwork(Surrogate):
     >>> network(3.0, 2.25).angle  # doctest: +SKIP
     """
 
-    FORMS = FORMS
-    SHIPPED = SHIPPED
-    LEARNED = "sheets"
+    FORMS: ClassVar[Mapping[str, Form]] = FORMS
+    SHIPPED: ClassVar[Path] = SHIPPED
+    LEARNED: ClassVar[str] = "sheets"
 
     def __call__(self, x: npt.ArrayLike, z: npt.ArrayLike) -> Elastica:
         """Return hanging sheets with tips at positions.

@@ -19,7 +19,9 @@ from withe.folding.paper import Paper
 from withe.folding.paper_rods import add_paper, jaw_stiffness
 from withe.folding.table_sheet import LONGEST, TableSheet, node_places
 from withe.folding.views import strip_picture
+from withe.parts.handles import Rod
 from withe.recording.record import Record
+from withe.simulation.simulation import Simulation
 from withe.simulation.snapshots import Snapshot
 
 __all__ = ["Fold", "Held", "SimulatedSheet"]
@@ -150,7 +152,7 @@ class SimulatedSheet(TableSheet[Fold]):
         places = node_places(paper.length, self.jaw.depth, edges)
         self._widths = paper.width_at(places)
         scene = self._tilted_scene()
-        self.rod = add_paper(scene, self.truth, places, self._drawn.curl)
+        self.rod: Rod = add_paper(scene, self.truth, places, self._drawn.curl)
         # Surfaces press on each other from a twentieth of the thickness on; a jaw at the sheet's height does not.
         scene.add_floor(-0.55 * paper.thickness, friction=self._friction(), restitution=0.0, name="table")
         scene.enable_contact(friction=validation.non_negative(own_friction, "own_friction"), restitution=0.0)
@@ -162,7 +164,7 @@ class SimulatedSheet(TableSheet[Fold]):
             force_limit=self.jaw.force_limit,
             name="jaw",
         )
-        self.simulation = scene.build(integrator="backward_euler", time_step=time_step, planar=True)
+        self.simulation: Simulation = scene.build(integrator="backward_euler", time_step=time_step, planar=True)
         self._flat = self.simulation.hand("jaw").pose.rotation
 
     def _friction(self) -> float | Callable[[FloatArray], FloatArray]:

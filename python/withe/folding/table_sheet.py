@@ -41,6 +41,9 @@ class FoldingMotion(Motion, Protocol):
 class TableSheet(ABC, Generic[F]):
     """A paper with the deviations of a seed, a jaw, and the simulation of both. `F` is the result of a fold."""
 
+    paper: Paper
+    jaw: Jaw
+    truth: Paper
     simulation: Simulation
 
     def __init__(self, paper: Paper, seed: int, noise: Noise | None, jaw: Jaw | None) -> None:

@@ -24,6 +24,7 @@ from withe.parts.handles import Rod
 from withe.parts.materials import Stiffness
 from withe.recording.record import Record
 from withe.scene.scene import Scene
+from withe.simulation.simulation import Simulation
 
 __all__ = ["WideFold", "WideSheet"]
 
@@ -122,6 +123,8 @@ class WideSheet(TableSheet[WideFold]):
     >>> print(f"{np.degrees(folded.spin):.2f} degrees")  # doctest: +SKIP
     """
 
+    strips: tuple[Rod, Rod]
+
     def __init__(
         self,
         paper: Paper,
@@ -142,11 +145,11 @@ class WideSheet(TableSheet[WideFold]):
         if uneven > 0.5:
             raise ValueError(f"unevenness must be at most 0.5, got {uneven:g}: friction would be negative")
         more = uneven * np.clip(np.random.default_rng((self._seed, 2)).normal(), -2.0, 2.0)
-        self.frictions = self.truth.friction * np.array([1.0 - more, 1.0 + more])
+        self.frictions: FloatArray = self.truth.friction * np.array([1.0 - more, 1.0 + more])
         self._places = node_places(paper.length, self.jaw.depth, edges)
         self._sides = np.array([-0.25, 0.25]) * paper.width
         scene, self.strips = self._scene(validation.non_negative(own_friction, "own_friction"))
-        self.simulation = scene.build(integrator="backward_euler", time_step=time_step)
+        self.simulation: Simulation = scene.build(integrator="backward_euler", time_step=time_step)
 
     def _scene(self, own_friction: float) -> tuple[Scene, tuple[Rod, Rod]]:
         paper, scene = self.paper, self._tilted_scene()

@@ -57,14 +57,19 @@ class Arm(Task):
         velocities themselves are 0.5 to 0.8 m/s.
     """
 
-    control_step = 0.1
+    control_step: float = 0.1
     steps = 100
-    bend_step = 0.05
-    axes = slice(None)
+    bend_step: float = 0.05
+    axes: slice = slice(None)
     components = 2
     planar = False
     twisted = False
-    time_step = longest_meant = 1.0 / 40.0
+    time_step: float = 1.0 / 40.0
+    longest_meant: float = 1.0 / 40.0
+    action_size: int
+    bends: FloatArray
+    twists: FloatArray
+    target: FloatArray
 
     def __init__(self) -> None:
         self.action_size = 5 * (self.components + self.twisted)
@@ -215,14 +220,14 @@ class Follow(Arm):
     """
 
     steps = 500
-    speed = 0.5  # [m/s]
-    turning = 0.025  # chance of a new direction, an action
+    speed: float = 0.5  # [m/s]
+    turning: float = 0.025  # chance of a new direction, an action
 
     def prepare(self, robots: Batch) -> None:
         """Allocate the motions of targets, which are drawn at the start of an episode."""
         super().prepare(robots)
         count = len(robots)
-        self.way = np.zeros((count, 3))  # velocity of the target [m/s]
+        self.way: FloatArray = np.zeros((count, 3))  # velocity of the target [m/s]
         self._taken = np.zeros(count, np.int64)
         self._turns = np.zeros((count, self.steps), bool)
         self._ways = np.zeros((count, self.steps + 1, 3))
@@ -276,7 +281,7 @@ class Reach(Arm):
     def prepare(self, robots: Batch) -> None:
         """Allocate orientations of the targets."""
         super().prepare(robots)
-        self.goal = np.tile((0.0, 0.0, 0.0, 1.0), (len(robots), 1))
+        self.goal: FloatArray = np.tile((0.0, 0.0, 0.0, 1.0), (len(robots), 1))
 
     def aim(self, lane: int, generator: np.random.Generator) -> None:
         """Draw a position anywhere and a yaw."""
@@ -319,11 +324,12 @@ class Reach(Arm):
 class _Obstructed(Arm):
     """The tip is to come to a goal behind obstacles; steps of 0.5 s."""
 
-    control_step = 0.5
+    control_step: float = 0.5
     steps = 50
-    bend_step = 0.25
-    time_step = longest_meant = 1.0 / 30.0  # led over 0.5 s an arm swings less
-    aimed_at = (0.8, 0.0, 0.15)  # [m]
+    bend_step: float = 0.25
+    time_step: float = 1.0 / 30.0
+    longest_meant: float = 1.0 / 30.0  # led over 0.5 s an arm swings less
+    aimed_at: tuple[float, float, float] = (0.8, 0.0, 0.15)  # [m]
 
     def aim(self, lane: int, generator: np.random.Generator) -> None:
         """Always there."""
@@ -341,11 +347,19 @@ class Obstacles2D(_Obstructed):
     >>> env = gymnasium.make("withe/Obstacles2D-v0")  # doctest: +SKIP
     """
 
-    axes = slice(None, None, 2)  # x and z
+    axes: slice = slice(None, None, 2)  # x and z
     components = 1
     planar = True
-    time_step = longest_meant = 1.0 / 36.0  # with 1/30 s, which impacts cut, the tip is wrong by 13 mm
-    places = ((0.2, 0.12), (0.6, 0.12), (0.4, 0.0), (0.4, 0.37), (0.4, 0.57), (0.4, 0.77))  # x, z [m]
+    time_step: float = 1.0 / 36.0
+    longest_meant: float = 1.0 / 36.0  # with 1/30 s, which impacts cut, the tip is wrong by 13 mm
+    places: tuple[tuple[float, float], ...] = (  # x, z [m]
+        (0.2, 0.12),
+        (0.6, 0.12),
+        (0.4, 0.0),
+        (0.4, 0.37),
+        (0.4, 0.57),
+        (0.4, 0.77),
+    )
 
     def add_obstacles(self, scene: Scene, generator: np.random.Generator) -> None:
         """Add capsules across the plane."""
@@ -365,14 +379,18 @@ class Obstacles3D(_Obstructed):
     """
 
     redraw = True
-    aimed_at = (0.8, 0.0, 0.35)
-    low, high = np.array([0.3, -0.6, -0.1]), np.array([0.6, 0.6, 0.8])  # box of the capsules [m]
-    count, radius, length, apart = 8, 0.03, 1.0, 0.015  # [-], [m]
+    aimed_at: tuple[float, float, float] = (0.8, 0.0, 0.35)
+    low: FloatArray = np.array([0.3, -0.6, -0.1])  # box of the capsules [m]
+    high: FloatArray = np.array([0.6, 0.6, 0.8])
+    count: int = 8
+    radius: float = 0.03  # [m]
+    length: float = 1.0  # [m]
+    apart: float = 0.015  # [m]
 
     def prepare(self, robots: Batch) -> None:
         """Allocate the obstacles for observations."""
         super().prepare(robots)
-        self.ends = np.zeros((len(robots), self.count * 6))
+        self.ends: FloatArray = np.zeros((len(robots), self.count * 6))
 
     def begin(self, robots: Batch, chosen: IntArray, generators: list[np.random.Generator]) -> None:
         """Store the positions of the capsules."""

@@ -75,6 +75,12 @@ class Episodes:
         Number of actions after which an episode is truncated, if it is below that of the task.
     """
 
+    task: Task
+    robots: Batch
+    begun: npt.NDArray[np.bool_]
+    action_size: int
+    steps: int
+
     def __init__(self, task: Task, count: int, workers: int | None, most: int | None = None) -> None:
         if not isinstance(task, Task):
             got = f"the class {task.__name__} itself" if isinstance(task, type) else type(task).__name__

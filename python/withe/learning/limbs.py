@@ -26,6 +26,7 @@ class _Limbs(Task):
     parts: tuple[slice, ...]  # stencils of a limb that are bent as one
     ways: tuple[tuple[int, int], ...]  # (part, component of curvature) of each number of an action of a limb
     most: float  # change of natural curvature [1/m]
+    actions: FloatArray  # last actions, (n, action_size) [-]
     drawn: FloatArray  # natural curvature as it was drawn, (stencils, 2) [1/m]
 
     def _bend(self, robots: Batch, actions: FloatArray, chosen: IntArray) -> None:
@@ -59,14 +60,20 @@ class Crawl(_Limbs):
     >>> env = gymnasium.make("withe/Crawl-v0")  # doctest: +SKIP
     """
 
-    action_size, control_step, steps = 18, 0.1, 100
-    limbs = tuple(f"leg {i}" for i in range(6))
-    parts = (slice(0, 4), slice(6, 10))
-    ways = ((0, 0), (0, 1), (1, 1))
-    most = 12.0
-    length, radius, nodes = 0.16, 5e-3, 17  # for a leg [m], [m], [-]
-    rise, fall = np.radians(35.0), np.radians(-80.0)  # slope at the body and at the foot
-    friction = 0.8
+    action_size: int = 18
+    control_step: float = 0.1
+    steps: int = 100
+    limbs: tuple[str, ...] = tuple(f"leg {i}" for i in range(6))
+    parts: tuple[slice, ...] = (slice(0, 4), slice(6, 10))
+    ways: tuple[tuple[int, int], ...] = ((0, 0), (0, 1), (1, 1))
+    most: float = 12.0
+    length: float = 0.16  # of a leg [m]
+    radius: float = 5e-3  # of a leg [m]
+    nodes: int = 17  # of a leg
+    rise: float = np.radians(35.0)  # slope at the body
+    fall: float = np.radians(-80.0)  # slope at the foot
+    friction: float = 0.8
+    before: FloatArray  # positions of the bodies before the last action, (n, 3) [m]
 
     def build(self, generator: np.random.Generator) -> Simulation:
         """Build the robot on its feet, as drawn.
@@ -79,7 +86,7 @@ class Crawl(_Limbs):
         scene = Scene()
         rubber = Material(youngs_modulus=1.5e7, poisson_ratio=0.5, density=1180.0, viscosity=5.0e4)
         arch = (self.fall - self.rise) / self.length
-        self.drawn = np.tile((0.0, arch), (self.nodes - 2, 1))
+        self.drawn: FloatArray = np.tile((0.0, arch), (self.nodes - 2, 1))
         rods = []
         for name, azimuth in zip(self.limbs, np.radians([30.0, 90.0, 150.0, 210.0, 270.0, 330.0]), strict=True):
             outward = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
@@ -141,13 +148,22 @@ class Wrap(_Limbs):
     >>> env = gymnasium.make("withe/Wrap-v0")  # doctest: +SKIP
     """
 
-    action_size, control_step, steps, redraw = 20, 0.1, 60, True
-    limbs = tuple(f"limb {i}" for i in range(5))
-    parts = (slice(0, 10), slice(10, 19))
-    ways = ((0, 0), (0, 1), (1, 0), (1, 1))
-    most = 25.0
-    length, radius, nodes, side = 0.3, 5e-3, 21, 0.09  # for a limb [m], [m], [-]; for the pentagon of their tops [m]
-    ball, depth, spread = 0.04, -0.2, 0.02  # radius of the ball, its height, how far aside it may be [m]
+    action_size: int = 20
+    control_step: float = 0.1
+    steps: int = 60
+    redraw: bool = True
+    limbs: tuple[str, ...] = tuple(f"limb {i}" for i in range(5))
+    parts: tuple[slice, ...] = (slice(0, 10), slice(10, 19))
+    ways: tuple[tuple[int, int], ...] = ((0, 0), (0, 1), (1, 0), (1, 1))
+    most: float = 25.0
+    length: float = 0.3  # of a limb [m]
+    radius: float = 5e-3  # of a limb [m]
+    nodes: int = 21  # of a limb
+    side: float = 0.09  # of the pentagon of the tops of the limbs [m]
+    ball: float = 0.04  # radius of the ball [m]
+    depth: float = -0.2  # height of the ball [m]
+    spread: float = 0.02  # greatest horizontal distance of the ball from the middle [m]
+    balls: FloatArray  # positions of the balls, (n, 3) [m]
 
     def build(self, generator: np.random.Generator) -> Simulation:
         """Build the hanging gripper with the ball somewhere between its limbs."""
@@ -155,7 +171,7 @@ class Wrap(_Limbs):
         silicone = Material(youngs_modulus=3e5, poisson_ratio=0.5, density=1200.0, viscosity=3e3)
         turns = 2.0 * np.pi * np.arange(5) / 5
         tops = self.side / (2.0 * np.sin(np.pi / 5)) * np.stack([np.cos(turns), np.sin(turns), 0.0 * turns], axis=1)
-        self.drawn = np.zeros((self.nodes - 2, 2))
+        self.drawn: FloatArray = np.zeros((self.nodes - 2, 2))
         for name, top, turn in zip(self.limbs, tops, turns, strict=True):
             limb = scene.add_rod(
                 start=top,

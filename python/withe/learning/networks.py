@@ -80,6 +80,10 @@ class Network:
         Record of the training.
     """
 
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    hidden: tuple[int, ...]
+
     def __init__(
         self,
         inputs: Sequence[str],

@@ -19,9 +19,9 @@ class Directory:
 
     def __init__(self, scene_id: str) -> None:
         self.scene_id = scene_id
-        self.layout = Layout()
+        self.layout: Layout = Layout()
         self.parts: dict[str, Part] = {}
-        self.contact = ContactSettings()
+        self.contact: ContactSettings = ContactSettings()
         self.actuations: tuple[Actuation, ...] = ()  # in the order of time
         self._retired: dict[str, int] = {}  # greatest number of a released part that was named by one, by its word
 

@@ -56,7 +56,7 @@ class Camera:
         rotation: ArrayLike | None = None,
         translation: ArrayLike | None = None,
     ) -> None:
-        self.matrix = _checked(matrix, (3, 3), "matrix")
+        self.matrix: Array = _checked(matrix, (3, 3), "matrix")
         if abs(np.linalg.det(self.matrix)) < 1e-12:
             raise ValueError("matrix must be invertible, got a singular one")
         if np.abs(self.matrix[2] - [0.0, 0.0, 1.0]).max() > 1e-9:

@@ -27,6 +27,12 @@ class View:
     A point x appears at offset + scale R(roll) axes x [px], where R turns clockwise in the picture.
     """
 
+    roll: float
+    scale: float
+    offset: FloatArray
+    places: FloatArray
+    axes: FloatArray
+
     def __init__(self, coordinates: FloatArray, axes: FloatArray) -> None:
         self.roll, self.scale, self.offset = coordinates[0], float(np.exp(coordinates[1])), coordinates[2:_VIEW]
         self.places = coordinates[_VIEW:]
@@ -57,6 +63,16 @@ class CameraProblem:
     axes : ndarray of shape (2, 3)
         Directions right and down in a level picture, in the world.
     """
+
+    equilibria: Equilibria
+    places: Places
+    seen: FloatArray
+    count: int
+    axes: FloatArray
+    begin: FloatArray
+    scales: FloatArray
+    per_frame: npt.NDArray[np.bool_]
+    names: list[str]
 
     def __init__(
         self, simulation: Simulation, unknowns: list[Unknown], places: Places, seen: FloatArray, side: int = 1

@@ -95,7 +95,7 @@ class Secants:
     """
 
     def __init__(self) -> None:
-        self.updated = False
+        self.updated: bool = False
         self._gain = np.inf  # gain of the last step
         self._last: tuple[FloatArray, FloatArray, FloatArray] | None = None  # coordinates, residual, derivatives
 
@@ -155,6 +155,11 @@ class Decomposed:
         Left singular vectors as columns, which are an orthonormal basis of the range; the singular values that are not
         zero to rounding; right singular vectors as rows.
     """
+
+    matrix: FloatArray
+    range: FloatArray
+    values: FloatArray
+    vectors: FloatArray
 
     def __init__(self, matrix: FloatArray) -> None:
         self.matrix = matrix

@@ -75,6 +75,10 @@ class Places:
         Arc length of each place on its line.
     """
 
+    rods: list[RodPart]
+    lines: list[Line]
+    arcs: FloatArray
+
     def __init__(self, simulation: Simulation, places: Sequence[Place]) -> None:
         directory = simulation._session.directory
         self._nodes = directory.layout.node_count

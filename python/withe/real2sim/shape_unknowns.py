@@ -32,6 +32,10 @@ class _NaturalStrain(Unknown):
         Text that distinguishes them in names.
     """
 
+    names: tuple[str, ...]
+    rods: tuple[str, ...]
+    scales: FloatArray
+    length: float
     per_frame = True
 
     def __init__(self, part: RodPart, basis: Any, directions: FloatArray, axes: list[str]) -> None:
@@ -95,7 +99,11 @@ class DrawnShape(Unknown):
     lengths, and the first node its position.
     """
 
-    word, per_frame = "points", False
+    names: tuple[str, ...]
+    rods: tuple[str, ...]
+    scales: FloatArray
+    word: str = "points"
+    per_frame: bool = False
 
     def __init__(self, simulation: Simulation, rod: Rod | str, basis: Any = "linear") -> None:
         part = rod_part(simulation, rod)
@@ -185,6 +193,9 @@ class DrawnShape(Unknown):
 class Pose(Unknown):
     """Position of a support [m], or its rotation against the initial guess, as a rotation vector [rad]."""
 
+    names: tuple[str, ...]
+    rods: tuple[str, ...]
+    scales: FloatArray
     per_frame = False
 
     def __init__(

@@ -46,7 +46,7 @@ class Equilibria(Coordinates):
     ) -> None:
         super().__init__(simulation, unknowns)
         self.conditions = conditions
-        self.solves = 0
+        self.solves: int = 0
 
     def positions(self, coordinates: FloatArray, frame: int) -> FloatArray:
         """Return the positions of the nodes at rest, shape (nodes, 3) [m].

@@ -94,6 +94,14 @@ class Coordinates:
         Arguments for derivatives by all unknowns, without values that another unknown replaces.
     """
 
+    simulation: Simulation
+    unknowns: list[Unknown]
+    names: tuple[str, ...]
+    scales: FloatArray
+    per_frame: npt.NDArray[np.bool_]
+    slices: list[slice]
+    words: list[Any]
+
     def __init__(self, simulation: Simulation, unknowns: Sequence[Unknown]) -> None:
         self.simulation, self.unknowns = simulation, list(unknowns)
         self.names = tuple(name for unknown in self.unknowns for name in unknown.names)
@@ -136,6 +144,10 @@ class Coordinates:
 class Parameter(Unknown):
     """A positive parameter of one or several parts; the coordinate is the logarithm of its factor."""
 
+    word: str
+    names: tuple[str, ...]
+    rods: tuple[str, ...]
+    scales: FloatArray
     per_frame = False
 
     def __init__(self, simulation: Simulation, handles: Sequence[Handle | str], word: str) -> None:
@@ -194,7 +206,11 @@ class Parameter(Unknown):
 class Tilt(Unknown):
     """Tilt of the base of a robot in a plane, as an opposite rotation of gravity."""
 
-    word, per_frame = "gravity", False
+    names: tuple[str, ...]
+    rods: tuple[str, ...]
+    scales: FloatArray
+    word: str = "gravity"
+    per_frame: bool = False
     name = "tilt of the base"
 
     def __init__(self, simulation: Simulation) -> None:
@@ -232,7 +248,11 @@ class Tilt(Unknown):
 class Delay(Unknown):
     """Delay of the clock of the targets after the start of a run [s]."""
 
-    word, per_frame = "delay", False
+    names: tuple[str, ...]
+    rods: tuple[str, ...]
+    scales: FloatArray
+    word: str = "delay"
+    per_frame: bool = False
 
     def __init__(self, first: float, duration: float) -> None:
         self._first = first

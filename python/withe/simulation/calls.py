@@ -90,7 +90,7 @@ class RunJournal:
     def __init__(self, tape: _core.Tape, session: Session) -> None:
         self._tape = tape
         self.calls: list[_Call] = []
-        self.ramps = _ramps_on_their_way(session)
+        self.ramps: dict[_Key, _Ramp] = _ramps_on_their_way(session)
 
     def note(
         self, session: Session, method: str, part: Part | BodyPair | None, values: Mapping[str, Any], over: float
@@ -246,7 +246,7 @@ class Ledger:
         for place in self._poses:
             self.sums[place] = np.zeros(3)
         moved = any(call.method == "move" and call.values for call in calls)
-        self.moves = by_moves and (moved or bool(self._poses))
+        self.moves: bool = by_moves and (moved or bool(self._poses))
 
     def visit(self, step: int, moment: int, time: float, found: _core.ParameterGradient) -> None:
         """Add derivatives by parameters from a step on, or of a read-out at a moment."""

@@ -39,7 +39,7 @@ class Run(Generic[S]):
         differentiable: bool = False,
         longest_step: Callable[[S], float] | None = None,
     ) -> None:
-        self.duration = validation.positive(duration, "duration")
+        self.duration: float = validation.positive(duration, "duration")
         step = stepping.session.options.time_step
         steps = self.duration / step
         # Shorter than the rounding error of the time or of a step: 1 / duration may not be a finite number.

@@ -93,7 +93,7 @@ class Stage:
             raise ValueError("record has no frames to show")
         if color_by != "rod" and color_by not in BARS:
             raise ValueError(f"color_by must be one of 'rod', {str(list(BARS))[1:-1]}, got {color_by!r}")
-        self.size = _checked_size(size)
+        self.size: tuple[int, int] = _checked_size(size)
         self._read(record, color_by)
         in_view = self._positions if frames is None else self._positions[list(frames)]
         nodes = in_view.reshape(-1, 3)
@@ -109,7 +109,7 @@ class Stage:
         self._fineness = supersampling
         window = [side * self._fineness for side in self.size]
         with render_window(off_screen):
-            self.plotter = pyvista.Plotter(off_screen=off_screen, window_size=window, lighting="none")
+            self.plotter: Any = pyvista.Plotter(off_screen=off_screen, window_size=window, lighting="none")
         if not multisampling:
             self.plotter.render_window.SetMultiSamples(0)
         self.plotter.set_background("#f5f7f9")
@@ -139,7 +139,7 @@ class Stage:
     def _read(self, record: Frames, color_by: ColorBy) -> None:
         """Motions, and the surfaces of rods."""
         self._record = record
-        self.times = record.times
+        self.times: FloatArray = record.times
         self._positions = record.positions()
         self._directors = [record.directors(rod)[:, :, 0] for rod in record.rods]
         samples = max(1, min(6, _MAX_SAMPLES // sum(len(rod.rows) for rod in record.rods)))

@@ -38,7 +38,7 @@ class Surface:
     """
 
     def __init__(self, rod: RodOutline, nodes: FloatArray, samples_per_edge: int = 4, sides: int = 24) -> None:
-        self.closed = rod.closed
+        self.closed: bool = rod.closed
         chords = np.linalg.norm(np.diff(nodes, axis=0, append=nodes[:1]), axis=1)[: rod.edges]
         knots = np.concatenate([[0.0], np.cumsum(np.maximum(chords, 1e-12 * chords.max()))])
         samples = _subdivide(knots, samples_per_edge)
@@ -52,7 +52,7 @@ class Surface:
         self._section, self._section_normals = _round(sides) if rod.widths is None else _rectangle()
         self._caps = _caps(rod.widths is None) if not rod.closed else np.zeros((0, 3))
         self._ring_samples = self._rings(len(samples))
-        self.faces = _faces(len(self._ring_samples), len(self._section), rod.closed)
+        self.faces: npt.NDArray[np.int64] = _faces(len(self._ring_samples), len(self._section), rod.closed)
 
     def _rings(self, samples: int) -> npt.NDArray[np.int64]:
         """Sample of every ring: the first one repeated for its cap, then all, then the last one."""
