@@ -30,7 +30,7 @@ PYTHON_SOURCES := $(shell find python/withe -name '*.py' -o -name '*.pyi' -o -na
 # Folders too: a deleted file is a change.
 SOURCE_FOLDERS := $(wildcard cpp/*/) $(shell find python/withe -type d -not -name __pycache__)
 
-.PHONY: help demo view learn test test-all ctest-build ctest ctest-baseline pytest asan tsan asan-python bench docs wheel lint format format-check prose types stubs stub-check \
+.PHONY: help demo view learn test test-all ctest-build ctest ctest-baseline pytest asan tsan asan-python bench docs wheel wheels lint format format-check prose types stubs stub-check \
     tidy tidy-changed clean distclean
 
 help:
@@ -45,6 +45,7 @@ help:
 	@echo "make tsan          C++ tests of what runs in threads under the thread sanitizer"
 	@echo "make asan-python   random sequences of calls through Python under them; SEQUENCES=1000 SEED=7 runs others"
 	@echo "make wheel         dist/*.whl for machines without compiler"
+	@echo "make wheels        the same for each of Python 3.11 to 3.14 that is installed"
 	@echo "make bench         all benchmarks (about an hour); NAME=work_precision runs one"
 	@echo "make docs          the documentation, into out/docs"
 	@echo "make lint          ruff; make format applies formatters, make format-check only looks"
@@ -172,6 +173,9 @@ docs: $(STAMPS)/installed $(STAMPS)/doc_tools
 
 wheel: $(STAMPS)/dev_tools
 	@python tools/make_wheel.py
+
+wheels: $(STAMPS)/dev_tools
+	@python tools/make_wheel.py --all
 
 # --- quality ------------------------------------------------------------------------------------------------
 

@@ -16,8 +16,8 @@ trap 'rm -rf "$scratch"' EXIT
 # Outside the checkout, so that the installed package is what is looked at.
 (cd "$scratch" && pybind11-stubgen --exit-code --output-dir "$scratch" withe._core)
 made="$scratch/withe/_core.pyi"
-# The bindings do not state what a dict or a tuple holds.
-sed -i -E 's/\bdict([,:)]|$)/dict[str, typing.Any]\1/; s/ClassVar\[tuple\]/ClassVar[tuple[typing.Any, ...]]/; s/-> tuple:/-> tuple[typing.Any, ...]:/' "$made"
+# The bindings do not state what a dict or a tuple holds. The version changes with each commit after a release.
+sed -i -E 's/^__version__: str = .*/__version__: str/; s/\bdict([,:)]|$)/dict[str, typing.Any]\1/; s/ClassVar\[tuple\]/ClassVar[tuple[typing.Any, ...]]/; s/-> tuple:/-> tuple[typing.Any, ...]:/' "$made"
 ruff format --quiet --isolated --line-length 120 "$made"
 
 if [[ "${1:-}" == --check ]]; then

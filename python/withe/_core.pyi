@@ -1558,4 +1558,4 @@ def trace_lines(
     Every line in a mask, in order, and labels.
     """
 
-__version__: str = "0.1.0"
+__version__: str

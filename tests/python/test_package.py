@@ -4,8 +4,10 @@ import importlib.metadata
 import importlib.util
 import platform
 import re
+import shutil
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -38,6 +40,54 @@ def test_the_installed_package_is_tested_and_typed():
 
 def test_version_is_the_same_everywhere():
     assert withe.__version__ == importlib.metadata.version("withe") == withe._core.__version__
+    assert re.fullmatch(r"\d+\.\d+\.\d+(\.post\d+)?", withe.__version__)
+
+
+def test_readme_and_citation_name_one_release():
+    (cited,) = re.findall(r"^version: (.+)$", (ROOT / "CITATION.cff").read_text(), re.MULTILINE)
+    assert re.findall(r"version = \{(.+)\}", (ROOT / "README.md").read_text()) == [cited]
+
+
+def git(folder, *words):
+    identity = ("-c", "user.name=a", "-c", "user.email=a@b", "-c", "commit.gpgsign=false")
+    subprocess.run(["git", "-C", folder, *identity, *words], check=True, capture_output=True)
+
+
+@pytest.mark.skipif(shutil.which("git") is None, reason="git is not installed")
+def test_the_version_is_that_of_the_last_tag_and_without_tags_that_of_the_citation(tmp_path):
+    version = load_tool("tag_version").version
+    (tmp_path / "CITATION.cff").write_text("cff-version: 1.2.0\nversion: 0.1.0\n")
+    assert version(tmp_path) == "0.1.0"
+    git(tmp_path, "init", "-q")
+    git(tmp_path, "commit", "-q", "--allow-empty", "-m", "first")
+    assert version(tmp_path) == "0.1.0"
+    git(tmp_path, "tag", "v0.2.0")
+    git(tmp_path, "tag", "notes")
+    assert version(tmp_path) == "0.2.0"
+    for _ in range(2):
+        git(tmp_path, "commit", "-q", "--allow-empty", "-m", "later")
+    assert version(tmp_path) == "0.2.0.post2"
+    inner = tmp_path / "archive"  # unpacked within another checkout
+    inner.mkdir()
+    (inner / "CITATION.cff").write_text("version: 0.1.0\n")
+    assert version(inner) == "0.1.0"
+    (inner / "PKG-INFO").write_text("Metadata-Version: 2.4\nVersion: 0.1.0.post3\n")
+    assert version(inner) == "0.1.0.post3"
+
+
+def test_pyproject_takes_the_version_from_the_tool():
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    assert settings["project"]["dynamic"] == ["version"]
+    provider = settings["tool"]["scikit-build"]["metadata"]["version"]
+    assert (ROOT / provider["provider-path"] / f"{provider['provider']}.py").is_file()
+
+
+def test_wheels_are_made_for_the_pythons_of_the_classifiers():
+    tool, project = load_tool("make_wheel"), tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    named = [each.rpartition(" :: ")[2] for each in project["classifiers"] if "Python :: 3." in each]
+    assert tuple(named) == tool.VERSIONS
+    assert project["requires-python"] == f">={tool.VERSIONS[0]}"
+    assert tool.interpreter("2.0") is None
 
 
 @pytest.mark.skipif(platform.libc_ver() != ("glibc", "2.36"), reason="wheels are built on Debian 12, with glibc 2.36")
