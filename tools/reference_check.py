@@ -331,7 +331,7 @@ def faults_of(subject: Subject) -> Iterator[Fault]:
             yield Fault("raises", where, f"{name} is not under Raises")
 
 
-DEPTH = 1
+DEPTH = 3
 """Calls of functions of the package that are followed in search of exceptions."""
 
 

@@ -274,6 +274,8 @@ class PlanFile(ABC):
         ------
         ValueError
             Another suffix.
+        OSError
+            The file cannot be written.
         """
         path = Path(path)
         if path.suffix == ".csv":

@@ -61,7 +61,9 @@ class Reading:
     @property
     def time(self) -> FloatArray:
         """Return the time of every simulation since its start, shape (n,) [s]."""
-        return _read(self._lanes, "time", -1, (), None)
+        times = np.empty(len(self._lanes))
+        self._lanes.engine.read("time", -1, times)
+        return times
 
     def positions(self, rod: Rod | str | None = None, out: FloatArray | None = None) -> FloatArray:
         """Return the positions of the nodes of a rod, or of all nodes of the scene.

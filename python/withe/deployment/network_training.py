@@ -63,6 +63,8 @@ def train(
         An unknown name or a negative seed.
     ImportError
         torch is not installed.
+    ConvergenceError
+        No grasp was found for one of the samples.
 
     Examples
     --------

@@ -138,6 +138,13 @@ class LayPlan(PlanFile):
         Returns
         -------
         matplotlib.figure.Figure
+
+        Raises
+        ------
+        ValueError
+            Friction that is negative or above 10.
+        ImportError
+            matplotlib is not installed.
         """
         title = f"{self.method}, {1e3 * self.speed:.0f} mm/s"
         return draw_plan(self.pattern, self.positions, self.feasibility(friction), title)
@@ -245,6 +252,8 @@ def plan(
         The cable is shorter than pattern and tail, or the pattern bends too tightly. Pattern or tail cross, a post is
         too close, or no friction is enough. A speed, tail, time step or friction is not positive. The method
         is "optimised" without friction, or "network" outside of its range.
+    ConvergenceError
+        No grasp was found for a part of the pattern.
 
     Warns
     -----

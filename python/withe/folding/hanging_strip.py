@@ -139,16 +139,18 @@ def measure(
     Measured
         Lgb with its standard deviation, by linear propagation of the errors of the readings.
 
-    Warns
-    -----
-    UserWarning
-        The strip is too short or too long for a precise result: cut one of 1.5 to 3 Lgb.
-
     Raises
     ------
     ValueError
         Missing input: pass length and drop, or an image and its scale. Lengths that are not positive or above 10 m, or
         a drop that no strip of this length can have. A picture without a sheet, or readings of two different strips.
+    ImportError
+        An image is given, and OpenCV is not installed.
+
+    Warns
+    -----
+    UserWarning
+        The strip is too short or too long for a precise result: cut one of 1.5 to 3 Lgb.
 
     Examples
     --------

@@ -243,6 +243,11 @@ class SimulatedSheet(TableSheet[Fold]):
         Returns
         -------
         Fold
+
+        Raises
+        ------
+        ValueError
+            As `fold`, or an error that the generator raises.
         """
         self._begin()
         return self._carried(JawMotion(motions, self._drawn), target, duration, progress)
@@ -271,6 +276,11 @@ class SimulatedSheet(TableSheet[Fold]):
         Returns
         -------
         Fold
+
+        Raises
+        ------
+        ValueError
+            As `carry_out`.
         """
         self.simulation.restore(held.state)
         return self._carried(held.jaw.on_from_here(motions), target, LONGEST, False)

@@ -247,6 +247,11 @@ class WideSheet(TableSheet[WideFold]):
         Returns
         -------
         WideFold
+
+        Raises
+        ------
+        ValueError
+            As `fold`, or an error that the generator raises.
         """
         simulation = self.simulation
         self._begin()

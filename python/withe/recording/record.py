@@ -689,6 +689,10 @@ class Record:
         ------
         ValueError
             An option out of range, or a path with another suffix.
+        ImportError
+            PyVista or imageio-ffmpeg is not installed.
+        OSError
+            The film cannot be written.
 
         See Also
         --------
@@ -713,6 +717,15 @@ class Record:
         -------
         pathlib.Path
             Path of the picture.
+
+        Raises
+        ------
+        ValueError
+            An option out of range, or a path with another suffix.
+        ImportError
+            PyVista is not installed.
+        OSError
+            The picture cannot be written.
 
         See Also
         --------

@@ -117,6 +117,11 @@ class Control:
         over : float [s]
             Duration of a linear ramp to the value. By default the change is immediate.
 
+        Raises
+        ------
+        ValueError
+            Not a rod of this scene, a wrong shape, or a value that is not finite.
+
         See Also
         --------
         set : The method to use instead.
@@ -134,6 +139,11 @@ class Control:
             Natural length over drawn length.
         over : float [s]
             Duration of a linear ramp to the value. By default the change is immediate.
+
+        Raises
+        ------
+        ValueError
+            Not a rod of this scene, a wrong shape, or a value that is not positive.
 
         See Also
         --------

@@ -125,7 +125,13 @@ class RunningHand(Hand):
 
     @property
     def pose(self) -> HeldPose:
-        """Return the pose of the hand. See `Simulation.pose`."""
+        """Return the pose of the hand. See `Simulation.pose`.
+
+        Raises
+        ------
+        ValueError
+            The hand was released.
+        """
         return support_pose(self.session, self)
 
     def move(
@@ -184,12 +190,24 @@ class RunningHand(Hand):
 
     @property
     def deflection(self) -> Deflection:
-        """Return the displacement of the rod in the hand. See `Simulation.deflection`."""
+        """Return the displacement of the rod in the hand. See `Simulation.deflection`.
+
+        Raises
+        ------
+        ValueError
+            The hand was released.
+        """
         return hand_deflection(self.session, self)
 
     @property
     def passage(self) -> Passage:
-        """Return the passage of the rod through this ring. See `Simulation.passage`."""
+        """Return the passage of the rod through this ring. See `Simulation.passage`.
+
+        Raises
+        ------
+        ValueError
+            Not a ring, or one that was released or left by its rod.
+        """
         return ring_passage(self.session, self)
 
     def feed(self, rate: float) -> None:

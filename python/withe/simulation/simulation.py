@@ -529,6 +529,13 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
         -------
         matplotlib.figure.Figure
 
+        Raises
+        ------
+        ValueError
+            An option out of range.
+        ImportError
+            matplotlib is not installed.
+
         See Also
         --------
         withe.view.plot : All options, and what they raise.
@@ -568,6 +575,15 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
         -------
         pathlib.Path
             Path of the file.
+
+        Raises
+        ------
+        ValueError
+            An option out of range, or a path with another suffix.
+        ImportError
+            PyVista is not installed.
+        OSError
+            The picture cannot be written.
 
         See Also
         --------
