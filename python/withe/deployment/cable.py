@@ -149,7 +149,7 @@ def measure(
         None or both of height and image, one that is not positive or above 10 m, an image without scale or without a
         loop, a negative error.
     ImportError
-        An image is given, and OpenCV is not installed.
+        An image file is given, and OpenCV is not installed.
 
     Examples
     --------

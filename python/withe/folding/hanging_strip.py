@@ -145,7 +145,7 @@ def measure(
         Missing input: pass length and drop, or an image and its scale. Lengths that are not positive or above 10 m, or
         a drop that no strip of this length can have. A picture without a sheet, or readings of two different strips.
     ImportError
-        An image is given, and OpenCV is not installed.
+        An image file is given, and OpenCV is not installed.
 
     Warns
     -----
