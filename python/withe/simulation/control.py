@@ -251,6 +251,11 @@ class Control:
         move : Move a support or an obstacle.
         Batch.set : Set parameters of many simulations.
 
+        Notes
+        -----
+        Type checkers such as mypy and pyright know the parameters of each kind of handle, and refuse a misspelt one. They
+        accept any parameter if the target is a name.
+
         Examples
         --------
         >>> simulation.set(arm, youngs_modulus=2e6, natural_stretch=1.01)
