@@ -253,8 +253,8 @@ class Control:
 
         Notes
         -----
-        Type checkers such as mypy and pyright know the parameters of each kind of handle, and refuse a misspelt one. They
-        accept any parameter if the target is a name.
+        Type checkers such as mypy and pyright know the parameters of each kind of handle, and refuse a misspelt one.
+        They accept any parameter if the target is a name.
 
         Examples
         --------
