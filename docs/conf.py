@@ -52,4 +52,5 @@ pages.write(Path(__file__).parent)
 def setup(app: object) -> None:
     """Connect the functions that complete and check the reference."""
     app.connect("autodoc-process-docstring", pages.process_docstring, priority=900)  # after napoleon
+    app.connect("autodoc-process-signature", pages.process_signature)
     app.connect("env-check-consistency", pages.report_missing)

@@ -21,6 +21,30 @@ MODULES = {
     "withe.shapes": "Shapes of centrelines",
     "withe.view": "Pictures and films",
 }
+# Classes whose objects come from a function, which their docstring names. Their constructors are not for users.
+MADE_BY = {
+    "withe.CustomForce": "Scene.add_custom_force",
+    "withe.Drag": "Scene.add_drag",
+    "withe.EdgeHandle": "Rod.edge",
+    "withe.Fluid": "Scene.add_fluid",
+    "withe.Hand": "Scene.grasp",
+    "withe.Joint": "Scene.join",
+    "withe.Load": "Scene.add_force",
+    "withe.Mass": "Scene.add_mass",
+    "withe.NodeHandle": "Rod.node",
+    "withe.Obstacle": "Scene.add_floor",
+    "withe.Record": "Simulation.run",
+    "withe.Rod": "Scene.add_rod",
+    "withe.RunningHand": "Simulation.grasp",
+    "withe.Simulation": "Scene.build",
+    "withe.Snapshot": "Simulation.snapshot",
+    "withe.Spring": "Scene.add_spring",
+    "withe.Support": "Scene.clamp",
+    "withe.Tendon": "Scene.add_tendon",
+    "withe.TorsionSpring": "Scene.add_torsion_spring",
+    "withe.learning.Network": "train_network",
+    "withe.real2sim.Calibration": "calibrate",
+}
 ROOT = Path(__file__).resolve().parent.parent
 GENERATED = "generated"
 
@@ -41,7 +65,7 @@ def reference(folder: Path) -> None:
         index.append(f"{title} <{module}>")
         names = public_names(module)
         lines = [f"# {title}", "", f"Module `{module}`.", "", "```{eval-rst}", ".. currentmodule:: " + module, ""]
-        lines += [".. autosummary::", ""]
+        lines += [".. autosummary::", "   :nosignatures:", ""]
         lines += [f"   {name}" for name in names]
         lines += ["```", "", "```{toctree}", ":hidden:", ""]
         lines += [f"{name} <{module}.{name}>" for name in names]
@@ -171,6 +195,11 @@ def process_docstring(app: Any, what: str, name: str, value: Any, options: Any, 
         found = overridden(getattr(importlib.import_module(module), owner), member)
         if found is not None:
             lines += ["", f"Arguments and result are those of :meth:`{found[0]}`.", ""]
+
+
+def process_signature(app: Any, what: str, name: str, *others: Any) -> tuple[str, None] | None:
+    """Leave out the constructor of a class whose objects come from a function."""
+    return ("", None) if what == "class" and name in MADE_BY else None
 
 
 def report_missing(app: Any, environment: Any) -> None:

@@ -38,30 +38,6 @@ VALIDATION = "withe.common.validation"
 SECTIONS = ("Parameters", "Attributes", "Returns", "Yields", "Raises", "Examples", "See Also", "Notes", "References")
 # Words of the type of an entry that stand for numbers with a unit or a shape. Whole numbers have neither.
 FLOATING = re.compile(r"\b(float|floats|number|numbers|array_like|arrays?|ndarray)\b")
-# Classes whose objects come from a function, which their docstring names. Their constructors are not for users.
-MADE_BY = {
-    "withe.CustomForce": "Scene.add_custom_force",
-    "withe.Drag": "Scene.add_drag",
-    "withe.EdgeHandle": "Rod.edge",
-    "withe.Fluid": "Scene.add_fluid",
-    "withe.Hand": "Scene.grasp",
-    "withe.Joint": "Scene.join",
-    "withe.Load": "Scene.add_force",
-    "withe.Mass": "Scene.add_mass",
-    "withe.NodeHandle": "Rod.node",
-    "withe.Obstacle": "Scene.add_floor",
-    "withe.Record": "Simulation.run",
-    "withe.Rod": "Scene.add_rod",
-    "withe.RunningHand": "Simulation.grasp",
-    "withe.Simulation": "Scene.build",
-    "withe.Snapshot": "Simulation.snapshot",
-    "withe.Spring": "Scene.add_spring",
-    "withe.Support": "Scene.clamp",
-    "withe.Tendon": "Scene.add_tendon",
-    "withe.TorsionSpring": "Scene.add_torsion_spring",
-    "withe.learning.Network": "train_network",
-    "withe.real2sim.Calibration": "calibrate",
-}
 FLOATING_ANNOTATION = re.compile(r"\b(float|floating\w*|ArrayLike|NDArray|\w*Array|ndarray)\b")
 UNIT_OR_SHAPE = re.compile(r"\[[^\]]+\]|\bshape\b|\bshapes\b")
 
@@ -179,7 +155,7 @@ def subjects(names: Iterable[tuple[str, str]]) -> Iterator[Subject]:
 def signature_names(subject: Subject) -> list[str] | None:
     """Return the arguments that must be documented; None if the subject has no arguments of its own."""
     value = subject.value
-    if isinstance(value, property | cached_property) or subject.where in MADE_BY:
+    if isinstance(value, property | cached_property) or subject.where in pages.MADE_BY:
         return None
     if isinstance(value, type):
         if issubclass(value, enum.Enum):
@@ -296,8 +272,8 @@ def faults_of(subject: Subject) -> Iterator[Fault]:
     names = [name for entry in documented for name in entry.names]
     expected = signature_names(subject)
     inherits = subject.overridden is not None and arguments(subject.overridden[1]) == expected
-    if where in MADE_BY and MADE_BY[where] not in (inspect.getdoc(value) or ""):
-        yield Fault("docstring", where, f"does not name {MADE_BY[where]}, which makes it")
+    if where in pages.MADE_BY and pages.MADE_BY[where] not in (inspect.getdoc(value) or ""):
+        yield Fault("docstring", where, f"does not name {pages.MADE_BY[where]}, which makes it")
     if expected is not None:
         for name in expected:
             if name not in names and not inherits:
@@ -311,7 +287,7 @@ def faults_of(subject: Subject) -> Iterator[Fault]:
         if is_numeric(entry, subject) and not UNIT_OR_SHAPE.search(entry.type):
             yield Fault("unit", where, f"{', '.join(entry.names)} : {entry.type} has neither unit nor shape")
     function = subject.function
-    if function is None or where in MADE_BY:
+    if function is None or where in pages.MADE_BY:
         return
     if is_property:
         if FLOATING_ANNOTATION.search(return_annotation(function)) and not UNIT_OR_SHAPE.search(doc.summary):

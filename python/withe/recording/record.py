@@ -59,7 +59,7 @@ class Record:
     * read rods: `positions`, `velocities`, `directors`, `spins`, `curvatures`, `twists`, `tensions`
     * read parts: `obstacle_position`
     * read pictures: `plot`, `view`, `picture`, `animate`
-    * read files: `save`, `load`, `to_vtk`
+    * files: `save`, `load`, `to_vtk`
     * differentiate: `gradient`
 
     Arrays that methods return are copies, with the frame as first axis. Rods are given by handle or by name.
