@@ -20,7 +20,10 @@ MODULES = {
     "withe.knots": "Knots",
     "withe.shapes": "Shapes of centrelines",
     "withe.view": "Pictures and films",
+    "withe.io": "Files of poses and frames",
 }
+# Names for users of a module that is also for other modules of the package.
+FOR_USERS = {"withe.io": ("load_poses", "save_poses", "write_vtk")}
 # Classes whose objects come from a function, which their docstring names. Their constructors are not for users.
 MADE_BY = {
     "withe.CustomForce": "Scene.add_custom_force",
@@ -52,9 +55,8 @@ GENERATED = "generated"
 def public_names(module: str) -> list[str]:
     """Return the public names of a module that are not modules themselves, sorted."""
     found = importlib.import_module(module)
-    return sorted(
-        name for name in found.__all__ if not name.startswith("_") and not inspect.ismodule(getattr(found, name))
-    )
+    names = FOR_USERS.get(module, found.__all__)
+    return sorted(name for name in names if not name.startswith("_") and not inspect.ismodule(getattr(found, name)))
 
 
 def reference(folder: Path) -> None:

@@ -2,7 +2,8 @@
 
 `python tools/reference_check.py` prints the faults of each kind and fails if there are any. The kinds:
 
-- page: a public module without a page, or a class that a public function returns and that has no page
+- page: a public module without a page, a class that a public function returns and that has no page, or a name such as
+  `withe.view.plot` in a docstring or on a page of docs/ that the reference lacks
 - docstring: a public function, class, method or property without a docstring
 - parameter: an argument that is not under Parameters, or an entry there that is no argument. A method that overrides a
   method of a public class with the same arguments may leave its arguments and its result to that method.
@@ -353,6 +354,22 @@ def page_faults(names: list[tuple[str, str]]) -> Iterator[Fault]:
         yield Fault("page", f"{each.__module__}.{each.__qualname__}", f"{where} returns it, and it has no page")
 
 
+def named_faults(names: list[tuple[str, str]]) -> Iterator[Fault]:
+    """Yield names in public docstrings and on pages of docs/ that the reference lacks."""
+    known = {*pages.MODULES, PACKAGE}
+    for module, name in names:
+        value = getattr(importlib.import_module(module), name)
+        known |= {f"{module}.{name}"} | {f"{module}.{name}.{member}" for member in dir(value)}
+    texts = {subject.where: inspect.getdoc(subject.value) or "" for subject in subjects(names)}
+    for path in [pages.ROOT / "README.md", *(pages.ROOT / "docs").rglob("*.md")]:
+        if pages.GENERATED not in path.parts:
+            texts[str(path.relative_to(pages.ROOT))] = re.sub(r"```.*?```", "", path.read_text(), flags=re.DOTALL)
+    for where, text in texts.items():
+        for name in re.findall(rf"`({PACKAGE}\.[\w.]*\w)(?:\(.*?\))?`", text):
+            if name not in known:
+                yield Fault("page", where, f"names {name}, which has no page")
+
+
 def public() -> list[tuple[str, str]]:
     """Return module and name of every public name."""
     return [(module, name) for module in pages.MODULES for name in pages.public_names(module)]
@@ -361,7 +378,11 @@ def public() -> list[tuple[str, str]]:
 def faults() -> list[Fault]:
     """Return all faults of the reference."""
     names = public()
-    return [*page_faults(names), *(fault for subject in subjects(names) for fault in faults_of(subject))]
+    return [
+        *page_faults(names),
+        *named_faults(names),
+        *(fault for subject in subjects(names) for fault in faults_of(subject)),
+    ]
 
 
 def main() -> None:

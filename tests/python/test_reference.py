@@ -34,6 +34,13 @@ def test_a_missing_page_is_found(check, monkeypatch):
     assert places == {"withe.shapes", "withe.simulation.hands.HeldPose"}
 
 
+def test_a_docstring_that_names_what_has_no_page_is_found(check, monkeypatch):
+    pytest.importorskip("gymnasium")
+    monkeypatch.setitem(check.pages.FOR_USERS, "withe.io", ("load_poses",))
+    (fault,) = check.named_faults(check.public())
+    assert str(fault) == "page: withe.Record.to_vtk: names withe.io.write_vtk, which has no page"
+
+
 def complete(force: float, count: int) -> float:
     """Return the work of a force.
 
