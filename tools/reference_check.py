@@ -2,8 +2,8 @@
 
 `python tools/reference_check.py` prints the faults of each kind and fails if there are any. The kinds:
 
-- page: a public module without a page, a class that a public function returns and that has no page, or a name such as
-  `withe.view.plot` in a docstring or on a page of docs/ that the reference lacks
+- page: a public module without a page, or a class that a public function returns and that has no page. Also a name such
+  as `withe.view.plot`, in a docstring or on a page of docs/, that the reference lacks.
 - docstring: a public function, class, method or property without a docstring
 - parameter: an argument that is not under Parameters, or an entry there that is no argument. A method that overrides a
   method of a public class with the same arguments may leave its arguments and its result to that method.
