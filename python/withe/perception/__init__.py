@@ -23,6 +23,7 @@ __all__ = [
     "color_filter",
     "detect_tags",
     "draw",
+    "ground_filter",
     "network_mask",
     "trace",
     "trace_mask",

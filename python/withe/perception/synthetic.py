@@ -406,7 +406,7 @@ def render(
     rng: np.random.Generator,
     colours: Sequence[Sequence[float]] | None = None,
     *,
-    background: Sequence[float] = (30, 32, 36),
+    background: Sequence[float] | Array = (30, 32, 36),
     shading: float = 0.6,
     grain: float = 6.0,
     shadow: float = 0.45,
@@ -420,8 +420,8 @@ def render(
         Random generator of the direction of the light and the grain.
     colours : sequence of (red, green, blue) from 0 to 255, optional
         Colour of each cable; by default random bright ones.
-    background : (red, green, blue)
-        Colour of the background.
+    background : (red, green, blue), or array_like of shape (height, width, 3)
+        Colour of the background, or a picture of it, such as `withe.perception.backgrounds.wood` returns.
     shading : float
         Darkening of the flank that faces away from the lamp, from 0 to 1.
     grain : float

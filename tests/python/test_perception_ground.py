@@ -1,0 +1,61 @@
+"""Cables on bright ground under shadows: the default filter, and what it leaves out."""
+
+import numpy as np
+import pytest
+
+from withe.perception import border_filter, ground_filter, trace
+from withe.perception.backgrounds import cast_shadow, plain, wood
+from withe.perception.synthetic import make_case, render
+
+COLOURS = [(200, 40, 40), (40, 90, 200)]
+SHAPE = (480, 640)
+
+
+def picture(seed, ground, colours=COLOURS, case="crossing 60", darkness=None):
+    scene, rng = make_case(case, seed), np.random.default_rng(seed)
+    shaded = cast_shadow(ground(rng, SHAPE), scene.mask, rng, darkness)
+    return scene, render(scene, rng, colours, background=shaded, grain=3.0, shading=0.45)
+
+
+def overlap(found, mask):
+    return (found & mask).sum() / (found | mask).sum()
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("ground", [plain, wood])
+def test_shadows_and_grain_are_no_cables(ground, seed):
+    scene, image = picture(seed, ground)
+    found = ground_filter(image)
+    assert overlap(found, scene.mask) > (0.85 if ground is plain else 0.75)  # seams in shadow are dark
+    assert overlap(border_filter(image), scene.mask) < overlap(found, scene.mask)
+    assert len(trace(image)) == 2
+
+
+@pytest.mark.parametrize("seed", [4, 5])
+def test_white_and_black_cables_are_found_though_they_have_no_colour(seed):
+    scene, image = picture(seed, plain, [(250, 250, 250), (12, 12, 14)], darkness=0.4)
+    assert overlap(ground_filter(image), scene.mask) > 0.8
+
+
+def test_a_grey_cable_apart_from_others_is_no_shadow():
+    scene, image = picture(6, plain, [(70, 70, 70)], case="self", darkness=0.2)
+    assert overlap(ground_filter(image), scene.mask) > 0.75
+
+
+def test_a_dark_ground_is_left_to_the_border_filter():
+    scene = make_case("crossing 60", 7)
+    image = render(scene, np.random.default_rng(7))
+    np.testing.assert_array_equal(ground_filter(image), border_filter(image))
+
+
+@pytest.mark.parametrize("factor", [0.6, 1.3])
+def test_the_light_does_not_matter(factor):
+    _, image = picture(8, plain)
+    brighter = np.clip(factor * image.astype(float), 0, 255).round().astype(np.uint8)
+    assert overlap(ground_filter(brighter), ground_filter(image)) > 0.9
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 7), (7, 1), (5, 5), (64, 3)])
+@pytest.mark.parametrize("level", [0, 90, 255])
+def test_small_pictures_of_one_colour_have_no_cable(shape, level):
+    assert not ground_filter(np.full((*shape, 3), level, np.uint8)).any()
