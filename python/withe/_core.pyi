@@ -61,6 +61,7 @@ __all__: list[str] = [
     "dragged_sheet",
     "drawn_strains",
     "foreground_mask",
+    "ground_mask",
     "hsv_mask",
     "sheets_at_forces",
     "sheets_at_poses",
@@ -1495,6 +1496,13 @@ def foreground_mask(
 ) -> numpy.typing.NDArray[numpy.uint8]:
     """
     Pixels whose colour is far from that of the border.
+    """
+
+def ground_mask(
+    image: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8], contrast: typing.SupportsInt | typing.SupportsIndex
+) -> numpy.typing.NDArray[numpy.uint8]:
+    """
+    Pixels that differ from the ground beneath by more than a shadow can.
     """
 
 def hsv_mask(

@@ -18,7 +18,7 @@ def plain(rng: np.random.Generator, shape: tuple[int, int]) -> Array:
     light = 1 + rng.uniform(0, 0.25) * (np.cos(angle) * x + np.sin(angle) * y)
     light += rng.uniform(-0.15, 0.05) * (x**2 + y**2)
     light *= 1 + 0.01 * _noise(rng, shape, 1.5)
-    return color * light[..., None]
+    return np.asarray(color * light[..., None])
 
 
 def wood(rng: np.random.Generator, shape: tuple[int, int]) -> Array:
@@ -67,7 +67,7 @@ def cast_shadow(
     moved = shift(mask.astype(float), length * np.array([np.sin(angle), np.cos(angle)]), order=1)
     soft = gaussian_filter(moved, rng.uniform(1.5, 5))
     share = rng.uniform(0.3, 0.6) if darkness is None else darkness
-    return ground * (1 - share * soft)[..., None]
+    return np.asarray(ground * (1 - share * soft)[..., None])
 
 
 def _places(shape: tuple[int, int]) -> tuple[Array, Array]:
