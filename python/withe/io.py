@@ -32,6 +32,7 @@ __all__ = [
     "save_json",
     "save_poses",
     "with_gaps",
+    "write_collection",
     "write_vtk",
     "written_beside",
 ]
@@ -436,23 +437,49 @@ def write_vtk(record: Frames, folder: str | os.PathLike[str]) -> Path:
     OSError
         The folder cannot be written.
     """
+    folder = Path(folder)
+    return write_collection(record, folder / "record.pvd", folder)
+
+
+def write_collection(record: Frames, collection: Path, folder: Path) -> Path:
+    """Write a .pvd file, and the frames that it lists into a folder; see `write_vtk`.
+
+    Parameters
+    ----------
+    record : Record
+    collection : pathlib.Path
+        File to write, ending in .pvd.
+    folder : pathlib.Path
+        Folder of the collection, or one in it. Created if missing.
+
+    Returns
+    -------
+    pathlib.Path
+        The .pvd file.
+
+    Raises
+    ------
+    ValueError
+        A record without frames.
+    OSError
+        The folder cannot be written.
+    """
     from xml.sax.saxutils import quoteattr  # imports half of the network, so not with the module
 
     if len(record) == 0:
         raise ValueError("record has no frames to write")
-    folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    collection = folder / "record.pvd"
     collection.unlink(missing_ok=True)  # an older one would list frames of two records if writing were cut off
     times = record.times
     digits = max(4, len(str(len(record) - 1)))
     names = [f"frame_{frame:0{digits}d}.vtp" for frame in range(len(record))]
+    within = "" if folder == collection.parent else f"{folder.relative_to(collection.parent).as_posix()}/"
     polylines = _Polylines(record)
     for frame, name in enumerate(names):
         with written_beside(folder / name) as temporary:
             temporary.write_text(polylines.document(frame, float(times[frame])), encoding="utf-8")
     entries = "\n".join(
-        f'    <DataSet timestep="{time!r}" group="" part="0" file={quoteattr(name)}/>'
+        f'    <DataSet timestep="{time!r}" group="" part="0" file={quoteattr(within + name)}/>'
         for time, name in zip(times.tolist(), names, strict=True)
     )
     with written_beside(collection) as temporary:

@@ -18,6 +18,7 @@ from withe import io, view
 from withe.common import validation
 from withe.common.frames import ENERGIES, EnergyHistory
 from withe.common.outlines import Named, ObstacleOutline, RodOutline, SpringOutline, TendonOutline, index_of
+from withe.export import export
 
 __all__ = ["ROD_READOUTS", "EnergyHistory", "Record", "RunGradient"]
 
@@ -36,10 +37,7 @@ _UNITS = {
     "energy": "J",
     "radii": "m",
 }
-_OTHER_FORMATS = (
-    "use to_vtk for ParaView, or write a table such as numpy.savetxt(path, numpy.column_stack([record.times, "
-    "record.positions(rod)[:, -1]]), delimiter=',')"
-)
+_OTHER_FORMATS = "use export for other programs: .csv, .glb, .pvd, .usda"
 ROD_READOUTS = ("directors", "curvatures", "twists", "tensions", "spins")
 
 
@@ -484,7 +482,7 @@ class Record:
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the record to one .npz file, which NumPy can read.
 
-        Use `to_vtk` for ParaView. To write a table, choose its columns, for example
+        Use `export` for tables and for other programs. To choose the columns of a table, use NumPy, for example
         ``numpy.savetxt("tip.csv", numpy.column_stack([record.times, record.positions("arm")[:, -1]]), delimiter=",")``.
 
         Parameters
@@ -590,10 +588,67 @@ class Record:
         except (KeyError, IndexError, TypeError, ValueError) as error:
             raise ValueError(f"{path} is a damaged record: {error}") from error
 
+    def export(self, path: str | os.PathLike[str]) -> Path:
+        """Write the motion for another program, in the format of the suffix.
+
+        ===================  ========================================================================================
+        suffix               content
+        ===================  ========================================================================================
+        ``.glb``             animated binary glTF 2.0 for Blender, three.js, PowerPoint and Windows
+        ``.usda``, ``.usdc`` USD stage, as text or binary, for Omniverse, Isaac Sim, Blender and Houdini
+        ``.pvd``             VTK collection for ParaView; the frames are in a folder of the same name
+        ``.csv``             table with one row per frame and node
+        ===================  ========================================================================================
+
+        Parameters
+        ----------
+        path : path
+            File to write.
+
+        Returns
+        -------
+        pathlib.Path
+            The written file.
+
+        Raises
+        ------
+        ValueError
+            Another suffix, or a record without frames.
+        ImportError
+            A USD file, and usd-core is not installed: install the extra "export".
+        OSError
+            The file cannot be written.
+
+        Notes
+        -----
+        * glTF: each rod is a skinned mesh with one joint per node, which moves and turns over time. Round rods are
+          tubes with the radii of their edges, and rectangular ones are boxes. Obstacles are meshes. Colours are those
+          of `picture`. Lengths are in metres. The root node turns the z axis up, because glTF has y up. The film begins
+          at time 0.
+        * USD: each rod is a cubic curve (BasisCurves) through its nodes, with widths, and velocities for motion blur. A
+          rectangular rod is a ribbon. Lengths are in metres (metersPerUnit 1), and z is up. The time code of a frame is
+          its time multiplied by timeCodesPerSecond.
+        * VTK: see `withe.io.write_vtk`.
+        * Table: columns have their units in the header. A tension is the mean of both edges of a node. Cells of
+          curvature and twist are empty at the ends of open rods.
+
+        Files for glTF and USD have no springs and tendons, and no obstacles that are far away or much larger than the
+        rods. If the time does not advance, as in a sequence of equilibria, frames are 1/30 s apart there.
+
+        References
+        ----------
+        Khronos Group 2021, glTF 2.0 Specification; Pixar, UsdGeomBasisCurves.
+
+        Examples
+        --------
+        >>> record.export("motion.glb")  # doctest: +SKIP
+        """
+        return export(self, path)
+
     def to_vtk(self, folder: str | os.PathLike[str]) -> Path:
         """Write the frames for ParaView; open the .pvd file whose path is returned.
 
-        See `withe.io.write_vtk` for what the files hold.
+        ``export("run.pvd")`` writes the same files with another name. See `withe.io.write_vtk` for their content.
 
         Parameters
         ----------
@@ -614,6 +669,7 @@ class Record:
 
         See Also
         --------
+        export : Write files for other programs.
         save : Write one file that `load` reads.
         """
         return io.write_vtk(self, folder)

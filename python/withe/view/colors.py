@@ -10,12 +10,24 @@ import numpy.typing as npt
 
 from withe.common.frames import Frames, edges_to_nodes, stencils_to_nodes
 
-__all__ = ["BARS", "ColorBy", "color_limits", "nice_limits", "nodal_values", "rod_color"]
+__all__ = [
+    "BARS",
+    "PLANE_COLOR",
+    "SOLID_COLOR",
+    "ColorBy",
+    "color_limits",
+    "linear",
+    "nice_limits",
+    "nodal_values",
+    "rgb",
+    "rod_color",
+]
 
 FloatArray = npt.NDArray[np.float64]
 ColorBy = Literal["rod", "tension", "curvature", "twist", "speed"]
 
 _PALETTE = ("#2a9d8f", "#e76f51", "#457b9d", "#e9b44c", "#8d6a9f", "#6a994e", "#c8553d", "#4f6d7a")
+PLANE_COLOR, SOLID_COLOR = "#e3e8ec", "#b4bdc5"
 BARS = {
     "tension": ("tension [N]", "viridis"),
     "curvature": ("curvature [1/m]", "viridis"),
@@ -26,8 +38,17 @@ BARS = {
 
 def rod_color(rod: int) -> FloatArray:
     """Red, green, blue from 0 to 1 of a rod by its number."""
-    code = _PALETTE[rod % len(_PALETTE)]
+    return rgb(_PALETTE[rod % len(_PALETTE)])
+
+
+def rgb(code: str) -> FloatArray:
+    """Red, green, blue from 0 to 1 of a code such as "#2a9d8f"."""
     return np.array([int(code[place : place + 2], 16) / 255.0 for place in (1, 3, 5)])
+
+
+def linear(color: FloatArray) -> FloatArray:
+    """Return the linear intensities of a colour of pictures, which is sRGB [IEC 61966-2-1]."""
+    return np.asarray(np.where(color <= 0.04045, color / 12.92, ((color + 0.055) / 1.055) ** 2.4), np.float64)
 
 
 def nodal_values(record: Frames, rod: Any, color_by: ColorBy) -> FloatArray:

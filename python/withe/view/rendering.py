@@ -14,7 +14,16 @@ import numpy.typing as npt
 from withe.common.extras import require
 from withe.common.frames import Frames
 from withe.view import scenery
-from withe.view.colors import BARS, ColorBy, color_limits, nice_limits, nodal_values, rod_color
+from withe.view.colors import (
+    BARS,
+    PLANE_COLOR,
+    SOLID_COLOR,
+    ColorBy,
+    color_limits,
+    nice_limits,
+    nodal_values,
+    rod_color,
+)
 from withe.view.ghosts import stands_out
 from withe.view.graphics import render_window
 from withe.view.pinhole import Pinhole, check_pinhole, look_through, towards
@@ -34,7 +43,7 @@ _DIRECTIONS = {
 _VIEW_ANGLE = 24.0  # [degrees]
 _BAR_SHARE = 0.16
 _INK = "#33383d"
-_PLANE, _PLANE_EDGE, _SOLID = "#e3e8ec", "#c3cbd2", "#b4bdc5"
+_PLANE_EDGE = "#c3cbd2"
 _MAX_SAMPLES = 6000  # rings of all rods together
 _SHADOW_CELLS = 320
 _BLURS = (2.5, 5.0, 9.0, 14.0)  # [cells], by height above the ground
@@ -312,7 +321,7 @@ class Stage:
             if obstacle.kind == "plane":
                 corners = scenery.patch(obstacle, places[0], nodes)
                 mesh = pyvista.PolyData(corners, [4, 0, 1, 2, 3])
-                options: dict[str, Any] = {"color": _PLANE, "ambient": 0.75, "diffuse": 0.3, "specular": 0.0}
+                options: dict[str, Any] = {"color": PLANE_COLOR, "ambient": 0.75, "diffuse": 0.3, "specular": 0.0}
                 normal = obstacle.axis / np.linalg.norm(obstacle.axis)
                 places = places[:1] + np.outer((places - places[0]) @ normal, normal)  # along itself it looks the same
                 self._obstacles.append((self.plotter.add_mesh(mesh, reset_camera=False, **options), places, None))
@@ -333,7 +342,13 @@ class Stage:
                     resolution=64,
                 )
             actor = self.plotter.add_mesh(
-                mesh, color=_SOLID, ambient=0.35, diffuse=0.75, specular=0.1, smooth_shading=True, reset_camera=False
+                mesh,
+                color=SOLID_COLOR,
+                ambient=0.35,
+                diffuse=0.75,
+                specular=0.1,
+                smooth_shading=True,
+                reset_camera=False,
             )
             area = np.pi * obstacle.radius**2 + 2.0 * obstacle.radius * length
             points = scenery.cloud(obstacle, places[0])

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from withe.common.outlines import RodOutline
 
-__all__ = ["Surface"]
+__all__ = ["Surface", "end_caps", "rectangle_section", "ring_faces", "round_section", "unit"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -49,10 +49,10 @@ class Surface:
         self._edge_weights = _hats(middles, samples, knots[-1] if rod.closed else None)
         half = 0.5 * rod.widths if rod.widths is not None else np.stack([rod.radii, rod.radii], axis=1)
         self._half_widths = self._edge_weights @ half
-        self._section, self._section_normals = _round(sides) if rod.widths is None else _rectangle()
-        self._caps = _caps(rod.widths is None) if not rod.closed else np.zeros((0, 3))
+        self._section, self._section_normals = round_section(sides) if rod.widths is None else rectangle_section()
+        self._caps = end_caps(rod.widths is None) if not rod.closed else np.zeros((0, 3))
         self._ring_samples = self._rings(len(samples))
-        self.faces: npt.NDArray[np.int64] = _faces(len(self._ring_samples), len(self._section), rod.closed)
+        self.faces: npt.NDArray[np.int64] = ring_faces(len(self._ring_samples), len(self._section), rod.closed)
 
     def _rings(self, samples: int) -> npt.NDArray[np.int64]:
         """Sample of every ring: the first one repeated for its cap, then all, then the last one."""
@@ -73,9 +73,9 @@ class Surface:
         points, normals : ndarrays of shape (points, 3)
         """
         centres = self._position_weights @ nodes
-        tangents = _unit(self._tangent_weights @ nodes)
+        tangents = unit(self._tangent_weights @ nodes)
         first = self._edge_weights @ directors
-        first = _unit(first - np.sum(first * tangents, axis=1, keepdims=True) * tangents)
+        first = unit(first - np.sum(first * tangents, axis=1, keepdims=True) * tangents)
         second = np.cross(tangents, first)
 
         count = len(self._caps)
@@ -112,7 +112,8 @@ class Surface:
         return np.repeat(values[self._ring_samples], len(self._section))
 
 
-def _unit(vectors: FloatArray) -> FloatArray:
+def unit(vectors: FloatArray) -> FloatArray:
+    """Return vectors of unit length, along the last axis."""
     lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return np.asarray(vectors / np.maximum(lengths, 1e-300), float)
 
@@ -140,20 +141,21 @@ def _hats(knots: FloatArray, samples: FloatArray, period: float | None) -> Float
     return np.stack([np.interp(samples, knots, row, period=period) for row in np.eye(len(knots))], axis=1)
 
 
-def _round(sides: int) -> tuple[FloatArray, FloatArray]:
+def round_section(sides: int) -> tuple[FloatArray, FloatArray]:
+    """Corners and normals of a circle of radius 1, counter-clockwise, shape (sides, 2)."""
     angles = 2.0 * np.pi * np.arange(sides) / sides
     corners = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     return corners, corners
 
 
-def _rectangle() -> tuple[FloatArray, FloatArray]:
-    """Every corner twice, once for each of its faces, so that edges stay sharp."""
+def rectangle_section() -> tuple[FloatArray, FloatArray]:
+    """Corners and normals of a square of side 2. Every corner has a row for each of its faces, so edges stay sharp."""
     corners = np.array([[1, -1], [1, 1], [1, 1], [-1, 1], [-1, 1], [-1, -1], [-1, -1], [1, -1]], float)
     normals = np.repeat(np.array([[1, 0], [0, 1], [-1, 0], [0, -1]], float), 2, axis=0)
     return corners, normals
 
 
-def _caps(round_section: bool) -> FloatArray:
+def end_caps(round_section: bool) -> FloatArray:
     """Rows of scale, offset along the rod in half widths, and lean of the normal; from the pole inwards."""
     if not round_section:
         return np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 1.0]])
@@ -161,7 +163,8 @@ def _caps(round_section: bool) -> FloatArray:
     return np.stack([np.cos(angles), np.sin(angles), np.sin(angles)], axis=1)
 
 
-def _faces(rings: int, sides: int, closed: bool) -> npt.NDArray[np.int64]:
+def ring_faces(rings: int, sides: int, closed: bool) -> npt.NDArray[np.int64]:
+    """Quadrilaterals between rings of points, counter-clockwise from outside, shape (faces, 4)."""
     ring = np.arange(rings if closed else rings - 1)[:, None]
     side = np.arange(sides)[None]
     following, beside = (ring + 1) % rings, (side + 1) % sides
