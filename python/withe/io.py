@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from withe.common import validation
 from withe.common.frames import Frames, edges_to_nodes, stencils_to_nodes
+from withe.common.log import logger, logs_debug
 
 __all__ = [
     "PlanFile",
@@ -69,6 +70,8 @@ def written_beside(path: Path) -> Iterator[Path]:
     try:
         yield temporary
         os.replace(temporary, path)
+        if logs_debug():
+            logger.debug("wrote %s: %d bytes", path, path.stat().st_size)
     except OSError as error:
         if error.errno is None:
             raise

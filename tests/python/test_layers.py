@@ -30,6 +30,8 @@ LATE = {
     "torch",
     "cv2",
     "dask",
+    "pxr",
+    "pygltflib",
     "elastica",
     "gymnasium",
     "stable_baselines3",

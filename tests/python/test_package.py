@@ -15,7 +15,7 @@ import pytest
 import withe
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-LATE = ("scipy", "matplotlib", "pyvista", "imageio_ffmpeg", "IPython", "torch", "cv2", "dask")
+LATE = ("scipy", "matplotlib", "pyvista", "imageio_ffmpeg", "IPython", "torch", "cv2", "dask", "pxr")
 
 
 def load_tool(name):

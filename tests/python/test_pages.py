@@ -1,5 +1,6 @@
 """The code of README.md and of the pages in docs runs as it stands there, without a warning."""
 
+import logging
 import re
 from pathlib import Path
 from types import SimpleNamespace
@@ -92,6 +93,12 @@ def gradients_have_their_shapes(names):
     assert names["by_gravity"][2] > 0.0
     assert names["by_modulus"] > 0.0
     assert names["by_start"].shape == (21, 3)
+
+
+@after("docs/how_to/convergence.md")
+def the_solver_is_silent_again(names):
+    assert names["found"].stable
+    logging.getLogger("withe").setLevel(logging.NOTSET)
 
 
 @before("docs/how_to/trace.md")

@@ -16,6 +16,7 @@ from withe.common import validation
 from withe.common.attributes import known_attributes, of_a_simulation
 from withe.common.deprecation import moved_into, renamed
 from withe.common.keywords import keyword_hints
+from withe.common.log import logs_info
 from withe.parts.actuation import add_actuation
 from withe.parts.applied_loads import AppliedLoads, Bearer
 from withe.parts.directory import Directory
@@ -32,6 +33,7 @@ from withe.scene.joints import JoinedNodes
 from withe.scene.loads import Loads
 from withe.scene.options import checked_options, with_build_options
 from withe.scene.supports import Supports
+from withe.simulation.logs import log_build
 from withe.simulation.parameters import Settable
 from withe.simulation.schedule import check_actuations
 from withe.simulation.simulation import Simulation
@@ -571,6 +573,8 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
             directory.parts.update({rod.name: rod.without_arcs() for rod in directory.all(RodPart)})
         simulation = Simulation._build(directory, self._gravity.copy(), options)
         check_actuations(simulation._session)
+        if logs_info():
+            log_build(simulation.plan)
         return simulation
 
     @renamed(n="count")

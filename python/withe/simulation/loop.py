@@ -13,6 +13,7 @@ from withe.common import validation
 from withe.recording.record import Record
 from withe.recording.recorder import Moving, Recorder
 from withe.simulation.gradients import RunDerivatives
+from withe.simulation.logs import run_logged
 from withe.simulation.outlines import outlines_of
 from withe.simulation.stepping import Stepping
 
@@ -76,7 +77,7 @@ class Run(Generic[S]):
 
     def go(self, report: Callable[[float], object], stopped: Callable[[], bool]) -> None:
         """Run to the end; `report` receives the completed time [s], and `stopped` may end the run."""
-        with self._stepping.in_run():
+        with self._stepping.in_run(), run_logged(self._stepping.session):
             self._go(report, stopped)
 
     def _go(self, report: Callable[[float], object], stopped: Callable[[], bool]) -> None:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from typing import Any
 
 from withe import _core
+from withe.common.log import logs_debug
 from withe.common.user_warnings import warn
 from withe.errors import (
     BranchChangedWarning,
@@ -26,6 +28,7 @@ from withe.simulation.gradients import equilibrium_gradient, equilibrium_jacobia
 from withe.simulation.hands import forget_left_rings
 from withe.simulation.linearisation import Linearisation, Stability
 from withe.simulation.loads import load_index
+from withe.simulation.logs import StepLog, log_equilibrium, log_failure
 from withe.simulation.paths import EquilibriumPath, PathOptions, path_of
 from withe.simulation.readouts import Equilibrium
 from withe.simulation.schedule import apply_due, next_time, steps_until_next
@@ -49,12 +52,15 @@ class Stepping:
         Of the last run.
     frame_time : (float, float) or None
         Time of the engine at the last frame of a run, and the time of that frame: steps add up to it, up to rounding.
+    watchers : list of callable
+        Called after every time step, for example to draw the scene. Copies have none.
     """
 
     def __init__(self, session: Session) -> None:
         self.session = session
         self.recorder: Recorder[Any] | None = None
         self.frame_time: tuple[float, float] | None = None
+        self.watchers: list[Callable[[], None]] = []
         self._running = False
 
     def copy(self) -> Stepping:
@@ -72,14 +78,14 @@ class Stepping:
         return now
 
     def step(self, count: int) -> None:
-        """Advance by time steps."""
+        """Advance by time steps: one by one if they are logged or watched, with the same result."""
+        single = bool(self.watchers) or logs_debug()
         while count > 0:
-            steps = count
+            steps = 1 if single else count
             if self.session.scene.actuations:
                 apply_due(self.session)
-                steps = steps_until_next(self.session, count)
-            with self._convergence():
-                self.session.world.step(steps, step_callback(self.session), force_function(self.session))
+                steps = steps_until_next(self.session, steps)
+            self._advance(partial(self.session.world.step, steps))
             count -= steps
 
     def advance_to(self, time: float) -> None:
@@ -90,8 +96,20 @@ class Stepping:
             if self.session.scene.actuations:
                 apply_due(self.session)
                 then = min(time, next_time(self.session))
-            with self._convergence():
-                self.session.world.advance_to(then, step_callback(self.session), force_function(self.session))
+            self._advance(partial(self.session.world.advance_to, then))
+
+    def _advance(self, advance: Callable[[Any, Any], None]) -> None:
+        """Call a function of the engine that advances, with the callbacks of the session."""
+        callback = step_callback(self.session)
+        log = StepLog(self.session, callback) if logs_debug() else None
+        with self._convergence():
+            try:
+                advance(callback if log is None else log.before_step, force_function(self.session))
+            finally:
+                if log is not None:
+                    log.write()
+        for watcher in tuple(self.watchers):
+            watcher()
 
     def equilibrium(self, stable: bool) -> Equilibrium:
         """Go to the equilibrium that the present state leads to; see `Simulation.equilibrium`."""
@@ -110,7 +128,7 @@ class Stepping:
         if not found.decided:
             stability = self.linearise().stability
         gradient, jacobian = self._derivatives()
-        return Equilibrium(
+        result = Equilibrium(
             stable=stability == "stable",
             stability=stability,
             branch_changed=found.branch_changed,
@@ -119,6 +137,8 @@ class Stepping:
             _gradient=gradient,
             _jacobian=jacobian,
         )
+        log_equilibrium(self.session, result)
+        return result
 
     def _derivatives(
         self,
@@ -196,7 +216,9 @@ class Stepping:
         try:
             yield
         except _core.ConvergenceFailure as failure:
-            raise convergence_error(self.session, failure.args) from None
+            error = convergence_error(self.session, failure.args)
+            log_failure(error)
+            raise error from None
         finally:
             forget_left_rings(self.session, world.take_left_rings())
             left, self.session.left_rings = self.session.left_rings, []
