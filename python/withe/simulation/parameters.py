@@ -12,7 +12,7 @@ from withe.simulation.access import Target, get_word, nothing_to_set, set_words,
 from withe.simulation.rods import in_order
 from withe.simulation.session import Session
 
-__all__ = ["Settable", "get_value", "set_values"]
+__all__ = ["Settable", "find_target", "get_value", "set_values"]
 
 Settable = Handle | tuple[Rod | Obstacle | str, Rod | Obstacle | str]
 
@@ -21,7 +21,7 @@ def set_values(session: Session, target: Settable | str | None, values: dict[str
     """Change parameters; see `Simulation.set`."""
     if not values:
         raise ValueError("set needs at least one parameter, such as youngs_modulus=1e6")
-    part = _target(session, target)
+    part = find_target(session, target)
     over = validation.non_negative(over, "over")
     if isinstance(part, RodPart):
         values = in_order(part, values)
@@ -36,7 +36,7 @@ def get_value(session: Session, target: Settable | str, word: str | None) -> Any
         if not isinstance(target, str) or word_of(None, target) is None:
             raise ValueError("get needs a parameter, such as get(arm, 'youngs_modulus')")
         return get_word(session, None, target)
-    part = _target(session, target)
+    part = find_target(session, target)
     known = word_of(part, word)
     if part is None or (known is not None and known.is_read):
         return get_word(session, part, word)
@@ -48,7 +48,8 @@ def get_value(session: Session, target: Settable | str, word: str | None) -> Any
     raise ValueError(f"{part.name!r} has no {word!r}; it has {', '.join(words)}")
 
 
-def _target(session: Session, target: Settable | str | None) -> Target:
+def find_target(session: Session, target: Settable | str | None) -> Target:
+    """Return the part or the pair of bodies that a user names; None for the scene."""
     if target is None:
         return None
     if not isinstance(target, tuple):

@@ -32,11 +32,14 @@ from withe.simulation.placement import Placement
 from withe.simulation.plausibility import check_scene
 from withe.simulation.readouts import Equilibrium
 from withe.simulation.session import Session
+from withe.simulation.sliders import EquilibriumSliders
 from withe.simulation.snapshots import Snapshot, restore
 from withe.simulation.state_space import StateSpace
 from withe.simulation.states import restore_frame
 from withe.simulation.stepping import Stepping
 from withe.simulation.surfaces import find_friction_fields
+from withe.view.live import LiveView
+from withe.view.sliders import SliderView
 
 __all__ = ["Simulation"]
 
@@ -542,24 +545,68 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
         """
         return self._frame().plot(**options)
 
-    def view(self, **options: Any) -> Any:
-        """Show the present shape interactively in a notebook or a window.
+    def view(self, *, sliders: Sequence[Any] | None = None, live: bool = False, **options: Any) -> Any:
+        """Show the scene in a notebook or a window: the present shape, with sliders, or during a run.
 
         Parameters
         ----------
+        sliders : sequence of tuple, optional
+            Parameters of `set` to be changed by hand. Each move of a slider sets the parameter, finds the equilibrium
+            and draws it. A slider is
+
+            * ``(part, word, low, high)`` for a number, such as ``(cord, "tension", 0, 5)``
+            * ``(part, word, (low, high))`` for a vector, with one slider per component, such as
+              ``(arm, "natural_curvature", (-10, 10))``: towards d1 and towards d2
+
+            Both forms mean the same. The ends may be given per component: ``(arm, "natural_curvature", (0, -10),
+            (0, 10))`` has a slider towards d2 only. A part is a handle, a name, a pair of bodies, or None for the
+            scene. Parameters of rods have the same value along the whole rod.
+        live : bool
+            True to return a context in which `step` and `run` draw the scene, at most 30 times per second::
+
+                with simulation.view(live=True):
+                    simulation.run(2.0)
+
         **options
-            Options of `withe.view.view`.
+            size, color_by, camera, ground, backend: see `withe.view.view`.
 
         Returns
         -------
-        object
-            The widget in a notebook, else the window, as `withe.view.view` returns it.
+        SliderView, LiveView or widget
+            With sliders, a view with ``values``, ``move``, ``image`` and ``picture``. The simulation has the state that
+            is shown. A window blocks until you close it. With ``live``, the context; at its end a window stays until
+            you close it. Otherwise the widget in a notebook, and None elsewhere.
 
-        See Also
+        Raises
+        ------
+        ValueError
+            A slider of another form, of a parameter that cannot be set, or whose low end is not below its high end.
+            Both `sliders` and `live`, or an option out of range.
+        ConvergenceError
+            With sliders: the simulation has no equilibrium at the start. While a slider moves, no error is raised: the
+            last equilibrium stays, with a text in the picture.
+        ImportError
+            PyVista is not installed.
+        RuntimeError
+            Rendering is not possible here, or a callback of `run` calls this method with sliders.
+
+        Notes
+        -----
+        Without a display, a warning is given, and views with sliders and live views are drawn into memory only:
+        ``image()`` returns the picture. In a notebook, sliders need trame, which ``pip install ".[view]"`` installs.
+
+        Examples
         --------
-        withe.view.view : All options, and what they raise.
+        >>> simulation.view(sliders=[(cord, "tension", 0, 5), (arm, "natural_curvature", (-10, 10))])  # doctest: +SKIP
         """
-        return self._frame().view(**options)
+        if validation.truth(live, "live"):
+            if sliders is not None:
+                raise ValueError("`sliders` and `live` must not be given together: sliders show equilibria")
+            return LiveView(self._frame, self._stepping.watchers, **options)
+        if sliders is None:
+            return self._frame().view(**options)
+        self._stepping.refuse_in_run("view(sliders=...)")
+        return SliderView(EquilibriumSliders(self, sliders), **options).show()
 
     def picture(self, path: str | os.PathLike[str], **options: Any) -> FilePath:
         """Render the present shape into a .png file.

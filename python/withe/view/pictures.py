@@ -20,6 +20,7 @@ from withe.view.colors import ColorBy
 from withe.view.films import Film, film_places
 from withe.view.pinhole import Pinhole
 from withe.view.rendering import Stage
+from withe.view.screens import in_notebook
 
 __all__ = ["animate", "picture", "view"]
 
@@ -212,7 +213,7 @@ def view(
     ValueError, ImportError, RuntimeError
         As in `picture`.
     """
-    notebook = _in_notebook()
+    notebook = in_notebook()
     stage = Stage(
         record, size=size, color_by=color_by, camera=camera, ground=ground, off_screen=notebook, supersampling=1
     )
@@ -248,12 +249,3 @@ def _even(size: Sequence[int]) -> Sequence[int]:
         return [int(side) // 2 * 2 for side in size]
     except (TypeError, ValueError):
         return size
-
-
-def _in_notebook() -> bool:
-    """Return True in a Jupyter kernel."""
-    try:
-        shell = require("IPython", "view").get_ipython()
-    except ImportError:
-        return False
-    return shell is not None and hasattr(shell, "kernel")

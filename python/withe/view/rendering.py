@@ -27,9 +27,10 @@ from withe.view.colors import (
 from withe.view.ghosts import stands_out
 from withe.view.graphics import render_window
 from withe.view.pinhole import Pinhole, check_pinhole, look_through, towards
+from withe.view.shadows import Shadow
 from withe.view.springs import SpringLines
 from withe.view.surfaces import Surface
-from withe.view.tendons import TendonLines
+from withe.view.tendons import TendonLines, tendon_points
 
 __all__ = ["Stage"]
 
@@ -45,8 +46,8 @@ _BAR_SHARE = 0.16
 _INK = "#33383d"
 _PLANE_EDGE = "#c3cbd2"
 _MAX_SAMPLES = 6000  # rings of all rods together
-_SHADOW_CELLS = 320
-_BLURS = (2.5, 5.0, 9.0, 14.0)  # [cells], by height above the ground
+_SHADOW_CELLS, _LIVE_SHADOW_CELLS = 320, 96
+_STEP_BACK = 0.5  # further beyond the region in view, over the way of a node that left it
 
 
 class Stage:
@@ -74,6 +75,11 @@ class Stage:
         Rendered pixels per shown pixel, along each side.
     multisampling : bool
         True to smooth edges within rendered pixels too, which takes twice as long.
+    live : bool
+        True to draw faster, for scenes that change many times a second: a coarser shadow, and no smooth edges beyond
+        those of `multisampling`.
+    left : float
+        Share of the picture on the left that is kept free, for sliders.
 
     Raises
     ------
@@ -97,12 +103,15 @@ class Stage:
         off_screen: bool = True,
         supersampling: int = 2,
         multisampling: bool = True,
+        live: bool = False,
+        left: float = 0.0,
     ) -> None:
         if len(record) == 0:
             raise ValueError("record has no frames to show")
         if color_by != "rod" and color_by not in BARS:
             raise ValueError(f"color_by must be one of 'rod', {str(list(BARS))[1:-1]}, got {color_by!r}")
         self.size: tuple[int, int] = _checked_size(size)
+        self._margins = left, 0.0 if color_by == "rod" else _BAR_SHARE
         self._read(record, color_by)
         in_view = self._positions if frames is None else self._positions[list(frames)]
         nodes = in_view.reshape(-1, 3)
@@ -128,19 +137,20 @@ class Stage:
         kinds = [obstacle.kind for obstacle, seen in zip(record.obstacles, around, strict=True) if len(seen)]
         self._casts = ground is not None or "plane" not in kinds
         nearby = np.concatenate([nodes[:0], *around])
-        self._frame_camera(direction, nodes, nearby, ground, 0.0 if color_by == "rod" else _BAR_SHARE)
+        self._around, self._given_ground = nearby, ground
+        self._frame_camera(direction, nodes)
         if isinstance(camera, Pinhole):
             look_through(self.plotter.camera, camera, self.size, nodes)
         self._add_lights(pyvista, direction)
         self._add_obstacles(pyvista, np.concatenate([nodes, nearby]))
-        self._add_shadow(pyvista)
+        self._shadow = Shadow(pyvista, self.plotter, _LIVE_SHADOW_CELLS if live else _SHADOW_CELLS)
         self._add_rods(pyvista, color_by)
         self._springs = SpringLines(pyvista, self.plotter, record, direction)
         self._tendons = TendonLines(pyvista, self.plotter, record)
         self._ghosts: list[tuple[FloatArray, FloatArray]] = []
         for place in range(len(ghosts)):
             self._add_ghost(pyvista, [*ghosts, frame], place)
-        if supersampling == 1:
+        if supersampling == 1 and not live:
             self.plotter.enable_anti_aliasing("ssaa")
         self._label: Any = None
         self.show(frame)
@@ -157,6 +167,7 @@ class Stage:
             surface.footprint(self._positions[0, rod.rows])
             for surface, rod in zip(self._surfaces, record.rods, strict=True)
         ]
+        self._color_by = color_by
         self._values = None if color_by == "rod" else [nodal_values(record, rod, color_by) for rod in record.rods]
         self._footprints_of_obstacles: list[FloatArray] = []
         self._places = [record.obstacle_position(obstacle) for obstacle in record.obstacles]
@@ -165,30 +176,70 @@ class Stage:
         """Move the rods to a frame; fractional frames are interpolated."""
         before = min(int(frame), len(self.times) - 1)
         after = min(before + 1, len(self.times) - 1)
+
+        def mixed(motions: list[FloatArray]) -> list[FloatArray]:
+            return [(1.0 - share) * motion[before] + share * motion[after] for motion in motions]
+
         share = frame - before
-        meshed = []
+        values = None if self._values is None else mixed(self._values)
+        (positions,) = mixed([self._positions])
+        self._move(positions, mixed(self._directors), mixed(self._places), mixed(self._tendons.motions), values)
+
+    def show_present(self, record: Frames) -> None:
+        """Move the rods to the first frame of another record of the same scene."""
+        self._move(
+            record.positions()[0],
+            [record.directors(rod)[0, :, 0] for rod in record.rods],
+            [record.obstacle_position(obstacle)[0] for obstacle in record.obstacles],
+            [tendon_points(record, tendon)[0] for tendon in record.tendons],
+            None if self._color_by == "rod" else [nodal_values(record, rod, self._color_by)[0] for rod in record.rods],
+        )
+
+    def _move(
+        self,
+        positions: FloatArray,
+        directors: list[FloatArray],
+        places: list[FloatArray],
+        tendons: list[FloatArray],
+        values: list[FloatArray] | None,
+    ) -> None:
+        """Move all parts in place: nodes of the scene, and for each part its directors, place, guides and colours."""
         self._obstacle_points = []
-        for actor, places, surface in self._obstacles:
-            way = self._mixed(places, before, after, share) - places[0]
+        for actor, index, normal, surface in self._obstacles:
+            way = places[index] - self._places[index][0]
+            if normal is not None:
+                way = normal * (normal @ way)  # along itself a plane looks the same
             actor.position = way
             self._obstacle_points += [surface + way] if surface is not None else []
-        positions = self._mixed(self._positions, before, after, share)
         self._springs.show(positions)
-        self._tendons.show(before, after, share)
+        self._tendons.show(tendons)
+        meshed = []
         for index, rod in enumerate(self._record.rods):
-            nodes = positions[rod.rows]
-            points, normals = self._surfaces[index].mesh(
-                nodes, self._mixed(self._directors[index], before, after, share)
-            )
+            points, normals = self._surfaces[index].mesh(positions[rod.rows], directors[index])
             mesh = self._meshes[index]
             mesh.points = points
             mesh.point_data["Normals"] = normals
-            if self._values is not None:
-                nodal = self._mixed(self._values[index], before, after, share)
-                mesh.point_data["value"] = self._surfaces[index].on_surface(nodal)
+            if values is not None:
+                mesh.point_data["value"] = self._surfaces[index].on_surface(values[index])
             meshed.append(points)
         if self._casts:
-            self._cast_shadow(meshed)
+            ghosts, areas = [points for points, _ in self._ghosts], [area for _, area in self._ghosts]
+            self._shadow.cast(
+                np.concatenate([*meshed, *self._obstacle_points, *ghosts]),
+                np.concatenate([*self._footprints, *self._footprints_of_obstacles, *areas]),
+                (*self._shadow_bounds, self._ground),
+                self._extent,
+            )
+
+    def keep_in_view(self, positions: FloatArray) -> None:
+        """Move the camera back if nodes, shape (nodes, 3) [m], leave the region in view; its direction stays."""
+        low, high = self._seen.min(axis=0), self._seen.max(axis=0)
+        if np.all(positions >= low - 1e-9 * self._extent) and np.all(positions <= high + 1e-9 * self._extent):
+            return
+        beyond = positions + _STEP_BACK * (positions - np.clip(positions, low, high))
+        camera = self.plotter.camera
+        direction = np.array(camera.position) - np.array(camera.focal_point)
+        self._frame_camera(direction / np.linalg.norm(direction), np.concatenate([self._seen, positions, beyond]))
 
     def label(self, text: str) -> None:
         """Write a line of text in the lower left corner, in place of the previous one."""
@@ -212,11 +263,6 @@ class Stage:
         """Close the window."""
         self.plotter.close()
 
-    @staticmethod
-    def _mixed(values: FloatArray, before: int, after: int, share: float) -> FloatArray:
-        mixed: FloatArray = (1.0 - share) * values[before] + share * values[after]
-        return mixed
-
     def _floor(self, points: FloatArray) -> float | None:
         """Return the height of the horizontal plane near rods that receives their shadow; None without such a plane."""
         heights = [
@@ -231,13 +277,15 @@ class Stage:
             return None
         return max(heights) + 1e-3 * float(np.linalg.norm(np.ptp(points, axis=0)))  # not in the plane itself
 
-    def _frame_camera(
-        self, direction: FloatArray, points: FloatArray, around: FloatArray, ground: float | None, aside: float
-    ) -> None:
+    def _frame_camera(self, direction: FloatArray, points: FloatArray) -> None:
         """Look from a direction at the middle of all points, from the least distance at which all are in view.
 
-        The surroundings of the rods are in view too. A share of the picture, `aside`, is for the scale on the right.
+        The surroundings of the rods are in view too. Shares of the picture are for sliders on the left and for the
+        scale on the right.
         """
+        left, right_share = self._margins
+        around, ground = self._around, self._given_ground
+        self._seen = points
         reach = max(float(rod.radii.max()) for rod in self._record.rods)
         everything = np.concatenate([points, around])
         low, high = everything.min(axis=0), everything.max(axis=0)
@@ -260,12 +308,12 @@ class Stage:
         local = seen - focus
         needed = np.maximum(
             np.abs(local @ up) / (0.82 * slope),
-            np.abs(local @ right) / ((0.86 - aside) * slope * self.size[0] / self.size[1]),
+            np.abs(local @ right) / ((0.86 - left - right_share) * slope * self.size[0] / self.size[1]),
         )
         distance = float((needed + local @ direction).max())
         view = self.plotter.camera
         view.view_angle = _VIEW_ANGLE
-        view.SetWindowCenter(aside, 0.0)
+        view.SetWindowCenter(right_share - left, 0.0)
         view.focal_point, view.position, view.up = focus, focus + distance * direction, up
         view.clipping_range = (0.05 * distance, 10.0 * (distance + extent))
 
@@ -315,19 +363,20 @@ class Stage:
             actor.prop.interpolation = "Phong"
 
     def _add_obstacles(self, pyvista: Any, nodes: FloatArray) -> None:
-        """Patches of planes, spheres and capsules, with where they are and, where they cast a shadow, their points."""
-        self._obstacles: list[tuple[Any, FloatArray, FloatArray | None]] = []
-        for obstacle, places in zip(self._record.obstacles, self._places, strict=True):
+        """Add planes, spheres and capsules: actor, index, normal of a plane, and points that cast a shadow."""
+        self._obstacles: list[tuple[Any, int, FloatArray | None, FloatArray | None]] = []
+        for index, (obstacle, places) in enumerate(zip(self._record.obstacles, self._places, strict=True)):
             if obstacle.kind == "plane":
                 corners = scenery.patch(obstacle, places[0], nodes)
                 mesh = pyvista.PolyData(corners, [4, 0, 1, 2, 3])
                 options: dict[str, Any] = {"color": PLANE_COLOR, "ambient": 0.75, "diffuse": 0.3, "specular": 0.0}
                 normal = obstacle.axis / np.linalg.norm(obstacle.axis)
-                places = places[:1] + np.outer((places - places[0]) @ normal, normal)  # along itself it looks the same
-                self._obstacles.append((self.plotter.add_mesh(mesh, reset_camera=False, **options), places, None))
+                self._obstacles.append(
+                    (self.plotter.add_mesh(mesh, reset_camera=False, **options), index, normal, None)
+                )
                 edge = pyvista.PolyData(corners, lines=[5, 0, 1, 2, 3, 0])
                 rim = self.plotter.add_mesh(edge, color=_PLANE_EDGE, reset_camera=False, lighting=False, line_width=2)
-                self._obstacles.append((rim, places, None))
+                self._obstacles.append((rim, index, normal, None))
                 continue
             start, end = scenery.ends(obstacle, places[0])
             length = float(np.linalg.norm(end - start))
@@ -352,7 +401,7 @@ class Stage:
             )
             area = np.pi * obstacle.radius**2 + 2.0 * obstacle.radius * length
             points = scenery.cloud(obstacle, places[0])
-            self._obstacles.append((actor, places, points))
+            self._obstacles.append((actor, index, None, points))
             self._footprints_of_obstacles.append(np.full(len(points), area / len(points)))
 
     def _add_ghost(self, pyvista: Any, frames: list[int], place: int) -> None:
@@ -376,42 +425,6 @@ class Stage:
             actor = self.plotter.add_mesh(mesh, color=pale, ambient=0.5, diffuse=0.6, reset_camera=False)
             actor.prop.interpolation = "Phong"
             self._ghosts.append((points, there * self._footprints[index]))
-
-    def _add_shadow(self, pyvista: Any) -> None:
-        """A plane under the rods, clear where no shadow falls."""
-        low, high = self._shadow_bounds
-        corners = np.column_stack([[low[0], high[0], high[0], low[0]], [low[1], low[1], high[1], high[1]]])
-        plane = pyvista.PolyData(np.column_stack([corners, np.full(4, self._ground)]), [4, 0, 1, 2, 3])
-        plane.active_texture_coordinates = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
-        blank = pyvista.Texture(np.zeros((_SHADOW_CELLS, _SHADOW_CELLS, 4), np.uint8))
-        self._shadow = self.plotter.add_mesh(plane, texture=blank, lighting=False, reset_camera=False)
-        self._shadow.ForceTranslucentOn()
-
-    def _cast_shadow(self, points: list[FloatArray]) -> None:
-        """Lay the rods flat on a grid and blur them, the more the higher they are."""
-        from scipy.ndimage import gaussian_filter
-
-        low, high = self._shadow_bounds
-        shade = np.zeros((_SHADOW_CELLS, _SHADOW_CELLS))
-        ghosts = [points for points, _ in self._ghosts]
-        footprints = self._footprints + self._footprints_of_obstacles + [area for _, area in self._ghosts]
-        points = points + self._obstacle_points + ghosts
-        heights = np.concatenate(points)[:, 2] - self._ground
-        places = (np.concatenate(points)[:, :2] - low) / (high - low) * _SHADOW_CELLS
-        weights = np.concatenate(footprints) / np.prod((high - low) / _SHADOW_CELLS)
-        level = np.clip(heights / self._extent * len(_BLURS), 0, len(_BLURS) - 1).astype(int)
-        box = [[0, _SHADOW_CELLS]] * 2
-        for index, blur in enumerate(_BLURS):
-            here = level == index
-            if here.any():
-                cover, *_ = np.histogram2d(places[here, 1], places[here, 0], _SHADOW_CELLS, box, weights=weights[here])
-                shade += gaussian_filter(cover, blur, mode="constant")
-        pixels = np.empty((_SHADOW_CELLS, _SHADOW_CELLS, 4), np.uint8)
-        pixels[..., :3] = (62, 74, 86)
-        pixels[..., 3] = 255.0 * 0.42 * -np.expm1(-1.4 * shade[::-1])
-        texture = require("pyvista", "view").Texture(pixels)
-        texture.interpolate = True
-        self._shadow.texture = texture
 
 
 def _empty_mesh(pyvista: Any, surface: Surface, shown: npt.NDArray[np.int64] | None = None) -> Any:

@@ -30,15 +30,20 @@ class TendonLines:
     pyvista : module
     plotter : pyvista.Plotter
     record : Frames
+
+    Attributes
+    ----------
+    motions : list of ndarray of shape (frames, guides, 3) [m]
+        Positions of the guides of each tendon.
     """
 
     def __init__(self, pyvista: Any, plotter: Any, record: Frames) -> None:
-        self._points = [tendon_points(record, tendon) for tendon in record.tendons]
-        self._meshes = [pyvista.lines_from_points(points[0]) for points in self._points]
+        self.motions = [tendon_points(record, tendon) for tendon in record.tendons]
+        self._meshes = [pyvista.lines_from_points(points[0]) for points in self.motions]
         for mesh in self._meshes:
             plotter.add_mesh(mesh, color="#33383d", line_width=3.0, reset_camera=False)
 
-    def show(self, before: int, after: int, share: float) -> None:
-        """Move the tendons to a place between two frames."""
-        for mesh, points in zip(self._meshes, self._points, strict=True):
-            mesh.points = (1.0 - share) * points[before] + share * points[after]
+    def show(self, guides: list[FloatArray]) -> None:
+        """Move the tendons to the positions of their guides, shape (guides, 3) [m] each."""
+        for mesh, points in zip(self._meshes, guides, strict=True):
+            mesh.points = points

@@ -1,0 +1,124 @@
+"""A view of a simulation while it runs."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Sequence
+from types import TracebackType
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common.frames import Frames
+from withe.common.keywords import keyword_hints
+from withe.view.colors import ColorBy
+from withe.view.pinhole import Pinhole
+from withe.view.rendering import Stage
+from withe.view.screens import LiveScreen, live_screen, place_to_show
+
+__all__ = ["LiveView"]
+
+_RATE = 30.0  # greatest number of pictures per second [1/s]
+
+
+class LiveView:
+    """A view that follows the steps of a simulation: ``simulation.view(live=True)`` returns it.
+
+    Parameters
+    ----------
+    present : callable
+        Returns the present scene as a record of one frame.
+    watchers : list of callable
+        Functions that the simulation calls after each time step.
+    size, color_by, camera, ground
+        As in `withe.view.picture`. The camera moves back if rods leave the picture. The scale of colours is that of the
+        first scene, so `color_by` needs a scene that is loaded.
+
+    Examples
+    --------
+    >>> with simulation.view(live=True):  # doctest: +SKIP
+    ...     simulation.run(2.0)
+    """
+
+    @keyword_hints
+    def __init__(
+        self,
+        present: Callable[[], Frames],
+        watchers: list[Callable[[], None]],
+        *,
+        size: Sequence[int] = (1024, 640),
+        color_by: ColorBy = "rod",
+        camera: Pinhole | str | npt.ArrayLike | None = None,
+        ground: float | None = None,
+    ) -> None:
+        self._present, self._watchers = present, watchers
+        self._place = place_to_show("view(live=True)", "see the run", interactive=False)
+        self._stage = Stage(
+            present(),
+            size=size,
+            color_by=color_by,
+            camera=camera,
+            ground=ground,
+            off_screen=self._place != "window",
+            supersampling=1,
+            multisampling=self._place == "window",
+            live=True,
+        )
+        self._moves_camera = not isinstance(camera, Pinhole)
+        self._thread = threading.get_ident()
+        self._interval, self._next = 1.0 / _RATE, 0.0
+        self._screen: LiveScreen | None = None
+        self.redraws = 0
+
+    def __enter__(self) -> LiveView:
+        self._screen = live_screen(self._place, self._stage.plotter)
+        self._watchers.append(self._watch)
+        self.update()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        if self._watch in self._watchers:
+            self._watchers.remove(self._watch)
+        if self._screen is None or self._screen.is_closed:
+            return
+        self.update()
+        if kind is None:
+            self._screen.finish()
+
+    def _watch(self) -> None:
+        """Redraw after a time step if it is time. Other threads cannot draw."""
+        if time.monotonic() >= self._next and threading.get_ident() == self._thread:
+            self.update()
+
+    def update(self) -> None:
+        """Draw the present scene."""
+        if self._screen is None or self._screen.is_closed:
+            return
+        began = time.monotonic()
+        record = self._present()
+        if self._moves_camera:
+            self._stage.keep_in_view(record.positions()[0])
+        self._stage.show_present(record)
+        self._stage.label(f"t = {record.times[0]:.3f} s")
+        self._screen.refresh()
+        self.redraws += 1
+        now = time.monotonic()
+        # The run has at least half of the time, however slow the graphics are.
+        self._next = now + max(self._interval - (now - began), now - began)
+
+    def image(self) -> npt.NDArray[np.uint8]:
+        """Return the present picture, shape (height, width, 3)."""
+        return self._stage.image()
+
+    def close(self) -> None:
+        """Close the view. The simulation runs on without it."""
+        if self._watch in self._watchers:
+            self._watchers.remove(self._watch)
+        self._screen = None
+        self._stage.close()
+
+    def __repr__(self) -> str:
+        return f"LiveView({self.redraws} pictures drawn)"
