@@ -11,6 +11,7 @@ import pytest
 import withe
 from soft_limb import LOG
 from withe.perception.synthetic import make_case, render
+from withe.view.graphics import probe_rendering
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 PAGES = sorted(
@@ -158,6 +159,25 @@ def robots_learn(names):
     assert names["seen"].shape == (100, 6)
     assert np.all(names["rewards"] < 0.0)
     assert names["policy"].predict(names["seen"][0])[0].shape == (2,)
+
+
+@before("docs/how_to/view.md")
+def views_are_drawn_into_memory():
+    pyvista = pytest.importorskip("pyvista")
+    try:
+        probe_rendering()
+    except RuntimeError as error:
+        pytest.skip(str(error))
+    before, pyvista.OFF_SCREEN = pyvista.OFF_SCREEN, True
+    return {"off_screen_before": before}
+
+
+@after("docs/how_to/view.md")
+def a_cord_bends_its_arm(names):
+    assert names["simulation"].get(names["cord"], "tension") == 1.0
+    assert names["simulation"].positions(names["arm"])[-1, 0] > 0.02
+    assert Path("finger.png").stat().st_size > 5_000
+    pytest.importorskip("pyvista").OFF_SCREEN = names["off_screen_before"]
 
 
 def test_the_readme_is_one_page_whose_links_lead_to_files():

@@ -218,6 +218,73 @@ def test_a_moved_slider_moves_the_tube_in_the_same_scene(memory):
         view.close()
 
 
+def test_a_slider_follows_the_mouse(memory):
+    simulation, arm, cord, _ = finger()
+    view = simulation.view(sliders=[(cord, "tension", 0, 1)], size=(640, 400))
+    plotter = view._stage.plotter
+    plotter.show(auto_close=False)
+    try:
+        mouse = plotter.iren.interactor
+
+        def at(share, event):
+            mouse.SetEventInformation(round(share * 640), round(0.9 * 400), 0, 0, "\0", 0, None)
+            mouse.InvokeEvent(event)
+
+        at(0.035, "MouseMoveEvent")
+        at(0.035, "LeftButtonPressEvent")
+        tips = []
+        for share in (0.08, 0.14, 0.3):
+            at(share, "MouseMoveEvent")
+            tips.append(simulation.positions(arm)[-1, 0])
+        at(0.3, "LeftButtonReleaseEvent")
+        assert 0.005 < tips[0] < tips[1] < tips[2]
+        assert simulation.get(cord, "tension") == view.values["tension of cord [N]"] == 1.0
+    finally:
+        view.close()
+
+
+def test_in_a_notebook_a_server_draws_the_sliders(memory, monkeypatch):
+    monkeypatch.setattr(screens, "in_notebook", lambda: True)
+    simulation, _, cord, _ = finger()
+    shown = []
+    for trame, backend in ((True, "server"), (False, "static")):
+        for module in ("screens", "sliders"):
+            monkeypatch.setattr(f"withe.view.{module}.has_trame", lambda trame=trame: trame)
+        if trame:
+            view = simulation.view(sliders=[(cord, "tension", 0, 5)], size=(160, 120))
+        else:
+            with pytest.warns(UserWarning, match="the package trame is not installed"):
+                view = simulation.view(sliders=[(cord, "tension", 0, 5)], size=(160, 120))
+        monkeypatch.setattr(view._stage.plotter, "show", lambda **options: shown.append(options))
+        view._ipython_display_()
+        assert shown.pop() == {"jupyter_backend": backend}
+        view.close()
+
+
+def test_in_a_notebook_a_live_view_replaces_one_picture(memory, monkeypatch):
+    display = pytest.importorskip("IPython.display")
+    monkeypatch.setattr(screens, "in_notebook", lambda: True)
+    pictures = []
+
+    class Handle:
+        def update(self, picture):
+            pictures.append(picture.data)
+
+    def show(picture, display_id):
+        pictures.append(picture.data)
+        return Handle()
+
+    monkeypatch.setattr(display, "display", show)
+    simulation, *_ = finger(time_step=5e-3)
+    simulation.set("pull", force=(0.2, 0.0, 0.0))
+    with simulation.view(live=True, size=(160, 120)) as view:
+        simulation.run(0.1, progress=False)
+    view.close()
+    assert len(pictures) >= 3
+    assert all(data[:2] == b"\xff\xd8" for data in pictures)  # JPEG
+    assert pictures[-1] != pictures[0]
+
+
 def test_both_ends_of_every_slider_are_in_view(memory):
     simulation, arm, _, _ = finger()
     view = simulation.view(sliders=[(arm, "natural_curvature", (-10, 10))], size=(320, 200))

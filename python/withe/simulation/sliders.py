@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, Self
@@ -163,7 +164,7 @@ class EquilibriumSliders:
             self._simulation.restore(self._last_good)
             self._applied = before
             title = self.sliders[slider].title
-            self._message = f"no equilibrium at {title} = {value:.4g}: the last one is shown\n{_first_clause(error)}"
+            self._message = f"no equilibrium at {title} = {value:.4g}: the last one is shown\n{_reason(error)}"
             return
         self._last_good = self._simulation.snapshot()
         self._message = "the scene has jumped to another branch of equilibria" if found.branch_changed else ""
@@ -283,7 +284,6 @@ def _start(simulation: Solvable, parameter: _Parameter) -> FloatArray:
     return np.clip(parameter.low if now is None else now, parameter.low, parameter.high)
 
 
-def _first_clause(error: Exception) -> str:
-    """Return the beginning of a message, for a line in a picture."""
-    text = str(error).splitlines()[0] if str(error) else type(error).__name__
-    return text if len(text) <= 100 else f"{text[:97]}..."
+def _reason(error: Exception) -> str:
+    """Return a message in lines that fit in a picture."""
+    return "\n".join(textwrap.wrap(str(error) or type(error).__name__, 110, max_lines=3, placeholder=" ..."))

@@ -241,10 +241,10 @@ class Stage:
         direction = np.array(camera.position) - np.array(camera.focal_point)
         self._frame_camera(direction / np.linalg.norm(direction), np.concatenate([self._seen, positions, beyond]))
 
-    def label(self, text: str) -> None:
-        """Write a line of text in the lower left corner, in place of the previous one."""
+    def label(self, text: str, lines: int = 55) -> None:
+        """Write text in the lower left corner, in place of the previous one. `lines` of text fill the picture."""
         if self._label is None:
-            size = max(7, self.size[1] * self._fineness // 55)
+            size = max(7, self.size[1] * self._fineness // lines)
             self._label = self.plotter.add_text(text, position=(0.03, 0.04), viewport=True, color=_INK, font_size=size)
         else:
             self._label.input = text

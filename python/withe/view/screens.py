@@ -14,7 +14,7 @@ import numpy.typing as npt
 from withe.common.extras import require
 from withe.common.user_warnings import warn
 
-__all__ = ["LiveScreen", "Place", "in_notebook", "live_screen", "place_to_show"]
+__all__ = ["LiveScreen", "Place", "has_trame", "in_notebook", "live_screen", "place_to_show"]
 
 Place = Literal["window", "notebook", "memory"]
 _NO_DISPLAY = (
@@ -53,7 +53,7 @@ def place_to_show(what: str, do: str, *, interactive: bool) -> Place:
     {"window", "notebook", "memory"}
     """
     if in_notebook():
-        if interactive and importlib.util.find_spec("trame") is None:
+        if interactive and not has_trame():
             warn(_NO_TRAME.format(what=what, do=do))
         return "notebook"
     if require("pyvista", "view").OFF_SCREEN:  # asked for, for example to build documentation
@@ -62,6 +62,11 @@ def place_to_show(what: str, do: str, *, interactive: bool) -> Place:
         warn(_NO_DISPLAY.format(what=what, do=do))
         return "memory"
     return "window"
+
+
+def has_trame() -> bool:
+    """Return True if PyVista can answer the mouse in a notebook."""
+    return importlib.util.find_spec("trame") is not None
 
 
 def _has_display() -> bool:

@@ -19,13 +19,14 @@ from withe.io import written_beside
 from withe.view.colors import ColorBy
 from withe.view.pinhole import Pinhole
 from withe.view.rendering import Stage
-from withe.view.screens import place_to_show
+from withe.view.screens import has_trame, place_to_show
 
 __all__ = ["Slider", "SliderModel", "SliderView"]
 
 _INK, _BAR = "#33383d", "#9aa3ab"
 _LEFT, _RIGHT, _TOP, _BOTTOM = 0.03, 0.25, 0.9, 0.14  # column of the sliders, in shares of the picture
 _PITCH = 0.15
+_LINES = 85  # of text that fill the picture
 
 
 @dataclass(frozen=True)
@@ -151,12 +152,13 @@ class SliderView:
     def _moved(self, index: int, value: float) -> None:
         """Solve and redraw, when the user moves a slider."""
         if index < len(self._widgets):  # PyVista calls this function once while it adds the widget
-            self._model.move(index, float(value))
+            slider = self._model.sliders[index]
+            self._model.move(index, float(np.clip(value, slider.low, slider.high)))
             self._redraw()
 
     def _redraw(self) -> None:
         self._stage.show_present(self._model.present())
-        self._stage.label(self._model.message)
+        self._stage.label(self._model.message, _LINES)
 
     @property
     def sliders(self) -> tuple[Slider, ...]:
@@ -230,8 +232,9 @@ class SliderView:
 
     def _ipython_display_(self) -> None:
         """Show the view in the output of a cell; the sliders answer through a server of trame."""
-        options = {"jupyter_backend": self._backend} if self._backend else {}
-        self._stage.plotter.show(**options)
+        # The server renders, because sliders of VTK do not answer in the browser.
+        server = "server" if has_trame() else "static"
+        self._stage.plotter.show(jupyter_backend=self._backend or server)
 
     def __repr__(self) -> str:
         return f"SliderView({', '.join(f'{title} = {value:.4g}' for title, value in self.values.items())})"
