@@ -591,14 +591,10 @@ class Record:
     def export(self, path: str | os.PathLike[str]) -> Path:
         """Write the motion for another program, in the format of the suffix.
 
-        ===================  ========================================================================================
-        suffix               content
-        ===================  ========================================================================================
-        ``.glb``             animated binary glTF 2.0 for Blender, three.js, PowerPoint and Windows
-        ``.usda``, ``.usdc`` USD stage, as text or binary, for Omniverse, Isaac Sim, Blender and Houdini
-        ``.pvd``             VTK collection for ParaView; the frames are in a folder of the same name
-        ``.csv``             table with one row per frame and node
-        ===================  ========================================================================================
+        * ``.glb``: animated binary glTF 2.0 for Blender, three.js, PowerPoint and Windows
+        * ``.usda`` or ``.usdc``: USD stage, as text or binary, for Omniverse, Isaac Sim, Blender and Houdini
+        * ``.pvd``: VTK collection for ParaView; the frames are in a folder of the same name
+        * ``.csv``: table with one row per frame and node
 
         Parameters
         ----------

@@ -4,6 +4,8 @@ Both are extras, imported when first used; ``make view`` or ``pip install ".[vie
 """
 
 from withe.view.figures import plot
+from withe.view.live import LiveView
 from withe.view.pictures import animate, picture, view
+from withe.view.sliders import SliderView
 
-__all__ = ["animate", "picture", "plot", "view"]
+__all__ = ["LiveView", "SliderView", "animate", "picture", "plot", "view"]
