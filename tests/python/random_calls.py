@@ -368,6 +368,8 @@ def main() -> None:
     # Four nodes under forces of any size are coarse, and the warnings are right.
     warnings.simplefilter("ignore", category=withe.CoarseMeshWarning)
     warnings.simplefilter("ignore", category=withe.RingLeftWarning)
+    # A time step of any length may be far from plausible.
+    warnings.simplefilter("ignore", category=withe.PlausibilityWarning)
     warnings.filterwarnings("ignore", "the ramp of .* has not begun")
     count, number = int(sys.argv[1]), int(sys.argv[2])
     make_test(count, number)()
