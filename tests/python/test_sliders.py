@@ -420,6 +420,51 @@ def test_without_a_display_a_warning_says_how_to_see_the_scene(renderer, monkeyp
     view.close()
 
 
+def test_a_window_answers_during_the_run_and_stays_until_it_is_closed():
+    calls = []
+
+    class Interactor:
+        done = False
+
+        def GetDone(self):
+            return self.done
+
+        def start(self):
+            calls.append("start")
+
+    class Plotter:
+        render_window = object()
+
+        def __init__(self):
+            self.iren = Interactor()
+            self.iren.interactor = self.iren
+
+        def show(self, **options):
+            calls.append(options)
+
+        def update(self):
+            calls.append("update")
+
+    plotter = Plotter()
+    window = screens.live_screen("window", plotter)
+    window.refresh()
+    window.finish()
+    assert calls == [{"interactive_update": True, "auto_close": False}, "update", "start"]
+    plotter.iren.done = True
+    assert window.is_closed
+    window.finish()
+    assert calls[-1] == "start"
+    assert len(calls) == 3
+
+
+def test_a_wrong_option_of_a_view_is_named(memory):
+    simulation, _, cord, _ = finger()
+    with pytest.raises(TypeError, match=r"SliderView\(\) has no keyword 'colour_by'; did you mean color_by="):
+        simulation.view(sliders=[(cord, "tension", 0, 5)], colour_by="tension")
+    with pytest.raises(TypeError, match=r"LiveView\(\) has no keyword 'colour_by'; did you mean color_by="):
+        simulation.view(live=True, colour_by="tension")
+
+
 def test_sliders_and_live_exclude_each_other():
     simulation, _, cord, _ = finger()
     with pytest.raises(ValueError, match="`sliders` and `live` must not be given together"):

@@ -568,7 +568,7 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
                     simulation.run(2.0)
 
         **options
-            size, color_by, camera, ground, backend: see `withe.view.view`.
+            size, color_by, camera, ground, backend (not with `live`): see `withe.view.view`.
 
         Returns
         -------

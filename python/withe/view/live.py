@@ -22,6 +22,7 @@ __all__ = ["LiveView"]
 _RATE = 30.0  # greatest number of pictures per second [1/s]
 
 
+@keyword_hints
 class LiveView:
     """A view that follows the steps of a simulation: ``simulation.view(live=True)`` returns it.
 
@@ -41,7 +42,6 @@ class LiveView:
     ...     simulation.run(2.0)
     """
 
-    @keyword_hints
     def __init__(
         self,
         present: Callable[[], Frames],

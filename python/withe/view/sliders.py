@@ -71,6 +71,7 @@ class SliderModel(Protocol):
         """Return the scene now, and with each slider at its ends."""
 
 
+@keyword_hints
 class SliderView:
     """A scene with a slider for each number: ``simulation.view(sliders=...)`` returns it.
 
@@ -87,7 +88,6 @@ class SliderView:
     {'tension of cord [N]': 3.2}
     """
 
-    @keyword_hints
     def __init__(
         self,
         model: SliderModel,
