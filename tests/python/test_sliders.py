@@ -368,6 +368,30 @@ def test_a_live_view_keeps_to_its_rate(memory, monkeypatch):
     view.close()
 
 
+@pytest.mark.parametrize(("speed", "duration"), [(1.0, 0.1), (0.25, 0.4), (np.inf, 0.0)])
+def test_a_live_run_is_not_faster_than_its_speed(memory, monkeypatch, speed, duration):
+    """Watched places alone wait; here a clock that only sleep advances stands for one."""
+    clock, slept = [5.0], []
+
+    def sleep(seconds):
+        slept.append(seconds)
+        clock[0] += seconds
+
+    monkeypatch.setattr("withe.view.live.time.monotonic", lambda: clock[0])
+    monkeypatch.setattr("withe.view.live.time.sleep", sleep)
+    simulation, *_ = finger(time_step=5e-3)
+    with simulation.view(live=True, size=(160, 120), speed=speed) as view:
+        assert not view._waits  # nobody sees it
+        view._waits = np.isfinite(speed)
+        simulation.run(0.1, progress=False)
+        assert clock[0] == pytest.approx(5.0 + duration)
+        assert view.redraws == pytest.approx(1 + 30.0 * duration, abs=1.0)
+        assert max(slept, default=0.0) <= 1.0 / 30.0
+    view.close()
+    with pytest.raises(ValueError, match=r"`speed` must be positive, got 0"):
+        simulation.view(live=True, speed=0)
+
+
 def test_the_camera_of_a_live_view_follows_rods_that_leave_the_picture(memory):
     scene = withe.Scene()
     scene.add_rod(start=(0, 0, 0), end=(0.2, 0, 0), nodes=11, radius=5e-3, material=RUBBER)

@@ -567,8 +567,10 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
                 with simulation.view(live=True):
                     simulation.run(2.0)
 
+            A run in a window or notebook is not faster than real time. ``speed=0.1`` makes it ten times slower, and
+            ``speed=math.inf`` as fast as it can be.
         **options
-            size, color_by, camera, ground, backend (not with `live`): see `withe.view.view`.
+            size, color_by, camera, ground, backend (not with `live`): see `withe.view.view`. speed: see `live`.
 
         Returns
         -------
@@ -602,7 +604,7 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
         if validation.truth(live, "live"):
             if sliders is not None:
                 raise ValueError("`sliders` and `live` must not be given together: sliders show equilibria")
-            return LiveView(self._frame, self._stepping.watchers, **options)
+            return LiveView(self._frame, self._stepping.watchers, lambda: self.time, **options)
         if sliders is None:
             return self._frame().view(**options)
         self._stepping.refuse_in_run("view(sliders=...)")

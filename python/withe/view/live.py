@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -20,6 +21,8 @@ from withe.view.screens import LiveScreen, live_screen, place_to_show
 __all__ = ["LiveView"]
 
 _RATE = 30.0  # greatest number of pictures per second [1/s]
+_SLICE = 1e-3  # least time to sleep [s]
+_LAG = 0.2  # delay that a run may catch up by going faster than its speed [s]
 
 
 @keyword_hints
@@ -32,6 +35,10 @@ class LiveView:
         Returns the present scene as a record of one frame.
     watchers : list of callable
         Functions that the simulation calls after each time step.
+    time_now : callable
+        Returns the time of the simulation [s].
+    speed : float
+        Greatest speed of the run: seconds of the simulation per second. Infinity for no limit.
     size, color_by, camera, ground
         As in `withe.view.picture`. The camera moves back if rods leave the picture. The scale of colours is that of the
         first scene, so `color_by` needs a scene that is loaded.
@@ -46,13 +53,18 @@ class LiveView:
         self,
         present: Callable[[], Frames],
         watchers: list[Callable[[], None]],
+        time_now: Callable[[], float],
         *,
+        speed: float = 1.0,
         size: Sequence[int] = (1024, 640),
         color_by: ColorBy = "rod",
         camera: Pinhole | str | npt.ArrayLike | None = None,
         ground: float | None = None,
     ) -> None:
-        self._present, self._watchers = present, watchers
+        if not speed > 0.0:
+            raise ValueError(f"`speed` must be positive, got {speed!r}")
+        self._present, self._watchers, self._time_now = present, watchers, time_now
+        self._speed = float(speed)
         self._place = place_to_show("view(live=True)", "see the run", interactive=False)
         self._stage = Stage(
             present(),
@@ -67,7 +79,9 @@ class LiveView:
         )
         self._moves_camera = not isinstance(camera, Pinhole)
         self._thread = threading.get_ident()
+        self._waits = self._place != "memory" and self._speed < math.inf
         self._interval, self._next = 1.0 / _RATE, 0.0
+        self._shown, self._due = time_now(), 0.0  # time of the simulation, and when the clock reaches it
         self._screen: LiveScreen | None = None
         self.redraws = 0
 
@@ -75,6 +89,8 @@ class LiveView:
         self._screen = live_screen(self._place, self._stage.plotter)
         self._watchers.append(self._watch)
         self.update()
+        self._shown, self._due = self._time_now(), time.monotonic()
+        self._next = self._due + self._interval  # the first picture takes longer than others
         return self
 
     def __exit__(
@@ -89,9 +105,26 @@ class LiveView:
             self._screen.finish()
 
     def _watch(self) -> None:
-        """Redraw after a time step if it is time. Other threads cannot draw."""
-        if time.monotonic() >= self._next and threading.get_ident() == self._thread:
+        """Wait and redraw after a time step, as the clock says. Other threads cannot draw."""
+        if threading.get_ident() != self._thread:
+            return
+        if self._waits:
+            self._wait()
+        if time.monotonic() >= self._next:
             self.update()
+
+    def _wait(self) -> None:
+        """Let the clock reach the time of the simulation. The window answers meanwhile."""
+        time_now = self._time_now()
+        self._due = max(self._due + (time_now - self._shown) / self._speed, time.monotonic() - _LAG)
+        self._shown = time_now
+        while self._screen is not None and not self._screen.is_closed:
+            now = time.monotonic()
+            if now >= self._due:
+                return
+            time.sleep(min(self._due - now, max(self._next - now, _SLICE)))
+            if time.monotonic() >= self._next:
+                self.update()
 
     def update(self) -> None:
         """Draw the present scene."""

@@ -47,6 +47,7 @@ _INK = "#33383d"
 _PLANE_EDGE = "#c3cbd2"
 _MAX_SAMPLES = 6000  # rings of all rods together
 _SHADOW_CELLS, _LIVE_SHADOW_CELLS = 320, 96
+_FIRST_RENDERS, _SLOW = 3, 1.0 / 30.0  # renders that compile shaders; time of a render [s]
 _STEP_BACK = 0.5  # further beyond the region in view, over the way of a node that left it
 
 
@@ -153,6 +154,7 @@ class Stage:
         if supersampling == 1 and not live:
             self.plotter.enable_anti_aliasing("ssaa")
         self._label: Any = None
+        self._shown = 0
         self.show(frame)
 
     def _read(self, record: Frames, color_by: ColorBy) -> None:
@@ -187,6 +189,9 @@ class Stage:
 
     def show_present(self, record: Frames) -> None:
         """Move the rods to the first frame of another record of the same scene."""
+        self._shown += 1
+        if self._shown > _FIRST_RENDERS and self.plotter.renderer.GetLastRenderTimeInSeconds() > _SLOW:
+            self.plotter.render_window.SetMultiSamples(0)  # without a graphics card, smooth edges take most of the time
         self._move(
             record.positions()[0],
             [record.directors(rod)[0, :, 0] for rod in record.rods],
