@@ -16,7 +16,7 @@ from withe.common.extras import require
 from withe.common.frames import Frames
 from withe.common.keywords import keyword_hints
 from withe.io import written_beside
-from withe.view.colors import ColorBy
+from withe.view.colors import ColorBy, rgb, rod_color
 from withe.view.pinhole import Pinhole
 from withe.view.rendering import Stage
 from withe.view.screens import has_trame, place_to_show
@@ -142,8 +142,9 @@ class SliderView:
         look.SetEndCapLength(0.002)
         look.SetEndCapWidth(0.016)
         look.SetLabelHeight(0.018)
+        look.GetSelectedProperty().SetColor(*rod_color(1))
         for line in (look.GetTubeProperty(), look.GetCapProperty()):
-            line.SetColor(*require("pyvista", "view").Color(_BAR).float_rgb)
+            line.SetColor(*rgb(_BAR))
         for text in (look.GetTitleProperty(), look.GetLabelProperty()):
             text.SetBold(False)
             text.SetShadow(False)
