@@ -47,6 +47,8 @@ MADE_BY = {
     "withe.TorsionSpring": "Scene.add_torsion_spring",
     "withe.learning.Network": "train_network",
     "withe.real2sim.Calibration": "calibrate",
+    "withe.view.LiveView": "Simulation.view",
+    "withe.view.SliderView": "Simulation.view",
 }
 ROOT = Path(__file__).resolve().parent.parent
 GENERATED = "generated"

@@ -57,7 +57,7 @@ class Record:
     * read rods: `positions`, `velocities`, `directors`, `spins`, `curvatures`, `twists`, `tensions`
     * read parts: `obstacle_position`
     * read pictures: `plot`, `view`, `picture`, `animate`
-    * files: `save`, `load`, `to_vtk`
+    * files: `save`, `load`, `export`, `to_vtk`
     * differentiate: `gradient`
 
     Arrays that methods return are copies, with the frame as first axis. Rods are given by handle or by name.
@@ -505,6 +505,7 @@ class Record:
         See Also
         --------
         load : Read the file.
+        export : Write files for other programs.
         to_vtk : Write files for ParaView.
         """
         path = validation.file_path(path, ".npz", instead=_OTHER_FORMATS)
@@ -624,7 +625,7 @@ class Record:
         * USD: each rod is a cubic curve (BasisCurves) through its nodes, with widths, and velocities for motion blur. A
           rectangular rod is a ribbon. Lengths are in metres (metersPerUnit 1), and z is up. The time code of a frame is
           its time multiplied by timeCodesPerSecond.
-        * VTK: see `withe.io.write_vtk`.
+        * VTK: see `to_vtk`.
         * Table: columns have their units in the header. A tension is the mean of both edges of a node. Cells of
           curvature and twist are empty at the ends of open rods.
 

@@ -6,6 +6,6 @@ Both are extras, imported when first used; ``make view`` or ``pip install ".[vie
 from withe.view.figures import plot
 from withe.view.live import LiveView
 from withe.view.pictures import animate, picture, view
-from withe.view.sliders import SliderView
+from withe.view.sliders import Slider, SliderView
 
-__all__ = ["LiveView", "SliderView", "animate", "picture", "plot", "view"]
+__all__ = ["LiveView", "Slider", "SliderView", "animate", "picture", "plot", "view"]

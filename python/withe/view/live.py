@@ -27,7 +27,7 @@ _LAG = 0.2  # delay that a run may catch up by going faster than its speed [s]
 
 @keyword_hints
 class LiveView:
-    """A view that follows the steps of a simulation: ``simulation.view(live=True)`` returns it.
+    """A view that follows the steps of a simulation. `Simulation.view` with ``live=True`` returns it.
 
     Parameters
     ----------
@@ -37,11 +37,23 @@ class LiveView:
         Functions that the simulation calls after each time step.
     time_now : callable
         Returns the time of the simulation [s].
-    speed : float
+    speed : float [-]
         Greatest speed of the run: seconds of the simulation per second. Infinity for no limit.
     size, color_by, camera, ground
         As in `withe.view.picture`. The camera moves back if rods leave the picture. The scale of colours is that of the
         first scene, so `color_by` needs a scene that is loaded.
+
+    Attributes
+    ----------
+    redraws : int
+        Number of pictures drawn.
+
+    Raises
+    ------
+    ValueError
+        A speed that is not positive, or an option out of range.
+    ImportError
+        PyVista is not installed.
 
     Examples
     --------
@@ -83,7 +95,7 @@ class LiveView:
         self._interval, self._next = 1.0 / _RATE, 0.0
         self._shown, self._due = time_now(), 0.0  # time of the simulation, and when the clock reaches it
         self._screen: LiveScreen | None = None
-        self.redraws = 0
+        self.redraws: int = 0
 
     def __enter__(self) -> LiveView:
         self._screen = live_screen(self._place, self._stage.plotter)
@@ -143,7 +155,12 @@ class LiveView:
         self._next = now + max(self._interval - (now - began), now - began)
 
     def image(self) -> npt.NDArray[np.uint8]:
-        """Return the present picture, shape (height, width, 3)."""
+        """Return the present picture.
+
+        Returns
+        -------
+        ndarray of uint8, shape (height, width, 3)
+        """
         return self._stage.image()
 
     def close(self) -> None:

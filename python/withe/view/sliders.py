@@ -37,7 +37,7 @@ class Slider:
     ----------
     title : str
         Name of the number, with its unit.
-    low, high : float
+    low, high : float [unit of the title]
         Range of the number.
     """
 
@@ -73,13 +73,22 @@ class SliderModel(Protocol):
 
 @keyword_hints
 class SliderView:
-    """A scene with a slider for each number: ``simulation.view(sliders=...)`` returns it.
+    """A scene with a slider for each number. `Simulation.view` with ``sliders=`` returns it.
 
     Parameters
     ----------
     model : SliderModel
     size, color_by, camera, ground
         As in `withe.view.picture`. At first the scene at both ends of each slider is in view.
+    backend : str, optional
+        PyVista's backend in a notebook. By default "server", or "static" without trame.
+
+    Raises
+    ------
+    ValueError
+        An option out of range.
+    ImportError
+        PyVista is not installed.
 
     Examples
     --------
@@ -168,7 +177,7 @@ class SliderView:
 
     @property
     def values(self) -> dict[str, float]:
-        """Return the value of each slider, by its title."""
+        """Return the value of each slider by its title, in the unit of the title, shape () each."""
         titles = (slider.title for slider in self._model.sliders)
         return dict(zip(titles, self._model.values, strict=True))
 
@@ -184,7 +193,8 @@ class SliderView:
         ----------
         slider : int or str
             Number of the slider from the top, or its title.
-        value : float
+        value : float [unit of the title]
+            Value in the range of the slider.
 
         Raises
         ------
@@ -205,16 +215,35 @@ class SliderView:
         self._stage.plotter.render()
 
     def image(self) -> npt.NDArray[np.uint8]:
-        """Return the present picture, shape (height, width, 3)."""
+        """Return the present picture.
+
+        Returns
+        -------
+        ndarray of uint8, shape (height, width, 3)
+        """
         return self._stage.image()
 
     def picture(self, path: str | os.PathLike[str]) -> Path:
         """Write the present picture into a .png file.
 
+        Parameters
+        ----------
+        path : str or path
+            File to write.
+
+        Returns
+        -------
+        pathlib.Path
+            Path of the file.
+
         Raises
         ------
         ValueError
             Another suffix.
+        ImportError
+            matplotlib is not installed.
+        OSError
+            The picture cannot be written.
         """
         path = validation.file_path(path, ".png")
         with written_beside(path) as temporary:
@@ -222,7 +251,13 @@ class SliderView:
         return path
 
     def show(self) -> SliderView:
-        """Open the window, and wait until the user closes it. In a notebook and without a display: do nothing."""
+        """Open the window, and wait until the user closes it. In a notebook and without a display: do nothing.
+
+        Returns
+        -------
+        SliderView
+            This view.
+        """
         if self._place == "window":
             self._stage.plotter.show()
         return self

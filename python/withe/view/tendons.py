@@ -38,7 +38,7 @@ class TendonLines:
     """
 
     def __init__(self, pyvista: Any, plotter: Any, record: Frames) -> None:
-        self.motions = [tendon_points(record, tendon) for tendon in record.tendons]
+        self.motions: list[FloatArray] = [tendon_points(record, tendon) for tendon in record.tendons]
         self._meshes = [pyvista.lines_from_points(points[0]) for points in self.motions]
         for mesh in self._meshes:
             plotter.add_mesh(mesh, color="#33383d", line_width=3.0, reset_camera=False)
