@@ -592,8 +592,8 @@ class Record:
     def export(self, path: str | os.PathLike[str]) -> Path:
         """Write the motion for another program, in the format of the suffix.
 
-        * ``.glb``: animated binary glTF 2.0 for Blender, three.js, PowerPoint and Windows
-        * ``.usda`` or ``.usdc``: USD stage, as text or binary, for Omniverse, Isaac Sim, Blender and Houdini
+        * ``.glb``: animated binary glTF 2.0, for programs such as Blender, three.js and the viewers of Windows
+        * ``.usda`` or ``.usdc``: USD stage, as text or binary, for programs such as Omniverse and Blender
         * ``.pvd``: VTK collection for ParaView; the frames are in a folder of the same name
         * ``.csv``: table with one row per frame and node
 
