@@ -200,6 +200,34 @@ BitImage majority(const BitImage& image) {
   return result;
 }
 
+BitImage without_specks(const BitImage& image, std::size_t least) {
+  BitImage left = image;
+  BitImage result = image;
+  std::vector<Pixel> region;
+  for (int y = 0; y < image.height(); ++y) {
+    for (int w = 0; w < image.words(); ++w) {
+      while (const std::uint64_t bits = left.row(y)[w]) {
+        region.assign(1, {64 * w + std::countr_zero(bits), y});
+        left.clear(region.front().x, y);
+        for (std::size_t next = 0; next < region.size(); ++next) {
+          const Pixel pixel = region[next];
+          for (int dy = -1; dy <= 1; ++dy) {
+            for (int dx = -1; dx <= 1; ++dx) {
+              const Pixel other{pixel.x + dx, pixel.y + dy};
+              if (!left.at(other.x, other.y)) continue;
+              left.clear(other.x, other.y);
+              region.push_back(other);
+            }
+          }
+        }
+        if (region.size() >= least) continue;
+        for (const Pixel pixel : region) result.clear(pixel.x, pixel.y);
+      }
+    }
+  }
+  return result;
+}
+
 double distance_to_background(const BitImage& image, Pixel pixel, double limit, bool border_is_background) {
   const auto [x, y] = pixel;
   const int width = image.width();

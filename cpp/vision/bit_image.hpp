@@ -73,6 +73,9 @@ BitImage erode(const BitImage& image);
 /// Beyond the border the image continues as it ends.
 BitImage majority(const BitImage& image);
 
+/// The image without its regions of fewer pixels than `least`; pixels that touch at a corner are in one region.
+BitImage without_specks(const BitImage& image, std::size_t least);
+
 /// Distance from a pixel that is set to the nearest one that is not, Euclidean and exact [px]. Pixels outside the
 /// image count as background only where `border_is_background`. At most `limit` is returned.
 double distance_to_background(const BitImage& image, Pixel pixel, double limit, bool border_is_background);

@@ -8,13 +8,12 @@
 
 namespace withe {
 
-void bridge_gaps(Continuations& links, const std::vector<std::vector<Vector2>>& ends, double longest, double angle) {
+void bridge_gaps(Continuations& links, const std::vector<std::vector<Vector2>>& ends, const GapOptions& options) {
   struct Bridge {
     double length;
     HalfEdge a, b;
     bool operator<(const Bridge& other) const { return length < other.length; }
   };
-  const double cosine = std::cos(angle * std::numbers::pi / 180);
   // Tips in cells of the size of the longest gap, so that only near ones are compared.
   std::unordered_map<std::int64_t, std::vector<HalfEdge>> cells;
   // An end at the flank of a cable was measured before that cable, which the bridge crosses.
@@ -22,16 +21,27 @@ void bridge_gaps(Continuations& links, const std::vector<std::vector<Vector2>>& 
   for (std::size_t h = 0; h < ends.size(); ++h) {
     if (!ends[h].empty()) widest = std::max(widest, 2 * links.branches[h].half_width);
   }
-  const auto reach_of = [&](HalfEdge a, HalfEdge b) {
-    double reach = longest;
+  const auto half_width = [&](HalfEdge half) { return links.branches[static_cast<std::size_t>(half)].half_width; };
+  const auto is_bridge = [&](HalfEdge a, HalfEdge b, const Vector2& bridge) {
+    const double length = bridge.norm();
+    double beyond = 0;
     for (const HalfEdge half : {a, b}) {
-      const auto h = static_cast<std::size_t>(half);
       // An end that may be round is assumed a little before the mask ends.
-      reach += (links.zone_of[h] >= 0 ? 4.0 : 0.25) * links.branches[h].half_width;
+      beyond += (links.zone_of[static_cast<std::size_t>(half)] >= 0 ? 4.0 : 0.25) * half_width(half);
     }
-    return reach;
+    const auto fits = [&](double longest, double degrees) {
+      if (length > longest + beyond) return false;
+      const double least = std::cos(degrees * std::numbers::pi / 180) * length;
+      return length == 0 || (links.branches[static_cast<std::size_t>(a)].tangent.dot(bridge) >= least &&
+                             links.branches[static_cast<std::size_t>(b)].tangent.dot(bridge) <= -least);
+    };
+    if (fits(options.longest, options.angle)) return true;
+    const double narrow = std::min(half_width(a), half_width(b));
+    const double wide = std::max(half_width(a), half_width(b));
+    return narrow >= options.like_widths * wide &&
+           fits(options.longest_straight * (narrow + wide), options.straight_angle);
   };
-  const double size = longest + 4 * widest;
+  const double size = std::max(options.longest, options.longest_straight * widest) + 4 * widest;
   const auto cell = [&](const Vector2& point, int dx, int dy) {
     const auto column = static_cast<std::int64_t>(std::floor(point.x() / size)) + dx;
     const auto row = static_cast<std::int64_t>(std::floor(point.y() / size)) + dy;
@@ -42,22 +52,13 @@ void bridge_gaps(Continuations& links, const std::vector<std::vector<Vector2>>& 
     if (ends[h].empty()) continue;
     const auto half = static_cast<HalfEdge>(h);
     const Vector2 tip = ends[h].back();
-    const auto direction = [&](HalfEdge of) -> const Vector2& {
-      return links.branches[static_cast<std::size_t>(of)].tangent;
-    };
     for (int dy = -1; dy <= 1; ++dy) {
       for (int dx = -1; dx <= 1; ++dx) {
         const auto found = cells.find(cell(tip, dx, dy));
         if (found == cells.end()) continue;
         for (const HalfEdge other : found->second) {
           const Vector2 bridge = ends[static_cast<std::size_t>(other)].back() - tip;
-          const double length = bridge.norm();
-          if (length > reach_of(half, other)) continue;
-          if (length > 0 &&
-              (direction(half).dot(bridge) < cosine * length || direction(other).dot(bridge) > -cosine * length)) {
-            continue;
-          }
-          bridges.push_back({length, half, other});
+          if (is_bridge(half, other, bridge)) bridges.push_back({bridge.norm(), half, other});
         }
       }
     }

@@ -14,9 +14,17 @@ struct CablePath {
   bool closed = false;
 };
 
-/// Bridges gaps between tips: at most `longest` px long, both ends within `angle` degrees of the bridge, the shortest
-/// first. `ends` holds the grown end of every tip, by half-edge; ends on the flank of a cable may be bridged across it.
-void bridge_gaps(Continuations& links, const std::vector<std::vector<Vector2>>& ends, double longest, double angle);
+struct GapOptions {
+  double longest = 16;          ///< longest gap [px]
+  double angle = 25;            ///< greatest angle of each end to the bridge [degrees]
+  double longest_straight = 4;  ///< longest gap between ends of like widths that nearly face each other [widths]
+  double straight_angle = 15;   ///< greatest angle of these ends to the bridge [degrees]
+  double like_widths = 0.75;    ///< least ratio of these widths
+};
+
+/// Bridges gaps between tips, the shortest first. `ends` holds the grown end of every tip, by half-edge; ends on the
+/// flank of a cable may be bridged across it.
+void bridge_gaps(Continuations& links, const std::vector<std::vector<Vector2>>& ends, const GapOptions& options);
 
 /// Every edge outside zones in exactly one path; open paths first.
 std::vector<CablePath> collect_paths(const SkeletonGraph& graph, const Continuations& links);

@@ -15,12 +15,23 @@ namespace withe {
 
 namespace {
 
+/// Regions of fewer pixels are noise of single pixels: salt of a density of 5 % forms no larger ones.
+constexpr std::size_t kSpeckPixels = 12;
+
 /// Removes frays and pinholes, unless the lines are so thin that much of them would be removed too. A smooth border
 /// converges at once. Bays of a ragged border become shallower by one pixel per round.
-BitImage smooth(const BitImage& mask) {
+BitImage smooth(const BitImage& given) {
+  const auto loses_much = [](const BitImage& before, const BitImage& after) {
+    return 10 * after.count() < 8 * before.count();
+  };
+  BitImage mask = given;
   BitImage result = majority(mask);
+  if (loses_much(mask, result)) {  // thin lines, or specks
+    mask = without_specks(mask, kSpeckPixels);
+    result = majority(mask);
+    if (loses_much(mask, result)) return mask;
+  }
   const std::size_t count = result.count();
-  if (10 * count < 8 * mask.count()) return mask;
   constexpr int most_rounds = 6;
   for (int round = 1; round < most_rounds; ++round) {
     BitImage next = majority(result);
@@ -218,7 +229,7 @@ Tracing trace_lines(const BitImage& mask, const TraceOptions& options, const Col
 
   const double shortest = std::max(options.shortest_cable * 2 * typical_half_width(graph), options.shortest_line);
   const auto ends = grow_tips(smoothed, graph, links, shortest);
-  bridge_gaps(links, ends, options.longest_gap, options.gap_angle);
+  bridge_gaps(links, ends, options.gaps);
   const std::vector<CablePath> paths = collect_paths(graph, links);
   watch.lap("paths");
 

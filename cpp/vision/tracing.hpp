@@ -8,6 +8,7 @@
 
 #include "common/types.hpp"
 #include "vision/bit_image.hpp"
+#include "vision/cable_paths.hpp"
 #include "vision/crossing_zones.hpp"
 
 namespace withe {
@@ -66,10 +67,9 @@ struct TraceOptions {
   double spur_ratio = 1.5;      ///< ends of the skeleton shorter than this are frays [local half widths]
   double shortest_cable = 2;    ///< shorter lines are specks [widths of the cables in the image]
   double shortest_line = 16;    ///< lines shorter than this are also specks: gaps of this length are bridged [px]
-  double longest_gap = 16;      ///< [px]
-  double gap_angle = 25;        ///< greatest angle of each end to the bridge [degrees]
   double spacing = 1.8;         ///< greatest spacing of rows [px]
   double stiffness_length = 1;  ///< bumps shorter than this are smoothed away [half widths]
+  GapOptions gaps;
   ZoneOptions zones;
 };
 

@@ -1,10 +1,12 @@
-"""Cables on bright ground under shadows: the default filter, and what it leaves out."""
+"""Cables on bright ground under shadows, found by the default filter; dirty masks."""
 
 import numpy as np
 import pytest
 
-from withe.perception import border_filter, ground_filter, trace
+from scoring import score
+from withe.perception import border_filter, ground_filter, trace, trace_mask
 from withe.perception.backgrounds import cast_shadow, plain, wood
+from withe.perception.disturbances import strip_across
 from withe.perception.synthetic import make_case, render
 
 COLOURS = [(200, 40, 40), (40, 90, 200)]
@@ -59,3 +61,46 @@ def test_the_light_does_not_matter(factor):
 @pytest.mark.parametrize("level", [0, 90, 255])
 def test_small_pictures_of_one_colour_have_no_cable(shape, level):
     assert not ground_filter(np.full((*shape, 3), level, np.uint8)).any()
+
+
+# Dirty masks
+
+
+def crossing(seed):
+    return make_case(f"crossing {(90, 60, 45)[seed % 3]}", 600 + seed)
+
+
+@pytest.mark.parametrize("density", [0.005, 0.02, 0.05])
+def test_salt_and_pepper_change_nothing(density):
+    for seed in range(6):
+        scene, rng = crossing(seed), np.random.default_rng(seed)
+        found = score(scene, trace_mask(scene.mask ^ (rng.random(SHAPE) < density)))
+        assert found.right, (seed, found)
+
+
+def test_noise_alone_holds_no_cable():
+    for seed in range(3):
+        assert len(trace_mask(np.random.default_rng(seed).random(SHAPE) < 0.05)) == 0
+
+
+@pytest.mark.parametrize("length", [12, 20, 28])
+def test_a_gap_between_ends_that_face_each_other_is_bridged(length):
+    for seed in range(6):
+        scene = crossing(seed)
+        line, place = scene.centrelines[0], scene.crossings[0].point
+        away = np.hypot(*(line - place).T) > 45 + length
+        away[:40] = away[-40:] = False
+        middle = int(np.flatnonzero(away)[away.sum() // 2])
+        gap = strip_across(line, middle, length, 2 * scene.widths[0], SHAPE)
+        found = score(scene, trace_mask(scene.mask & ~gap))
+        assert found.right, (seed, found)
+
+
+def test_ends_that_do_not_face_each_other_stay_apart():
+    mask = np.zeros((120, 300), bool)
+    mask[40:50, 20:140] = True
+    mask[60:70, 165:280] = True  # 25 px further on, and two widths aside
+    assert len(trace_mask(mask)) == 2
+    mask[60:70] = False
+    mask[42:47, 165:280] = True  # half as wide
+    assert len(trace_mask(mask)) == 2
