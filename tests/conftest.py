@@ -7,10 +7,20 @@ import types
 import numpy as np
 import pytest
 
+from cases import Recorder
+
 NAMED = (bool, int, float, complex, np.number, type(None))
 
 
-def pytest_configure():
+def pytest_addoption(parser):
+    parser.addoption(
+        "--cases", metavar="FILE", help="add errors of the cases of the validation page to FILE; - prints them"
+    )
+
+
+def pytest_configure(config):
+    if config.getoption("cases"):
+        config.pluginmanager.register(Recorder(config), "cases")
     # Ctrl-C is ignored in tests that a script starts in the background; some tests press it.
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cases import measured_order
+
 
 def observed_orders(errors: Sequence[float], ratio: float = 2.0) -> np.ndarray:
     """Orders p seen in errors of runs whose edge or step shrinks by `ratio` from each to the next."""
@@ -16,12 +18,14 @@ def observed_orders(errors: Sequence[float], ratio: float = 2.0) -> np.ndarray:
 def assert_order(errors: Sequence[float], order: float = 2.0, slack: float = 0.15, ratio: float = 2.0) -> None:
     """The errors fall at the order given, within the slack, in every refinement."""
     orders = observed_orders(errors, ratio)
+    measured_order(orders)
     assert np.all(np.abs(orders - order) <= slack), f"errors {list(errors)} fall at orders {orders}, not {order}"
 
 
 def assert_order_at_least(errors: Sequence[float], order: float, slack: float = 0.15, ratio: float = 2.0) -> None:
     """The errors fall at the order given or faster, less the slack, in every refinement."""
     orders = observed_orders(errors, ratio)
+    measured_order(orders)
     assert np.all(orders >= order - slack), f"errors {list(errors)} fall at orders {orders}, less than {order}"
 
 

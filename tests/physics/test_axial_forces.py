@@ -30,6 +30,7 @@ def whirled(modulus: float, **options: Any) -> tuple[withe.Simulation, withe.Rod
     return simulation, arm, hub
 
 
+@pytest.mark.case("dynamics", "Tension of an arm that turns steadily", source="N = rho A w^2 (L^2 - x^2) / 2")
 @pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum", "backward_euler"])
 @pytest.mark.parametrize("step", [1e-3, 5e-3])
 @pytest.mark.parametrize("modulus", [1e8, 1e9])

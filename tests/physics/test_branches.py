@@ -7,6 +7,7 @@ import pytest
 
 import rods
 import withe
+from cases import measured, measured_order
 
 LEE = {"stretch": 7.2e6 * 6.0, "bend": 7.2e6 * 2.0, "length": 120.0}
 
@@ -148,6 +149,9 @@ def test_what_is_set_to_a_state_between_two_wells_falls_into_its_own(share):
     assert simulation.positions(beam)[20, 2] == pytest.approx(np.copysign(top, share), rel=2e-3)
 
 
+@pytest.mark.case(
+    "stability", "Limit load of Lee's frame, published value", source="18.55 EI / L^2 [Lee, Manuel and Rossow 1968]"
+)
 def test_limit_loads_of_lees_frame_by_force_and_by_displacement():
     """18.55 EI / L^2 [Lee, Manuel and Rossow 1968], at second order in the mesh; snap-through to a negative load."""
     by_force, by_displacement = [], []
@@ -185,6 +189,8 @@ def test_limit_loads_of_lees_frame_by_force_and_by_displacement():
         )
     print("limit loads", by_force, by_displacement)
     for loads in (by_force, by_displacement):
+        measured(loads[-1] / 18.55 - 1.0)
+        measured_order(np.log2((loads[0] - loads[1]) / (loads[1] - loads[2])))
         assert loads[-1] == pytest.approx(18.55, rel=1e-3)
         assert (loads[0] - loads[1]) / (loads[1] - loads[2]) == pytest.approx(4.0, abs=1.0)
     assert by_displacement == pytest.approx(by_force, rel=1e-4)
@@ -279,6 +285,9 @@ def arch(edges):
     return scene, arc.node(edges // 2)
 
 
+@pytest.mark.case(
+    "stability", "Limit load of a deep arch, published value", source="8.97 EI / R^2 [DaDeppo and Schmidt 1975]"
+)
 def test_limit_load_of_a_deep_arch_by_force_and_by_displacement():
     """8.97 EI / R^2 [DaDeppo and Schmidt 1975], 897 in their numbers."""
     scene, crown = arch(64)

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 import rods
 import theory
 import withe
+from cases import measured
 from convergence import assert_order, zero_crossing
 
 SIDE = 1e-5
@@ -55,11 +56,15 @@ def buckling_load(make, exact):
     return zero_crossing(loads, deflections)
 
 
+@pytest.mark.case(
+    "stability", "Buckling load of a column with four pairs of ends", source="P = pi^2 EI / (K L)^2 [Euler 1744]"
+)
 @pytest.mark.parametrize("case", theory.EULER_LOADS)
 def test_euler_load_converges_at_second_order(case):
     exact = theory.EULER_LOADS[case]
     errors = [buckling_load(lambda p, s, n=n: column(case, n, p, s), exact) / exact - 1.0 for n in (32, 64, 128)]
     assert_order(errors)
+    measured(errors[-1])
     assert abs(errors[-1]) < 1e-3
 
 
@@ -68,6 +73,9 @@ def test_effective_lengths_are_eulers(case, K):
     assert theory.EULER_LOADS[case] == pytest.approx((np.pi / K) ** 2, rel=1.5e-3)
 
 
+@pytest.mark.case(
+    "stability", "Buckling of a column under its own weight", source="w L^3 / EI = 7.837 [Greenhill 1881]"
+)
 def test_self_weight_at_which_a_column_buckles_converges_at_second_order():
     assert pytest.approx(7.837, abs=5e-4) == theory.GREENHILL
     errors = [
@@ -75,6 +83,7 @@ def test_self_weight_at_which_a_column_buckles_converges_at_second_order():
         for n in (32, 64, 128)
     ]
     assert_order(errors)
+    measured(errors[-1])
     assert abs(errors[-1]) < 5e-5
 
 
@@ -142,6 +151,11 @@ def loaded_column(nodes, overload):
     return scene.build(), column, load
 
 
+@pytest.mark.case(
+    "stability",
+    "Deflection of a column just above its buckling load",
+    source="post-buckling expansion [Timoshenko and Gere 1961, 2.7]",
+)
 @pytest.mark.parametrize("nodes", [41, 101, 201])
 def test_column_buckles_however_little_more_than_its_load_it_carries(nodes):
     """A sideways force that is taken away again leads to the same shape, so far aside as the elastica says.
@@ -181,6 +195,9 @@ def test_a_column_below_its_buckling_load_is_straight_stable_and_sways_alike_to_
     assert frequencies[0] == pytest.approx(frequencies[1], rel=1e-3)
 
 
+@pytest.mark.case(
+    "stability", "Stiffness of a column just above its buckling load", source="twice the lost stiffness [Koiter 1945]"
+)
 @pytest.mark.parametrize("nodes", [101, 201])
 @pytest.mark.parametrize("overload", [2e-5, 1e-4])
 def test_a_column_above_its_buckling_load_is_bent_stable_and_sways_against_koiters_stiffness(nodes, overload):
@@ -201,4 +218,5 @@ def test_a_column_above_its_buckling_load_is_bent_stable_and_sways_against_koite
     softer = straight.linearise().frequencies(1)[0]
     lost = -(softer**2 + (softer**2 - softest**2) / 5e-4 * (overload + 5e-4))
     assert lost > 0.0
+    measured(frequencies[1] ** 2 / (2.0 * lost) - 1.0)
     assert frequencies[1] ** 2 == pytest.approx(2.0 * lost, rel=0.03)

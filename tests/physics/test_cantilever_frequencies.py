@@ -5,6 +5,7 @@ import pytest
 
 import rods
 import theory
+from cases import measured
 from convergence import assert_order
 
 PROBE = 1e-7
@@ -57,10 +58,14 @@ def frequencies_from_answers(nodes):
 EXACT = np.square(theory.CANTILEVER_ROOTS)
 
 
+@pytest.mark.case(
+    "dynamics", "Frequencies of a cantilever, modes 1 to 3, 201 nodes", source="Euler-Bernoulli beam, cos b cosh b = -1"
+)
 def test_first_three_frequencies_are_theirs_at_201_nodes():
     assert pytest.approx((1.87510, 4.69409, 7.85476), abs=1e-5) == theory.CANTILEVER_ROOTS
     errors = frequencies(201) / EXACT - 1.0
     print("frequencies off by", ", ".join(f"{error:.5%}" for error in errors))
+    measured(errors)
     assert np.all(np.abs(errors) < (0.5e-4, 2e-4, 4e-4)), errors
 
 
@@ -68,8 +73,12 @@ def test_linearised_equations_have_the_frequencies_of_what_the_engine_answers():
     np.testing.assert_allclose(frequencies(51), frequencies_from_answers(51), rtol=1e-6)
 
 
+@pytest.mark.case(
+    "dynamics", "Frequencies of a cantilever, modes 1 to 3, 41 nodes", source="Euler-Bernoulli beam, cos b cosh b = -1"
+)
 def test_frequencies_of_a_cantilever_converge_at_third_order():
     errors = np.array([frequencies(n) for n in (11, 21, 41)]) / EXACT - 1.0
+    measured(errors[-1])
     for mode in errors.T:
         assert_order(mode, order=3.0, slack=0.3)
 
@@ -89,16 +98,21 @@ def supported(edges, ends):
     return modes[rigid] / exact - 1.0
 
 
+@pytest.mark.case("dynamics", "Frequencies of free and pinned beams", source="Euler-Bernoulli beam")
 @pytest.mark.parametrize(("ends", "lumped"), [("free", 4.11), ("pinned", 0.822)])
 def test_frequencies_of_free_and_pinned_beams_converge_faster_than_with_lumped_masses(ends, lumped):
     """Mass that edges carry along them, to a pin too, leaves the edge length to the fourth power; lumped masses -4.11
     and -0.822 times its square over that of the beam."""
     edges = np.array((8, 16, 32))
     errors = np.array([supported(n, ends) for n in edges])
+    measured(errors[-1])
     assert_order(errors, order=4.0, slack=0.3)
     assert abs(errors[-1]) * edges[-1] ** 2 < 0.01 * lumped
 
 
+@pytest.mark.case(
+    "dynamics", "Discretisation error of a cantilever's frequencies", source="Gregory's formula, s^2 b^2 l^3 / 6"
+)
 def test_frequencies_of_a_cantilever_are_off_by_what_its_clamp_bends_too_far():
     """Gregory's formula: with one correction at the wall, the bending energy there is too large.
 
@@ -120,6 +134,7 @@ def test_frequencies_of_a_rod_held_by_its_first_edge_converge_at_first_order_onl
     np.testing.assert_allclose(errors[-1], (1.0 - 1.0 / 400.0) ** -2 - 1.0, atol=5e-5)
 
 
+@pytest.mark.case("dynamics", "Torsional wave in a rod that is let go", source="wave equation, period 4 L / c")
 def test_torsional_wave_returns_after_four_lengths():
     """Let go from even twist, the free end swings as a triangle wave: c = sqrt(C / rho J), period 4 L / c."""
     radius, twist = 0.1, 0.7

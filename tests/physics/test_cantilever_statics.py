@@ -9,6 +9,7 @@ import pytest
 import rods
 import theory
 import withe
+from cases import measured
 from convergence import assert_order, assert_order_at_least
 
 EDGES = (40, 80, 160)
@@ -47,16 +48,21 @@ def test_theory_of_self_weight_is_the_tabulated_one(weight, down, inward):
     assert exact.inward == pytest.approx(inward, abs=6e-6)
 
 
+@pytest.mark.case(
+    "statics", "Tip of a cantilever under a load at its tip", source="elastica [Bisshopp and Drucker 1945]"
+)
 @SPACES
 @pytest.mark.parametrize("load", [1.0, 5.0])
 def test_tip_loaded_cantilever_converges_at_second_order(load, planar):
     exact = theory.tip_loaded(load)
     errors = np.array([tip_loaded(load, n, planar) for n in EDGES]) - (exact.down, exact.inward, exact.tip_angle)
     # All three together: a single one may pass through zero.
+    measured(errors[-1], "L")
     assert_order(np.linalg.norm(errors, axis=1))
     assert np.all(np.abs(errors[-1]) < 3e-5)
 
 
+@pytest.mark.case("statics", "Tip of a cantilever under its own weight", source="elastica, solved by shooting")
 @SPACES
 @pytest.mark.parametrize("weight", [1.0, 10.0])
 def test_tip_of_a_self_weight_cantilever_converges_at_second_order_or_better(weight, planar):
@@ -66,16 +72,19 @@ def test_tip_of_a_self_weight_cantilever_converges_at_second_order_or_better(wei
         simulation, arm = rods.heavy_cantilever(weight, edges, planar=planar)
         assert simulation.equilibrium().stable
         errors.append(np.subtract(tip(simulation, arm), (exact.down, exact.inward, exact.tip_angle)))
+    measured(errors[-1], "L")
     assert_order_at_least(np.linalg.norm(errors, axis=1), order=2.0)
     assert np.all(np.abs(errors[-1]) < {1.0: 3e-7, 10.0: 1e-5}[weight])
 
 
+@pytest.mark.case("statics", "Sag of a cantilever under a small weight", source="w L^4 / (8 EI)")
 def test_small_self_weight_sinks_by_an_eighth_of_it():
     errors = []
     for edges in EDGES:
         simulation, arm = rods.heavy_cantilever(1e-4, edges)
         simulation.equilibrium()
         errors.append(tip(simulation, arm)[0] / (1e-4 / 8.0) - 1.0)
+    measured(errors[-1])
     assert_order(errors, order=3.0)
     assert abs(errors[-1]) < 1e-6
 
@@ -92,6 +101,7 @@ def test_small_self_weight_sinks_by_an_eighth_of_it_on_the_finest_meshes(edges, 
     assert tip(simulation, arm)[0] == pytest.approx(1e-3 / 8.0, rel=2e-6)
 
 
+@pytest.mark.case("statics", "Force and moment of a clamp", source="balance of forces and moments")
 def test_support_of_a_cantilever_carries_its_load_exactly():
     scene = rods.weightless()
     arm = rods.straight(scene, 40, stiffness=rods.stiffness(stretch=1e4))
@@ -109,13 +119,16 @@ def test_support_of_a_cantilever_carries_its_load_exactly():
 HEAVY_STRIP = {0.5: 0.0078, 1.0: 0.0623, 2.0: 0.4252, 3.0: 0.7666, 4.0: 0.8785, 6.0: 0.9401, 10.0: 0.9731}
 
 
+@pytest.mark.case("statics", "Drop of a heavy strip, seven lengths", source="tabulated elastica, four decimals")
 @pytest.mark.parametrize("length", HEAVY_STRIP)
 def test_end_of_a_heavy_strip_drops_as_tabulated(length):
     simulation, arm = rods.heavy_cantilever(0.5 * length**3, 400)
     assert simulation.equilibrium().stable
+    measured(tip(simulation, arm)[0] - HEAVY_STRIP[length], "L")
     assert tip(simulation, arm)[0] == pytest.approx(HEAVY_STRIP[length], abs=6e-5)
 
 
+@pytest.mark.case("statics", "Tip of a heavy strip", source="elastica, solved by shooting")
 def test_heavy_strip_converges_at_second_order():
     exact = theory.self_weight(0.5 * 3.0**3)
     errors = []
@@ -123,4 +136,5 @@ def test_heavy_strip_converges_at_second_order():
         simulation, arm = rods.heavy_cantilever(0.5 * 3.0**3, edges)
         simulation.equilibrium()
         errors.append(np.subtract(tip(simulation, arm), (exact.down, exact.inward, exact.tip_angle)))
+    measured(errors[-1], "L")
     assert_order(np.linalg.norm(errors, axis=1))

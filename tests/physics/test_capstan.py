@@ -49,6 +49,9 @@ def tension_ratio(friction: float, centreline: bool) -> float:
     return float(np.mean(pulls)) / HOLDING
 
 
+@pytest.mark.case(
+    "contact", "Capstan: tension ratio over half a turn, planar", source="exp(mu phi) [Euler 1769, Eytelwein 1808]"
+)
 @pytest.mark.parametrize("friction", [0.3, 0.5])
 def test_a_rope_round_a_post_multiplies_its_tension(friction: float) -> None:
     assert tension_ratio(friction, centreline=True) == pytest.approx(np.exp(friction * np.pi), rel=0.01)

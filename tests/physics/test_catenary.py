@@ -1,9 +1,11 @@
 """A soft rope between two pins hangs as a catenary."""
 
 import numpy as np
+import pytest
 
 import rods
 import withe
+from cases import measured
 from convergence import assert_order
 
 # z = a cosh(x / a) with a = 1 between x = -1 and 1: length 2 sinh 1.
@@ -29,12 +31,14 @@ def hanging(edges, bend, weight=1.0):
     return simulation, rope, left, right
 
 
+@pytest.mark.case("statics", "Sag of a soft rope", source="catenary")
 def test_soft_rope_converges_to_the_catenary_at_second_order():
     errors = []
     for edges in (16, 32, 64):
         simulation, rope, *_ = hanging(edges, 1e-9)
         sag = -simulation.positions(rope)[edges // 2, 2]
         errors.append(sag - (np.cosh(1.0) - 1.0))
+    measured(errors[-1] / (np.cosh(1.0) - 1.0))
     assert_order(errors)
     assert abs(errors[-1]) < 1e-3
 
@@ -45,6 +49,7 @@ def test_every_node_of_a_soft_rope_lies_on_the_catenary():
     np.testing.assert_allclose(z, np.cosh(x) - np.cosh(1.0), atol=2e-4)
 
 
+@pytest.mark.case("statics", "Forces of a soft rope on its pins", source="catenary")
 def test_pins_of_a_rope_carry_its_weight_and_the_horizontal_pull_of_the_catenary():
     simulation, _, left, right = hanging(128, 1e-9)
     np.testing.assert_allclose(simulation.reaction(left).force, (-1.0, 0.0, HALF), rtol=5e-4, atol=1e-8)

@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 
 import rods
 import withe
+from cases import measured
 from convergence import assert_order
 
 
@@ -20,6 +21,11 @@ def is_stable(simulation: withe.Simulation) -> bool:
         return simulation.equilibrium(stable=False).stable
 
 
+@pytest.mark.case(
+    "stability",
+    "Buckling load of a compressible column (bracket)",
+    source="P (1 - P / EA) = pi^2 EI / L^2 [Magnusson, Ristinmaa and Ljung 2001]",
+)
 @pytest.mark.parametrize("slenderness", [0.05, 0.15, 0.22])  # pi^2 B / (EA L^2)
 def test_a_column_that_shortens_buckles_at_a_greater_load(slenderness: float) -> None:
     """P (1 - P / EA) = pi^2 B / L^2 [Magnusson, Ristinmaa and Ljung 2001, Int. J. Solids Struct. 38]."""
@@ -33,9 +39,13 @@ def test_a_column_that_shortens_buckles_at_a_greater_load(slenderness: float) ->
     for share in (0.998, 1.002):
         simulation = rods.sharp(scene, planar=True)
         simulation.set(push, force=(-share * critical, 0.0, 0.0))
+        measured(share - 1.0)
         assert is_stable(simulation) == (share < 1.0)
 
 
+@pytest.mark.case(
+    "stability", "Buckling strain of a column that grows between walls (bracket)", source="4 pi^2 EI / (EA L^2)"
+)
 def test_a_column_that_grows_between_walls_buckles_by_its_strain() -> None:
     """4 pi^2 B / (EA L^2), as under heat; of first order in the strain itself, and of second in the mesh."""
     axial = 1e5
@@ -47,6 +57,7 @@ def test_a_column_that_grows_between_walls_buckles_by_its_strain() -> None:
         scene.clamp(column.end)
         simulation = rods.sharp(scene, planar=True)
         simulation.set(column, natural_stretch=1.0 + share * critical)
+        measured(share - 1.0)
         assert is_stable(simulation) == (share < 1.0)
 
 
@@ -57,6 +68,11 @@ def tensioned(w: float, tension: float) -> float:
     return 2.0 * a * b * (1.0 / np.cosh(b) - np.cos(a)) + (b * b - a * a) * np.sin(a) * np.tanh(b)
 
 
+@pytest.mark.case(
+    "dynamics",
+    "Frequencies of a clamped beam under tension, modes 1 to 3",
+    source="characteristic equation of the beam",
+)
 @pytest.mark.parametrize("tension", [20.0, 400.0])
 def test_a_clamped_beam_under_tension_vibrates_as_theory_says(tension: float) -> None:
     grid = np.linspace(1.0, 400.0, 4000)
@@ -73,10 +89,12 @@ def test_a_clamped_beam_under_tension_vibrates_as_theory_says(tension: float) ->
         simulation = rods.sharp(scene, planar=True)
         simulation.equilibrium()
         errors.append(np.abs(2.0 * np.pi * simulation.linearise().frequencies(3) / right - 1.0).max())
+    measured(errors[-1])
     assert errors[0] < 1.5e-3
     assert errors[-1] < 2.5e-4
 
 
+@pytest.mark.case("actuation", "Tip of a tapered arm with a tendon", source="curvature T h / EI(s), by quadrature")
 def test_a_tendon_bends_a_tapered_arm_by_its_stiffness_along_it() -> None:
     """Curvature T h / EI(s), by quadrature."""
     pull, offset = 2.0, 0.02
@@ -99,5 +117,6 @@ def test_a_tendon_bends_a_tapered_arm_by_its_stiffness_along_it() -> None:
         simulation = rods.sharp(scene)
         simulation.equilibrium()
         errors.append(np.linalg.norm(simulation.positions(arm)[-1] - right))
+    measured(errors[-1], "L")
     assert errors[-1] < 1e-4
     assert_order(np.array(errors), order=2.0, slack=0.3)

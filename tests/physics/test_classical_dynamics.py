@@ -6,6 +6,7 @@ from scipy.integrate import solve_ivp
 
 import rods
 import withe
+from cases import measured
 from convergence import assert_order, assert_order_at_least
 from hermite_beam import fly
 
@@ -55,6 +56,7 @@ def double_pendulum(first, second):
     return np.stack([np.sin(a) + np.sin(b), -np.cos(a) - np.cos(b)], axis=1)
 
 
+@pytest.mark.case("dynamics", "Double pendulum of stiff bars", source="Lagrange's equations")
 @pytest.mark.parametrize("kind", ["pinned", "revolute"])
 def test_a_double_pendulum_swings_as_by_lagrange(kind):
     exact = double_pendulum(1.2, 0.4)
@@ -72,6 +74,7 @@ def test_a_double_pendulum_swings_as_by_lagrange(kind):
     steps = [missed(20, dt) for dt in (2e-2, 1e-2, 5e-3)]
     print(f"double pendulum, {kind}:", meshes, steps)
     # Stiff bars carry their mass along them: one edge is enough, and only the step is left.
+    measured(max(meshes), "L")
     assert max(meshes) < 1e-4
     assert_order_at_least(steps, 2.0, slack=0.3)
 
@@ -116,6 +119,7 @@ def four_bar(start, times):
     return np.array([joints_of_four_bar(a)[1] for a in y[0]])
 
 
+@pytest.mark.case("dynamics", "Four-bar linkage of stiff bars", source="Lagrange's equations")
 def test_a_four_bar_linkage_moves_as_by_lagrange():
     times = np.linspace(0.1, 1.0, 10)
     exact = four_bar(0.9, times)
@@ -135,6 +139,7 @@ def test_a_four_bar_linkage_moves_as_by_lagrange():
     meshes = [missed(n, 5e-4) for n in (1, 2, 10)]
     steps = [missed(20, dt) for dt in (2e-2, 1e-2, 5e-3)]
     print("four-bar:", meshes, steps)
+    measured(max(meshes), "L")
     assert max(meshes) < 1e-4
     assert_order_at_least(steps, 2.0, slack=0.3)
 
@@ -177,6 +182,9 @@ def flown(edges, step):
     return np.array(found)
 
 
+@pytest.mark.case(
+    "dynamics", "Flying spaghetti, planar", source="beam of Hermite elements; scene of [Simo and Vu-Quoc 1986]"
+)
 @pytest.mark.slow
 def test_spaghetti_flies_as_a_beam_of_smooth_elements(spaghetti):
     """[Simo and Vu-Quoc 1986], the flexible one, in a plane: EA 1e4, EI 500, 8 N and 80 N m at an end."""
@@ -186,12 +194,14 @@ def test_spaghetti_flies_as_a_beam_of_smooth_elements(spaghetti):
 
     meshes = [missed(n, 1e-3) for n in (10, 20, 40)]
     print("spaghetti by mesh:", meshes, "at 40 edges and 5 ms", missed(40, 5e-3))
+    measured(meshes[-1], "L")
     assert meshes[-1] < 1e-4
     assert_order(meshes, slack=0.3)
     steps = [flown(20, dt) for dt in (2e-2, 1e-2, 5e-3, 2.5e-3)]
     assert_order([float(np.linalg.norm(a - b)) for a, b in zip(steps[:-1], steps[1:], strict=True)], slack=0.3)
 
 
+@pytest.mark.case("dynamics", "Flexible pendulum that falls", source="beam of Hermite elements")
 def test_a_flexible_pendulum_falls_as_a_beam_of_smooth_elements():
     """Let go level from a pin; EI = 0.02, w L^3 / EI = 490."""
     times = np.array((0.2, 0.4))
@@ -208,6 +218,7 @@ def test_a_flexible_pendulum_falls_as_a_beam_of_smooth_elements():
 
     meshes = [farthest(fallen(n, 1e-3), exact) for n in (10, 20, 40)]
     print("flexible pendulum by mesh:", meshes, "at 40 edges and 5 ms", farthest(fallen(40, 5e-3), exact))
+    measured(meshes[-1], "L")
     assert meshes[-1] < 7e-4
     assert_order(meshes, slack=0.3)
     steps = [fallen(20, dt) for dt in (2.5e-3, 1.25e-3, 6.25e-4, 3.125e-4)]
@@ -216,6 +227,7 @@ def test_a_flexible_pendulum_falls_as_a_beam_of_smooth_elements():
     )
 
 
+@pytest.mark.case("dynamics", "Rod on a turning hub: stretch and kinetic energy", source="x + u = sin(k x) / (k cos k)")
 @pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum"])
 def test_a_rod_on_a_turning_hub_stretches_and_stores_as_in_theory_and_goes_on_so(integrator):
     """EA u'' + m w^2 (x + u) = 0, u(0) = u'(1) = 0: x + u = sin(k x) / (k cos k), k^2 = m w^2 / EA.
@@ -255,4 +267,5 @@ def test_a_rod_on_a_turning_hub_stretches_and_stores_as_in_theory_and_goes_on_so
     print(integrator, "turning hub:", errors)
     assert_order_at_least(errors[:, 0], 2.0, slack=0.3)
     assert_order_at_least(errors[:, 1], 2.0, slack=0.3)
+    measured(errors[-1])
     assert errors[-1].max() < 1e-3

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import withe
+from cases import measured
 
 G = 9.81
 STIFF = withe.Material(youngs_modulus=1e9, poisson_ratio=0.3, density=1000.0)
@@ -27,6 +28,9 @@ FRICTION = 0.5
 THRESHOLD = np.degrees(np.arctan(FRICTION))
 
 
+@pytest.mark.case(
+    "contact", "Block on a slope 0.001 steeper than friction holds", source="g (sin a - mu cos a) [Coulomb]"
+)
 @pytest.mark.parametrize("friction_model", ["anchored", "implicit"])
 @pytest.mark.parametrize("beyond", [-0.001, 0.001])
 def test_a_block_on_a_slope_slides_when_it_is_steeper_than_friction(beyond, friction_model):
@@ -51,6 +55,7 @@ def test_a_block_on_a_slope_slides_when_it_is_steeper_than_friction(beyond, fric
         assert after - before == pytest.approx(0.5 * exact, rel=1e-3)
 
 
+@pytest.mark.case("contact", "Cylinder that rolls down a slope", source="2/3 g sin a")
 @pytest.mark.parametrize("friction_model", ["anchored", "implicit"])
 def test_a_cylinder_rolls_down_a_slope_at_two_thirds_of_what_slides(friction_model):
     simulation, cylinder, down = on_a_slope(20.0, 0.6, False, friction_model)
@@ -64,6 +69,7 @@ def test_a_cylinder_rolls_down_a_slope_at_two_thirds_of_what_slides(friction_mod
     assert (simulation.spins(cylinder)[4] - spin) / 0.4 * 0.02 == pytest.approx(exact, rel=2e-3)
 
 
+@pytest.mark.case("contact", "Cylinder that slides until it rolls", source="2/3 v0 after v0 / (3 mu g)")
 @pytest.mark.parametrize("friction_model", ["anchored", "implicit"])
 def test_a_cylinder_that_slides_comes_to_roll_at_two_thirds_of_its_speed(friction_model):
     """After v0 / (3 mu g), whatever the friction."""
@@ -104,10 +110,12 @@ def spin_lost(edges):
     return (before - spin()) / 0.3
 
 
+@pytest.mark.case("contact", "Stick that spins flat on a floor", source="3 mu g / L")
 def test_a_stick_that_spins_flat_on_a_floor_slows_at_three_mu_g_over_its_length():
     """Torque mu m g L / 4 over m L^2 / 12. It is soft enough to press evenly along its length."""
     errors = [spin_lost(n) / (3.0 * 0.3 * G) - 1.0 for n in (4, 10, 40)]
     print("spinning stick:", errors)
+    measured(errors)
     assert abs(errors[0]) < 1e-3
     assert np.abs(errors[1:]).max() < 3e-4
 
@@ -131,6 +139,9 @@ def wound(nodes, wrap):
     return points, tangent(0.0), tangent(wrap), wrap * reach / per
 
 
+@pytest.mark.case(
+    "contact", "Capstan: tension ratio over 0.25 to 2 turns", source="exp(mu phi) [Euler 1769, Eytelwein 1808]"
+)
 @pytest.mark.parametrize(("turns", "bound"), [(0.25, 2e-4), (1.0, 3e-4), (2.0, 1.5e-3)])
 def test_a_rope_wound_about_a_post_multiplies_its_tension(turns, bound):
     """exp(mu phi) [Euler 1769, Eytelwein 1808]; beyond half a turn it climbs, and turns by a thousandth less."""
@@ -169,6 +180,7 @@ def test_a_rope_wound_about_a_post_multiplies_its_tension(turns, bound):
         pulls.append(simulation.reaction(grip).force @ last)
     error = float(np.mean(pulls)) / exact - 1.0
     print(f"capstan, {turns} turns:", exact, error)
+    measured(error)
     assert abs(error) < bound
 
 

@@ -7,6 +7,7 @@ from scipy.special import jn_zeros
 
 import rods
 import withe
+from cases import measured
 from convergence import assert_order, assert_order_at_least
 
 UP = (0.0, 0.0, 1.0)
@@ -61,6 +62,7 @@ def beam_frequencies(edges, ends, count=3):
     return found[skipped:]
 
 
+@pytest.mark.case("dynamics", "Frequencies of beams with any two ends, modes 1 to 3", source="Euler-Bernoulli beam")
 @pytest.mark.parametrize(
     "ends",
     [
@@ -78,12 +80,14 @@ def test_three_frequencies_of_beams_with_any_two_ends_converge(ends):
     exact = np.square(wave_numbers(ends, 3))
     errors = np.array([beam_frequencies(n, ends) for n in (20, 40, 80)]) / exact - 1.0
     print(f"beam, {ends}:", errors.tolist())
+    measured(errors[-1])
     assert abs(errors[1, 0]) < 1.2e-4
     assert np.abs(errors[1]).max() < 7e-4
     for mode in errors.T:
         assert_order_at_least(mode, 2.5)
 
 
+@pytest.mark.case("dynamics", "Frequencies of a ring in its plane", source="[Hoppe 1871; Love 1927, section 293]")
 @pytest.mark.parametrize("n", [2, 3])
 def test_a_ring_vibrates_in_its_plane_as_hoppe_has_it(n):
     """w^2 = B / (rho A R^4) n^2 (n^2 - 1)^2 / (n^2 + 1), without stretch [Hoppe 1871; Love 1927, section 293]."""
@@ -108,10 +112,14 @@ def test_a_ring_vibrates_in_its_plane_as_hoppe_has_it(n):
         np.testing.assert_allclose(pair[0], pair[1], rtol=1e-4)
         errors.append(pair.mean() / exact - 1.0)
     print(f"ring, n = {n}:", errors)
+    measured(errors[-1])
     assert abs(errors[-1]) < 1e-3 * (n**2 - 1.0) / 3.0
     assert_order(errors, slack=0.2)
 
 
+@pytest.mark.case(
+    "dynamics", "Frequencies of a pinned beam under axial force", source="w^2 = (k^4 EI + k^2 T) / (rho A)"
+)
 @pytest.mark.parametrize("tension", [100.0, -5.0])
 def test_a_pinned_beam_under_tension_or_pressure_converges_to_its_closed_form(tension):
     """w^2 = k^4 B / rho A + k^2 T / rho A, k = n pi / L."""
@@ -128,11 +136,15 @@ def test_a_pinned_beam_under_tension_or_pressure_converges_to_its_closed_form(te
         assert simulation.equilibrium().stable
         errors.append(2.0 * np.pi * simulation.linearise().frequencies(3) / exact - 1.0)
     print(f"tension {tension}:", np.array(errors).tolist())
+    measured(errors[-1])
     assert np.abs(errors[0]).max() < 1.5e-3
     for mode in np.array(errors[1:]).T:
         assert_order_at_least(mode, 2.0)
 
 
+@pytest.mark.case(
+    "dynamics", "Frequencies of a hanging cable, modes 1 to 3", source="zeros of J0 [Daniel Bernoulli 1732]"
+)
 def test_a_hanging_cable_converges_to_bernoullis_frequencies():
     """w_n = j_0n / 2 sqrt(g / L), j_0n the roots of J0 [Daniel Bernoulli 1732]; it hardly bends or stretches."""
     exact = 0.5 * jn_zeros(0, 3)
@@ -147,6 +159,7 @@ def test_a_hanging_cable_converges_to_bernoullis_frequencies():
         simulation.equilibrium()
         errors.append(2.0 * np.pi * simulation.linearise().frequencies(3) / exact - 1.0)
     print("hanging cable:", np.array(errors).tolist())
+    measured(errors[-1])
     assert np.abs(errors[-1]).max() < 6e-3
     for mode in np.array(errors).T:
         assert_order_at_least(mode, 2.0)
@@ -176,16 +189,19 @@ def decay_rate(mode, edges, steps, viscous_time=0.0, drag=0.0):
     return -0.5 * np.log(-last) / step
 
 
+@pytest.mark.case("dynamics", "Decay rate of a Kelvin-Voigt beam, modes 1 to 3", source="tau w^2 / 2")
 @pytest.mark.parametrize("mode", [1, 2, 3])
 def test_modes_of_a_kelvin_voigt_beam_decay_by_half_their_frequency_squared_and_its_viscous_time(mode):
     frequency = (mode * np.pi) ** 2
     found = [decay_rate(mode, 40, n, viscous_time=0.04 / frequency) for n in (50, 100, 200)]
     errors = np.array(found) / (0.02 * frequency) - 1.0
     print(f"decay by viscosity, mode {mode}:", errors.tolist())
+    measured(errors[-1])
     assert abs(errors[-1]) < 1.5e-3
     assert_order(np.diff(found))
 
 
+@pytest.mark.case("dynamics", "Decay rate of a beam in drag, modes 1 to 3", source="c / (2 rho A)")
 @pytest.mark.parametrize("mode", [1, 2, 3])
 def test_modes_of_a_beam_in_drag_decay_by_drag_over_twice_its_mass(mode):
     frequency = (mode * np.pi) ** 2
@@ -194,5 +210,6 @@ def test_modes_of_a_beam_in_drag_decay_by_drag_over_twice_its_mass(mode):
     errors = np.array(found) / (0.5 * drag) - 1.0
     print(f"decay by drag, mode {mode}:", errors.tolist())
     # Drag acts at nodes and mass along edges, which differ by (k l)^2 / 6.
+    measured(errors[-1])
     assert abs(errors[-1]) < 1e-3
     assert_order(errors, slack=0.2)

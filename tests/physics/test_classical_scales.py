@@ -7,9 +7,11 @@ from scipy.optimize import brentq
 import rods
 import theory
 import withe
+from cases import measured
 from convergence import assert_order, assert_order_at_least
 
 
+@pytest.mark.case("statics", "Rubber of 1 kPa joined to steel of 200 GPa", source="elastica")
 @pytest.mark.parametrize("load", [1.0, 5.0])
 def test_rubber_joined_to_steel_bends_as_if_steel_were_a_wall(load):
     """1 kPa and 200 GPa, of one section: the elastica of a cantilever."""
@@ -34,10 +36,12 @@ def test_rubber_joined_to_steel_bends_as_if_steel_were_a_wall(load):
         x, _, z = simulation.positions(rubber)[-1]
         errors.append(float(np.hypot(x - 1.0 + exact.inward, z + exact.down)))
     print(f"1 kPa joined to 200 GPa, {load}:", errors)
+    measured(errors[-1], "L")
     assert errors[-1] < 3e-4
     assert_order(errors, slack=0.3)
 
 
+@pytest.mark.case("dynamics", "Frequency of a beam with a tip mass of 1e9 beams", source="w^2 = 3 EI / (M L^3)")
 def test_a_beam_swings_a_mass_a_thousand_million_times_its_own():
     """w^2 = 3 B / (M L^3), by its period in motion and by its matrices."""
     exact = np.sqrt(3.0 / 1e9)
@@ -64,10 +68,14 @@ def test_a_beam_swings_a_mass_a_thousand_million_times_its_own():
         np.testing.assert_allclose(np.array(heights)[[49, 99, 199]] / 1e-4, (1.0, 0.0, 0.0), atol=3e-3)
         errors.append(swing / exact - 1.0)
     print("masses 1 : 1e9:", errors)
+    measured(errors[-1])
     assert abs(errors[-1]) < 1e-3
     assert_order_at_least(errors, 2.0)
 
 
+@pytest.mark.case(
+    "statics", "Sag and pull of 10 km of steel cable", source="elastic catenary [Irvine 1981, section 1.3]"
+)
 def test_ten_kilometres_of_cable_hang_as_an_elastic_catenary():
     """[Irvine 1981, section 1.3]: H, and the sag, of a steel cable that is longer than its span by a fifth of it."""
     length, span, weight, stretch = 10e3, 8e3, 7850.0 * np.pi * 0.02**2 * 9.81, 2e11 * np.pi * 0.02**2
@@ -94,11 +102,13 @@ def test_ten_kilometres_of_cable_hang_as_an_elastic_catenary():
         lowest = simulation.positions(cable)[edges // 2, 2]
         errors.append((-lowest / sag - 1.0, -simulation.reaction(grip).force[0] / pull - 1.0))
     print("10 km:", errors)
+    measured(errors[-1])
     assert np.abs(errors[-1]).max() < 1e-3
     for kind in np.array(errors).T:
         assert_order(kind, slack=0.3)
 
 
+@pytest.mark.case("statics", "Glass fibre of radius 1 um", source="elastica")
 def test_a_rod_one_micrometre_thick_bends_as_the_elastica():
     """Radius 1 um, length 1 mm, at default tolerances; P L^2 / B = 5, a quarter of a micronewton."""
     radius, length = 1e-6, 1e-3
@@ -116,10 +126,12 @@ def test_a_rod_one_micrometre_thick_bends_as_the_elastica():
         x, _, z = simulation.positions(fibre)[-1] / length
         errors.append(float(np.hypot(x - 1.0 + exact.inward, z + exact.down)))
     print("1 um:", errors)
+    measured(errors[-1], "L")
     assert errors[-1] < 2e-4
     assert_order(errors, slack=0.3)
 
 
+@pytest.mark.case("statics", "Shaft whose end is turned 20 times", source="twist phi / L, moment GJ phi / L")
 @pytest.mark.filterwarnings("ignore::withe.CoarseMeshWarning")
 def test_an_end_turned_twenty_times_in_one_move_winds_the_rod_evenly():
     """Too stiff to buckle: twist of 40 pi per length, C of it as moment, and half C of its square as energy."""
@@ -133,6 +145,7 @@ def test_an_end_turned_twenty_times_in_one_move_winds_the_rod_evenly():
     error = np.abs(simulation.twists(shaft) / (40.0 * np.pi) - 1.0).max()
     moment = simulation.reaction(hand).moment[0] / (0.7 * 40.0 * np.pi) - 1.0
     print("20 turns:", error, moment, simulation.energy().twist / (0.35 * (40.0 * np.pi) ** 2) - 1.0)
+    measured([error, moment])
     assert error < 1e-9
     assert abs(moment) < 1e-9
     assert simulation.energy().twist == pytest.approx(0.35 * (40.0 * np.pi) ** 2, rel=1e-9)

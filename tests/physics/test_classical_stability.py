@@ -7,6 +7,7 @@ import rods
 import snap_through
 import theory
 import withe
+from cases import measured
 from convergence import assert_order, assert_order_at_least, zero_crossing
 
 
@@ -48,6 +49,7 @@ LEE_DROPS = np.concatenate([np.arange(0.05, 0.38, 0.05), np.arange(0.39, 0.435, 
 ARCH_DROPS = np.concatenate([np.arange(0.1, 1.05, 0.1), np.arange(1.08, 1.21, 0.02)])
 
 
+@pytest.mark.case("stability", "Limit loads of Lee's frame and of a deep arch", source="elastica, solved by shooting")
 @pytest.mark.parametrize(
     ("make", "curve", "drops", "known", "meshes", "bound"),
     [
@@ -74,10 +76,16 @@ def test_limit_loads_converge_at_second_order_or_better_to_those_of_the_elastica
             forces.append(-simulation.reaction(grip).force[2])
         errors.append(snap_through.peak(drops, forces) / exact - 1.0)
     print("limit load", exact, errors)
+    measured(errors[-1])
     assert abs(errors[-1]) < bound
     assert_order_at_least(errors, 2.0)
 
 
+@pytest.mark.case(
+    "stability",
+    "Lateral buckling of a narrow cantilever",
+    source="4.0126 sqrt(EI GJ) / L^2 [Prandtl 1899, Michell 1899]",
+)
 def test_a_narrow_cantilever_tips_over_sideways_at_prandtls_load_at_second_order():
     """It hardly bends under the load; a small side load measures the stiffness that is left."""
     assert pytest.approx(4.0126, abs=1e-4) == theory.TIPPING_LOAD
@@ -95,12 +103,16 @@ def test_a_narrow_cantilever_tips_over_sideways_at_prandtls_load_at_second_order
             sways.append(simulation.positions(strip)[-1, 1] / 1e-5)
         errors.append(zero_crossing(loads, sways) / theory.TIPPING_LOAD - 1.0)
     print("lateral buckling:", errors)
+    measured(errors[2])
     assert abs(errors[0]) < 3e-3
     assert abs(errors[2]) < 1e-4
     # Order of differences: bending under the load contributes a constant 1.1e-5.
     assert_order_at_least(np.diff(errors[1:]), 2.0, slack=0.2)
 
 
+@pytest.mark.case(
+    "stability", "Growth rate of Beck's column beyond flutter", source="characteristic equation [Beck 1952]"
+)
 def test_flutter_of_becks_column_grows_in_time_as_fast_as_in_theory():
     """Beyond 20.05 its lowest frequencies are a complex pair, found in motion from a small disturbance."""
     frequency, growth = theory.flutter(25.0)
@@ -131,5 +143,6 @@ def test_flutter_of_becks_column_grows_in_time_as_fast_as_in_theory():
         ]
         errors.append(0.5 * np.log(-last) / (25.0 * step) / growth - 1.0)
     print("Beck, growth", growth, "error", errors)
+    measured(errors[-1])
     assert abs(errors[-1]) < 4e-3
     assert_order(errors, slack=0.3)

@@ -10,6 +10,7 @@ from scipy.integrate import quad
 
 import rods
 import withe
+from cases import measured
 from convergence import assert_order, assert_order_at_least
 from kirchhoff import Cantilever, follower_tip
 from stiffness_method import displacements
@@ -46,6 +47,11 @@ def bend_of_45_degrees(edges):
     return simulation.positions(arm)[-1]
 
 
+@pytest.mark.case(
+    "statics",
+    "Tip of a bend of 45 degrees, loaded out of its plane",
+    source="Kirchhoff's equations; scene of [Bathe and Bolourchi 1979]",
+)
 def test_bend_of_45_degrees_converges_at_second_order():
     bent = Cantilever(
         length=0.25 * np.pi * BEND_RADIUS,
@@ -59,6 +65,7 @@ def test_bend_of_45_degrees_converges_at_second_order():
     np.testing.assert_allclose(exact, (15.79, 47.23, 53.37), atol=0.15)
     errors = [missed(bend_of_45_degrees(n), exact) for n in (8, 64, 128, 256)]
     print("45-degree bend:", errors)
+    measured(errors[-1] / BEND_RADIUS, "R")
     assert errors[0] < 3e-2
     assert_order(errors[1:])
 
@@ -91,6 +98,7 @@ def princeton(edges, load):
     ]
 
 
+@pytest.mark.case("statics", "Princeton beam, three loads, four angles", source="Kirchhoff's equations")
 @pytest.mark.parametrize("size", [4.448, 8.896, 13.345])  # [N]
 @pytest.mark.parametrize("degrees", [0, 30, 60, 90])
 def test_princeton_beam_bends_over_both_sides_of_its_section_as_in_theory(size, degrees):
@@ -104,11 +112,15 @@ def test_princeton_beam_bends_over_both_sides_of_its_section_as_in_theory(size, 
     exact = Cantilever(PRINCETON_LENGTH, tuple(bend), twist, stretch).tip(load)
     errors = np.array([missed(tip, exact) for tip in tips]) / missed(exact, (PRINCETON_LENGTH, 0, 0))
     print(f"Princeton, {size} N at {degrees} degrees:", errors)
+    measured(errors[-1])
     assert errors[0] < 1e-3
     # The error of the wall is of third order, and hides the second order of a load along the width.
     assert_order_at_least(errors[1:], 2.0, slack=0.3)
 
 
+@pytest.mark.case(
+    "statics", "Cantilever under a follower force", source="elastica; scene of [Argyris and Symeonidis 1981]"
+)
 @pytest.mark.parametrize("load", [2.0, *(pytest.param(load, marks=pytest.mark.slow) for load in (10.0, 20.0)), 40.0])
 def test_a_force_that_follows_the_end_of_a_cantilever_converges_at_second_order(load):
     """[Argyris and Symeonidis 1981] follow such a beam as it coils; P L^2 / B up to 40."""
@@ -125,6 +137,7 @@ def test_a_force_that_follows_the_end_of_a_cantilever_converges_at_second_order(
             simulation.equilibrium()
         errors.append(missed(simulation.positions(arm)[-1], (1.0 - inward, 0.0, across)))
     print(f"follower, {load}:", errors)
+    measured(errors[-1], "L")
     assert errors[1] < 7e-4
     assert_order(errors)
 
@@ -132,6 +145,7 @@ def test_a_force_that_follows_the_end_of_a_cantilever_converges_at_second_order(
 STRIP = {"bend": (1.0, 0.2), "twist": 0.3}
 
 
+@pytest.mark.case("statics", "Strips with natural twist or curvature", source="Kirchhoff's equations")
 @pytest.mark.parametrize(
     ("natural", "load"),
     [
@@ -165,10 +179,12 @@ def test_strips_that_are_twisted_or_curved_by_nature_converge_at_second_order(na
             simulation.equilibrium()
         errors.append(missed(simulation.positions(strip)[-1], exact))
     print("strip", natural, load, errors)
+    measured(errors[-1], "L")
     assert errors[-1] < 5e-5
     assert_order(errors)
 
 
+@pytest.mark.case("statics", "Deflection of a tapered cantilever", source="quadrature of x^2 / EI(x)")
 def test_a_tapered_cantilever_converges_at_second_order():
     """Round, its end a quarter as thick as its root; by quadrature of x^2 / EI, EI ~ h^4, each edge as thick as its
     middle."""
@@ -189,6 +205,7 @@ def test_a_tapered_cantilever_converges_at_second_order():
         simulation.equilibrium()
         errors.append(simulation.positions(arm)[-1, 2] / 1e-5 / exact - 1.0)
     print("taper:", errors)
+    measured(errors[-1])
     assert abs(errors[-1]) < 1e-3
     assert_order(errors)
 
@@ -237,6 +254,7 @@ FRAMES = {
 }
 
 
+@pytest.mark.case("statics", "Displacements of frames with rigid joints", source="matrix stiffness method")
 @pytest.mark.parametrize("frame", FRAMES)
 def test_frames_give_way_as_by_the_stiffness_method(frame):
     joints, members, clamped, forces = FRAMES[frame]
@@ -278,5 +296,6 @@ def test_frames_give_way_as_by_the_stiffness_method(frame):
             answers.append((found - points) / size)
         errors.append(missed(0.5 * (answers[0] + answers[1]), exact) / np.linalg.norm(exact))
     print(f"frame {frame}:", errors)
+    measured(errors[-1])
     assert errors[-1] < 1e-4
     assert_order_at_least(errors, 2.0)

@@ -9,6 +9,7 @@ import numpy.typing as npt
 import pytest
 
 import withe
+from cases import measured
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -136,6 +137,7 @@ def heavy_rod(friction_model: Any) -> tuple[withe.Scene, withe.Rod]:
     return scene, rod
 
 
+@pytest.mark.case("contact", "Rod that is pushed along a floor", source="block with Coulomb friction")
 @pytest.mark.parametrize("friction_model", ["implicit", "lagged", "semi_explicit"])
 def test_a_rod_pushed_along_a_floor_slides_as_a_block_does(friction_model: Any) -> None:
     scene, rod = heavy_rod(friction_model)
@@ -160,6 +162,7 @@ def test_a_rod_pushed_along_a_floor_slides_as_a_block_does(friction_model: Any) 
         assert simulation.energy().kinetic == pytest.approx(0.5 * speed**2, rel=0.01, abs=1e-4)
 
 
+@pytest.mark.case("contact", "Friction force of a rod that sticks or slides", source="-F or -mu m g")
 @pytest.mark.parametrize("friction_model", ["implicit", "lagged", "anchored"])
 @pytest.mark.parametrize(("force", "sticks"), [(1.5, True), (6.0, False)])
 def test_friction_read_out_holds_a_block_or_is_at_its_limit(friction_model: Any, force: float, sticks: bool) -> None:
@@ -421,6 +424,7 @@ def test_what_friction_takes_in_explicit_steps_is_booked_to_second_order(frictio
     assert abs(errors[1]) < abs(errors[0]) / (1.8 if friction_model == "lagged" else 3.0)
 
 
+@pytest.mark.case("contact", "Rod that slides, explicit steps", source="block with Coulomb friction")
 @pytest.mark.parametrize("friction_model", ["implicit", "lagged", "anchored"])
 def test_explicit_steps_let_a_rod_slide_as_a_block_does(friction_model: Any) -> None:
     simulation, push = explicit_rod(friction_model, 1e-4, 2e-2)
@@ -428,6 +432,7 @@ def test_explicit_steps_let_a_rod_slide_as_a_block_does(friction_model: Any) -> 
     simulation.set(push, load=(6.0, 0, 0))
     simulation.step(4000)
     v = simulation.velocities()[:, 0]
+    measured(0.5 * (v[1:] + v[:-1]).mean() / (0.4 * (6.0 - 0.4 * 9.8)) - 1.0)
     assert 0.5 * (v[1:] + v[:-1]).mean() == pytest.approx(0.4 * (6.0 - 0.4 * 9.8), rel=0.015)  # momentum over mass
     assert abs(excess(simulation, start)) < 1e-3 * simulation.energy().kinetic
     contacts = simulation.contacts()
@@ -435,6 +440,7 @@ def test_explicit_steps_let_a_rod_slide_as_a_block_does(friction_model: Any) -> 
     np.testing.assert_allclose(-contacts["friction"][:, 0], 0.4 * contacts["normal_force"], rtol=0.01, atol=late)
 
 
+@pytest.mark.case("contact", "Braking force between rods without friction, over weight", source="zero")
 @pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum"])
 @pytest.mark.parametrize("angle", [90.0, 60.0])
 @pytest.mark.parametrize("time_step", [2e-3, 5e-4])
@@ -458,9 +464,11 @@ def test_rods_that_slide_over_rods_without_friction_are_not_braked(integrator: A
     simulation.step(round(duration / time_step))
     masses = np.r_[0.5, np.ones(nodes - 2), 0.5] / (nodes - 1)
     lost = speed - np.linalg.norm(masses @ simulation.velocities(rod)[:, :2])
+    measured(abs(lost) / (9.81 * duration), "m g")
     assert abs(lost) / (9.81 * duration) < 2e-3
 
 
+@pytest.mark.case("contact", "Contact forces of a rod on a sphere or cylinder", source="balance of forces")
 @pytest.mark.parametrize("nodes", [6, 9, 17])
 @pytest.mark.parametrize("kind", ["sphere", "capsule"])
 def test_contacts_read_out_balance_weight_and_reaction_on_what_is_round(kind: str, nodes: int) -> None:
@@ -480,4 +488,5 @@ def test_contacts_read_out_balance_weight_and_reaction_on_what_is_round(kind: st
     np.testing.assert_allclose(np.linalg.norm(contacts["normal"], axis=1), 1.0, rtol=1e-12)
     pressing = (contacts["normal_force"][:, None] * contacts["normal"]).sum(axis=0)
     weight = np.array([0.0, 0.0, 1200.0 * np.pi * 5e-3**2 * 0.4 * 9.81])
+    measured((pressing + simulation.reaction(wall).force - weight) / np.linalg.norm(weight))
     np.testing.assert_allclose(pressing + simulation.reaction(wall).force, weight, atol=1e-9)

@@ -7,6 +7,7 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 import withe
+from cases import measured
 from convergence import assert_order, observed_orders
 
 LENGTH, RADIUS, DENSITY = 0.1, 5e-3, 1000.0
@@ -125,6 +126,7 @@ def test_stiff_nonlinear_spring_stays_bounded_and_converges_at_second_order():
     assert_order(errors, order=2, slack=0.3)
 
 
+@pytest.mark.case("statics", "Bar on springs that are a custom force", source="k x = m g")
 @pytest.mark.parametrize("planar", [False, True])
 @pytest.mark.parametrize("given", [False, True])
 def test_spring_and_weight_are_in_balance_at_their_exact_place(given, planar):
@@ -159,6 +161,7 @@ def test_nonlinear_springs_and_weight_are_in_balance():
     assert 1e3 * float(np.abs(z**3).sum()) == pytest.approx(9.81 * MASS, rel=1e-7)
 
 
+@pytest.mark.case("dynamics", "Frequency of two bars on a spring that is a custom force", source="w^2 = 2 k / m")
 def test_spring_between_rods_that_share_no_node_gives_their_frequency():
     """Two bars and a spring between their middles: w^2 = 2 k / m, by steps of any length and by linearisation."""
     stiff = 20.0
@@ -185,6 +188,7 @@ def test_spring_between_rods_that_share_no_node_gives_their_frequency():
     frequency = np.sqrt(2 * stiff / MASS) / (2 * np.pi)
     simulation = scene.build(time_step=1 / (400 * frequency))
     found = simulation.linearise().frequencies(13)
+    measured(np.min(np.abs(np.asarray(found, complex) - frequency)) / frequency)
     assert np.min(np.abs(np.asarray(found, complex) - frequency)) < 1e-3 * frequency
     simulation.set_velocities(upper, (0, 0, 0.01))
     simulation.set_velocities(lower, (0, 0, -0.01))
@@ -194,6 +198,7 @@ def test_spring_between_rods_that_share_no_node_gives_their_frequency():
     np.testing.assert_allclose(simulation.momentum().linear, 0, atol=1e-12)
 
 
+@pytest.mark.case("statics", "Compass needle under its weight", source="balance of moments")
 @pytest.mark.parametrize("planar", [False, True])
 def test_moments_of_a_compass_needle_balance_its_weight(planar):
     """A stiff bar on a pin, with a moment m t x B for a field along z, against its weight.

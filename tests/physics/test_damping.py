@@ -39,6 +39,9 @@ def ringing(edges, steps, viscous_time, direction, integrator="implicit_midpoint
     return fitted_oscillation(tips, step)
 
 
+@pytest.mark.case(
+    "dynamics", "Decay and frequency of a viscous rod in any plane", source="tau w^2 / 2, w sqrt(1 - zeta^2)"
+)
 @pytest.mark.parametrize("direction", [(0.0, 0.0, 1.0), (0.0, 0.6, 0.8)])
 def test_bending_of_a_kelvin_voigt_rod_decays_at_half_its_viscous_time_by_frequency_squared(direction):
     frequency = theory.CANTILEVER_ROOTS[0] ** 2
@@ -54,6 +57,7 @@ def test_decay_rate_converges_at_second_order_in_the_step():
     assert_order(np.diff(decays), slack=0.2)
 
 
+@pytest.mark.case("dynamics", "Creep of a Kelvin-Voigt bar", source="F L / EA (1 - exp(-t / tau))")
 def test_viscous_bar_creeps_to_its_length_in_its_viscous_time():
     """A massless Kelvin-Voigt bar under a sudden pull: u = (F L / EA) (1 - exp(-t / tau))."""
     scene = rods.weightless()
@@ -109,6 +113,7 @@ def test_material_viscosity_is_that_of_its_modulus():
     assert simulation.positions(bar)[-1, 0] - 1.0 == pytest.approx(0.01 * (1.0 - np.exp(-1.0)), rel=5e-3)
 
 
+@pytest.mark.case("dynamics", "Terminal velocity of a rod in drag", source="rho A g / c")
 @pytest.mark.parametrize("integrator", ["backward_euler", "implicit_midpoint", "energy_momentum", "verlet"])
 def test_falling_rod_reaches_its_terminal_velocity(integrator):
     """rho A g / c, approached in the time rho A / c."""
@@ -147,6 +152,7 @@ def test_drag_takes_what_gravity_gives_at_terminal_velocity():
     assert before.gravity - after.gravity == pytest.approx(9.81 * 9.81 / 4.0, rel=1e-6)
 
 
+@pytest.mark.case("dynamics", "Decay of axial modes in drag", source="c / (2 m)")
 @pytest.mark.parametrize("mode", [0, 2, 4])
 def test_drag_damps_every_mode_alike(mode):
     """c x' on m x'': amplitudes fall by exp(-c t / 2 m), however few edges a wave has."""

@@ -6,6 +6,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
 import withe
+from cases import measured
 
 GRAVITY, RADIUS, DENSITY = 9.81, 5e-3, 1000.0
 ALONG, ACROSS = 0.1, 0.35
@@ -28,6 +29,9 @@ def lying(length, nodes, friction, modulus=1e7, friction_model="anchored", **opt
     return rod, scene
 
 
+@pytest.mark.case(
+    "contact", "Force on a rod with directed friction that slides at an angle", source="N (mu_t cos a, mu_n sin a)"
+)
 @pytest.mark.parametrize("friction_model", ["anchored", "implicit"])
 @pytest.mark.parametrize("angle", [0.0, 0.4, 1.0, np.pi / 2])
 def test_sliding_at_an_angle_takes_the_force_of_the_model(friction_model, angle):
@@ -47,6 +51,9 @@ def test_sliding_at_an_angle_takes_the_force_of_the_model(friction_model, angle)
     )
 
 
+@pytest.mark.case(
+    "contact", "Path of a rod with directed friction that slides to rest", source="ordinary differential equation"
+)
 def test_a_rod_that_slides_to_rest_goes_the_way_of_the_model():
     """v' = -g (mu_along v_x, mu_across v_y) / |v|: it turns into its own direction while it slows down."""
     found = solve_ivp(
@@ -66,6 +73,7 @@ def test_a_rod_that_slides_to_rest_goes_the_way_of_the_model():
         simulation.run(0.15, progress=False)
         way = (simulation.positions(rod).mean(axis=0) - start)[:2]
         errors.append(np.linalg.norm(way - found[:2]))
+    measured(errors[-1] / np.linalg.norm(found[:2]))
     assert errors[-1] < 0.01 * np.linalg.norm(found[:2])
 
 
@@ -89,6 +97,7 @@ def test_it_only_takes(friction_model):
         assert simulation.energy().kinetic < kinetic
 
 
+@pytest.mark.case("contact", "Sliding distance with friction forward and backward", source="v^2 / (2 mu g)")
 @pytest.mark.parametrize("friction_model", ["anchored", "implicit"])
 @pytest.mark.parametrize(("way", "friction"), [(1.0, FORWARD), (-1.0, BACKWARD)])
 def test_a_rod_slides_towards_its_end_and_its_start_by_a_friction_each(way, friction, friction_model):
@@ -124,6 +133,7 @@ def test_a_slope_holds_a_rod_the_one_way_only(way, holds):
     assert slid == pytest.approx(expected, rel=0.01, abs=2e-5)
 
 
+@pytest.mark.case("contact", "Stride of a worm that stretches", source="e L (mu_b - mu_f) / (mu_b + mu_f)")
 def test_a_worm_that_stretches_and_shortens_crawls_by_what_friction_differs():
     """All of a body that stretches evenly and slowly slides, mu_b / (mu_f + mu_b) of it forward in either half of a
     cycle: the middle goes by strain length (mu_b - mu_f) / (mu_b + mu_f) a cycle."""
@@ -194,6 +204,9 @@ def crawl(*friction):
     return np.linalg.norm(ways[1] - ways[0]) / period, snake_speed(length, amplitude, waves, period, *friction)
 
 
+@pytest.mark.case(
+    "contact", "Speed of a snake, three friction laws", source="quasi-static model [Hu et al. 2009, eq. 1-3]"
+)
 @pytest.mark.parametrize("friction", [(0.1, 0.1, 0.4), (0.1, 0.15, 0.2), (0.15, 0.1, 0.5)])
 def test_a_snake_crawls_by_friction_that_differs(friction):
     """Scales resist one way more than the other; 1 : 1.5 : 2 are those of a snake of PyElastica's."""

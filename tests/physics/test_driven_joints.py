@@ -10,6 +10,7 @@ from scipy.optimize import brentq
 
 import rods
 import withe
+from cases import measured
 from convergence import assert_order
 
 SCHEMES = ("backward_euler", "implicit_midpoint", "energy_momentum", "fourth_order")
@@ -38,6 +39,7 @@ def settle(simulation):
         return simulation.equilibrium()
 
 
+@pytest.mark.case("actuation", "Bar on a hinge with spring and motor", source="k (theta - r) - M = W L / 2 cos(theta)")
 @pytest.mark.parametrize("swapped", [False, True])
 @pytest.mark.parametrize("planar", [True, False])
 def test_a_spring_and_a_motor_hold_a_bar_where_its_weight_balances_them(planar, swapped):
@@ -68,6 +70,7 @@ def test_an_upright_bar_falls_below_the_stiffness_that_balances_its_weight(plana
         assert abs(simulation.joint_angle("hinge")) == pytest.approx(leans, abs=1e-3)
 
 
+@pytest.mark.case("actuation", "Servo that moves a bar", source="Lagrange's equation")
 @pytest.mark.parametrize("integrator", SCHEMES)
 @pytest.mark.parametrize("planar", [True, False])
 def test_a_servo_moves_a_bar_as_lagrange_has_it(planar, integrator):
@@ -84,6 +87,7 @@ def test_a_servo_moves_a_bar_as_lagrange_has_it(planar, integrator):
     step = 5e-5 if integrator == "backward_euler" else 1e-3
     simulation = bar(planar, gravity=(0, 0, -9.81), integrator=integrator, step=step, **numbers)
     simulation.run(0.4, progress=False)
+    measured(simulation.joint_angle("hinge") - exact[0], "rad")
     assert simulation.joint_angle("hinge") == pytest.approx(exact[0], abs=3e-3)
     energy = simulation.energy()
     assert energy.loads == pytest.approx(-0.01 * simulation.joint_angle("hinge"), rel=1e-9)
@@ -93,12 +97,14 @@ def test_a_servo_moves_a_bar_as_lagrange_has_it(planar, integrator):
         assert energy.dissipated > 0.1 * stored
 
 
+@pytest.mark.case("actuation", "Motor that turns a bar over two turns", source="ordinary differential equation")
 @pytest.mark.parametrize("planar", [True, False])
 def test_a_motor_turns_a_bar_round_and_whole_turns_are_counted(planar):
     simulation = bar(planar, integrator="energy_momentum", step=2e-3, moment=0.02)
     simulation.run(1.2, progress=False)
     expected = 0.5 * 0.02 / INERTIA * 1.2**2
     assert expected > 4.0 * np.pi
+    measured(simulation.joint_angle("hinge") / expected - 1.0)
     assert simulation.joint_angle("hinge") == pytest.approx(expected, rel=1e-3)
     x = simulation.positions("arm")
     seen = np.arctan2(-(x[-1] - x[0])[2], (x[-1] - x[0])[0])
@@ -221,6 +227,7 @@ def test_a_plane_and_space_have_the_same_hinges(integrator):
     assert seen[0][1] == pytest.approx(seen[1][1], abs=200.0 * near)  # frames vibrate
 
 
+@pytest.mark.case("actuation", "Driven joints, convergence in time", source="refinement of the step")
 @pytest.mark.parametrize("planar", [True, False])
 @pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum"])
 def test_driven_joints_converge_at_second_order(integrator, planar):
@@ -256,6 +263,7 @@ def test_an_order_in_which_rods_are_joined_to_a_hub_makes_no_difference():
     np.testing.assert_allclose(tips[0], tips[1], atol=1e-9)
 
 
+@pytest.mark.case("actuation", "Angle of a hinge under a moment", source="k theta = M")
 @pytest.mark.parametrize("swapped", [False, True])
 @pytest.mark.parametrize("follower", [False, True])
 @pytest.mark.parametrize("planar", [True, False])

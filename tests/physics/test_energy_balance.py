@@ -5,6 +5,7 @@ import pytest
 
 import rods
 import withe
+from cases import measured
 from convergence import assert_order
 
 DURATION = 0.5
@@ -86,15 +87,18 @@ CASES = [
 ]
 
 
+@pytest.mark.case("dynamics", "Energy balance, energy-momentum steps", source="conservation")
 @pytest.mark.parametrize("planar", [True, False], ids=["planar", "spatial"])
 @pytest.mark.parametrize("what", CASES)
 def test_energy_of_energy_momentum_steps_adds_up_to_solver_tolerance(what, planar):
     for step in (1e-2, 2.5e-3):
         worst, size = worst_imbalance("energy_momentum", step, what, planar)
         assert size > 1e-2
+        measured(worst / size)
         assert worst < 1e-9 * size
 
 
+@pytest.mark.case("dynamics", "Energy balance, midpoint steps", source="conservation")
 @pytest.mark.parametrize("planar", [True, False], ids=["planar", "spatial"])
 @pytest.mark.parametrize("what", CASES)
 def test_energy_of_midpoint_steps_adds_up_at_second_order(what, planar):
@@ -102,15 +106,18 @@ def test_energy_of_midpoint_steps_adds_up_at_second_order(what, planar):
     assert_order(errors, slack=0.3)
 
 
+@pytest.mark.case("dynamics", "Energy balance, fourth-order steps", source="conservation")
 @pytest.mark.parametrize("planar", [True, False], ids=["planar", "spatial"])
 @pytest.mark.parametrize("what", ["drag", "load", "wall", "actuation"])
 def test_energy_of_fourth_order_steps_adds_up_to_solver_tolerance(what, planar):
     for step in (5e-3, 2.5e-3):
         worst, size = worst_imbalance("fourth_order", step, what, planar)
         assert size > 1e-3
+        measured(worst / size)
         assert worst < 1e-9 * size
 
 
+@pytest.mark.case("contact", "Energy balance with friction", source="conservation")
 @pytest.mark.parametrize("friction", [0.3, (0.2, 0.5)], ids=["isotropic", "directed"])
 @pytest.mark.parametrize("model", ["anchored", "implicit"])
 @pytest.mark.parametrize("what", ["flat", "tilted", "rods"])
@@ -135,6 +142,7 @@ def test_what_friction_takes_is_booked_however_short_the_steps(what, model, fric
             simulation.step()
             worst = max(worst, abs(balance(simulation) - first))
         assert simulation.energy().dissipated > 0.01 * moving
+        measured(worst / moving)
         assert worst < 1e-6 * moving
 
 
@@ -190,6 +198,7 @@ def test_energy_momentum_steps_in_a_plane_take_few_iterations_on_fine_meshes(nod
 HELIX_HEIGHTS = {0.3: -0.20881, 0.6: -0.19466, 1.0: -0.20712, 2.0: -0.20140}
 
 
+@pytest.mark.case("dynamics", "Soft helix that swings for 2 s", source="a public rod code")
 def test_soft_helix_swings_as_in_published_code():
     scene, arm = soft_helix()
     simulation = scene.build(integrator="implicit_midpoint", time_step=1e-3, bending="tangent")
@@ -197,6 +206,7 @@ def test_soft_helix_swings_as_in_published_code():
     for time, height in HELIX_HEIGHTS.items():
         frame = int(np.argmin(np.abs(record.times - time)))
         assert record.times[frame] == pytest.approx(time, abs=1e-9)
+        measured(1e3 * (record.positions(arm)[frame, -1, 2] - height), "mm")
         assert record.positions(arm)[frame, -1, 2] == pytest.approx(height, abs=1.5e-4)
 
 

@@ -7,6 +7,7 @@ import pytest
 
 import rods
 import withe
+from cases import measured
 from convergence import assert_order
 
 GAUSS = np.polynomial.legendre.leggauss
@@ -76,6 +77,7 @@ def cylinder(slenderness):
     return along, across
 
 
+@pytest.mark.case("fluid", "Rods that fall along and across themselves", source="slender-body theory")
 def test_rods_fall_along_and_across_at_the_speeds_of_slender_body_theory():
     along = falling((0.0, 0.0, 1.0), {})[0]
     across = falling((1.0, 0.0, 0.0), {})[0]
@@ -85,6 +87,11 @@ def test_rods_fall_along_and_across_at_the_speeds_of_slender_body_theory():
     assert 1.4 < along / across < 2.0
 
 
+@pytest.mark.case(
+    "fluid",
+    "Ratio of the two speeds in a resistive fluid",
+    source="2 (ln(L / a) - 0.5) / (ln(L / a) + 0.5), resistive-force theory",
+)
 def test_the_ratio_of_the_two_speeds_tends_to_two_as_rods_become_slender():
     ratios = []
     for slenderness in (1e2, 1e4, 1e8):
@@ -118,6 +125,7 @@ def test_a_row_of_joined_rods_falls_through_a_resistive_fluid_as_one_rod(parts):
     np.testing.assert_allclose(speeds[1][1][1], speeds[0][1][1], rtol=1e-9)
 
 
+@pytest.mark.case("fluid", "Ring that falls in a resistive fluid", source="c_n per length of the circle")
 def test_a_ring_meets_the_resistance_of_its_arc_on_any_mesh():
     """It falls along its axis, across all of its length: c_n a unit length, of the circle and not of its chords."""
     weight, radius, wavelength = 0.05 * 9.81, 1e-3, 0.5
@@ -134,6 +142,9 @@ def test_a_ring_meets_the_resistance_of_its_arc_on_any_mesh():
         np.testing.assert_allclose(-simulation.velocities(ring)[:, 2], weight / across, rtol=1e-4)
 
 
+@pytest.mark.case(
+    "fluid", "Ring that falls, Stokeslets", source="integral over the circle [Cortez, Fauci and Medovikov 2005, eq. 10]"
+)
 def test_speed_of_a_falling_ring_converges_at_second_order_to_the_integral_over_a_circle():
     """By symmetry the force is the same all round."""
     radius, regularization = 0.4, 0.05
@@ -154,10 +165,12 @@ def test_speed_of_a_falling_ring_converges_at_second_order_to_the_integral_over_
         simulation = scene.build(integrator="backward_euler", time_step=0.01, planar=False)
         simulation.step(400)
         errors.append(-simulation.velocities(ring)[:, 2].mean() / exact - 1.0)
+    measured(errors[-1])
     assert abs(errors[-1]) < 1e-3
     assert_order(errors, slack=0.3)
 
 
+@pytest.mark.case("fluid", "Two rods that fall side by side", source="Stokeslets by Gauss quadrature")
 def test_rods_side_by_side_carry_each_other_down_as_stokeslets_integrated_without_segments_say():
     """Forces at blunt ends have no limit as they are resolved: within a few edges they come to a per cent."""
     regularization, gap = 0.02, 0.3
@@ -224,6 +237,7 @@ def turning_helix(edges, **fluid):
     return (np.cross(hand, reaction.force) + reaction.moment)[2], reaction.force[2]
 
 
+@pytest.mark.case("fluid", "Torque and thrust of a turning helix, resistive", source="resistive-force theory")
 def test_a_turning_helix_needs_the_torque_and_thrust_of_resistive_force_theory():
     """Torque and thrust per length of a helix of radius a that turns at w, with the angle p to its axis.
 
@@ -239,12 +253,14 @@ def test_a_turning_helix_needs_the_torque_and_thrust_of_resistive_force_theory()
     assert abs(thrust) == pytest.approx(length * speed * (across - along) * sine * cosine, rel=2e-3)
 
 
+@pytest.mark.case("fluid", "Torque and thrust of a turning helix, Stokeslets", source="Stokeslets by Gauss quadrature")
 def test_a_turning_helix_of_segments_needs_what_stokeslets_integrated_along_the_curve_say():
     regularization = 2e-3
     turn = lambda x: RATE * np.cross((0.0, 0.0, 1.0), x)  # noqa: E731
     x, force = smooth_forces([(helix_at, TURNS * TURN_LENGTH)], turn, regularization, 330)
     expected = np.cross(x, force)[:, 2].sum(), force[:, 2].sum()
     torque, thrust = turning_helix(160, regularization=regularization)
+    measured([torque / expected[0] - 1.0, thrust / expected[1] - 1.0])
     assert torque == pytest.approx(expected[0], rel=5e-3)
     assert thrust == pytest.approx(expected[1], rel=1e-2)
     # Resistive-force theory is known to be within some tens of per cent [Rodenborn and others 2013].

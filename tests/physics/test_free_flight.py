@@ -5,6 +5,7 @@ import pytest
 
 import rods
 import withe
+from cases import measured
 
 EDGES = 16
 RADIUS = 0.08
@@ -105,6 +106,7 @@ def test_angular_momentum_is_kept_to_solver_tolerance_in_a_plane(integrator):
     np.testing.assert_allclose(after, before, atol=1e-10)
 
 
+@pytest.mark.case("dynamics", "Angular momentum of a free rod that twists", source="conservation")
 @pytest.mark.parametrize(
     ("integrator", "viscosity"),
     [
@@ -138,9 +140,11 @@ def test_angular_momentum_with_twist_is_kept_to_solver_tolerance(integrator, vis
             totals.append(momenta(simulation, rod, mass)[1] + spin)
         # The spin matters: it is far more than what may be lost.
         assert np.linalg.norm(spin) > 1e-5 * np.linalg.norm(totals[0])
+        measured(np.linalg.norm(totals[1] - totals[0]) / np.linalg.norm(totals[0]))
         assert np.linalg.norm(totals[1] - totals[0]) < 1e-10 * np.linalg.norm(totals[0])
 
 
+@pytest.mark.case("dynamics", "Energy of a free rod, energy-momentum steps", source="conservation")
 @pytest.mark.parametrize("planar", [True, False], ids=["planar", "spatial"])
 @pytest.mark.parametrize("step", [2e-3, 2e-2])
 def test_energy_momentum_keeps_the_energy_of_a_free_rod(step, planar):
@@ -154,6 +158,7 @@ def test_energy_momentum_keeps_the_energy_of_a_free_rod(step, planar):
         swing = max(swing, abs(energy.kinetic - before.kinetic))
     assert simulation.statistics.rejected_steps == 0
     assert swing > 1e-3 * before.kinetic
+    measured(drift / before.kinetic)
     assert drift < 1e-9 * before.kinetic
 
 

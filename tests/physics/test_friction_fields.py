@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import withe
+from cases import measured
 
 RUBBER = withe.Material(youngs_modulus=1e8, poisson_ratio=0.3, density=1200.0)
 LENGTH, RADIUS, NODES = 0.2, 4e-3, 41
@@ -32,6 +33,9 @@ def lying_rod(friction=0.0, friction_model="anchored", pulled="end", material=RU
     return scene
 
 
+@pytest.mark.case(
+    "contact", "Pull of a rod over a floor with varying friction", source="integral of friction along the rod"
+)
 @pytest.mark.parametrize("friction_model", ["anchored", "implicit"])
 def test_a_rod_is_pulled_over_a_step_and_a_ramp_by_the_integral_of_friction(friction_model):
     # On the centreline, so that friction has no arm about the hand, by which it would press the front harder.
@@ -56,6 +60,7 @@ def test_a_rod_is_pulled_over_a_step_and_a_ramp_by_the_integral_of_friction(fric
     assert simulation.energy().work == pytest.approx(work, rel=0.01)
 
 
+@pytest.mark.case("contact", "Force that turns a rod with uneven friction", source="statics of a rigid rod")
 def test_a_rod_with_less_friction_behind_turns_about_the_point_that_statics_say():
     # Pulled across at its start, a rigid rod turns about c: half of the moment of friction about the start lies on
     # either side, and the force is what is left of both.
@@ -76,6 +81,7 @@ def test_a_rod_with_less_friction_behind_turns_about_the_point_that_statics_say(
     k = int(np.argmax(moved < 0.0))
     zero = s[k - 1] + (s[k] - s[k - 1]) * moved[k - 1] / (moved[k - 1] - moved[k])
     assert zero == pytest.approx(c, abs=0.6 * LENGTH / (NODES - 1))
+    measured(simulation.reaction("hand").force[1] / force - 1.0)
     assert simulation.reaction("hand").force[1] == pytest.approx(force, rel=0.03)
 
 

@@ -110,6 +110,7 @@ def cantilever(stiffness=None, edges=20, planar=True, limit=None):
     return rods.sharp(scene, planar=planar), arm, hand
 
 
+@pytest.mark.case("statics", "Cantilever pushed by a compliant hand", source="springs in series, 3 EI / L^3")
 @pytest.mark.parametrize("planar", [True, False], ids=["planar", "spatial"])
 def test_a_cantilever_pushed_through_a_spring_takes_the_share_of_springs_in_series(planar):
     k, push = 5.0, 1e-5
@@ -129,6 +130,7 @@ def test_a_cantilever_pushed_through_a_spring_takes_the_share_of_springs_in_seri
     )
 
 
+@pytest.mark.case("statics", "Cantilever turned by a compliant hand", source="springs in series, EI / L")
 def test_a_cantilever_turned_through_a_spring_takes_its_share_too():
     """M = c (angle - turn) = EI / L turn with the tip free to move: the hand holds it by next to nothing."""
     c, angle = 2.0, 1e-4
@@ -322,6 +324,7 @@ def test_a_weak_hand_that_turns_on_and_on_lets_what_it_holds_turn_by_nearly_half
     assert turned > np.radians(165.0)
 
 
+@pytest.mark.case("contact", "Rod that slips out of a hand", source="force limit F, slip d - F / k")
 def test_a_rod_drawn_out_of_a_hand_slips_at_the_limit_and_what_that_takes_is_dissipated():
     limit, k = 0.3, 200.0
     scene = rods.weightless()

@@ -7,6 +7,7 @@ import pytest
 
 import rods
 import withe
+from cases import measured
 from convergence import assert_order
 
 
@@ -55,6 +56,7 @@ def love(natural, held, bend=1.0, twist=0.8):
     return force, (bend * k * (k - k0) + twist * t * (t - t0)) / s
 
 
+@pytest.mark.case("statics", "Wrench of a clamped helix", source="Love's helix")
 @pytest.mark.parametrize(
     ("natural", "held"),
     [((8.0, 3.0), (7.5, 3.5)), ((8.0, 3.0), (8.3, 2.6)), ((8.0, -3.0), (7.5, -2.5)), ((5.0, 0.0), (5.0, 0.7))],
@@ -67,6 +69,7 @@ def test_wrench_of_a_clamped_helix_converges_to_loves_at_second_order(natural, h
         wrench, shift = clamped_helix(natural, held, 1.0, edges)
         errors.append(np.linalg.norm(wrench - exact))
         shifts.append(shift)
+    measured(errors[-1] / max(abs(force), abs(moment)))
     assert_order(errors)
     assert shifts[-1] < 1e-5
     assert errors[-1] < 2e-2 * max(abs(force), abs(moment))
@@ -100,6 +103,7 @@ def tip_at_rest(bending="angle", **options):
     return simulation.positions(arm)[-1]
 
 
+@pytest.mark.case("statics", "Tip of a soft helix at rest", source="a public rod code")
 def test_soft_helix_held_by_its_first_edge_comes_to_rest_where_published_code_has_it():
     _, arm = soft_helix()
     assert arm.nodes == 106

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import withe
+from cases import measured
 from impacts import CONSERVING, Impact, draw, losses, run
 
 IMPACTS = [draw(number) for number in range(30)]
@@ -27,6 +28,7 @@ def test_an_impact_gives_back_no_more_than_it_took_and_leaves_what_slides(impact
         assert outcome.unbooked < 1e-6
 
 
+@pytest.mark.case("contact", "Speed after drawn impacts, restitution 0.3 to 0.9", source="Newton's restitution")
 @pytest.mark.parametrize("integrator", CONSERVING)
 @pytest.mark.parametrize("impact", [i for i in IMPACTS if i.even], ids=lambda i: f"{i.number}-{i.kind}")
 def test_surfaces_part_at_the_speed_that_restitution_says(impact: Impact, integrator: Any) -> None:
@@ -35,10 +37,12 @@ def test_surfaces_part_at_the_speed_that_restitution_says(impact: Impact, integr
         assert outcome.given_back == pytest.approx(restitution, rel=0.01)
 
 
+@pytest.mark.case("contact", "Energy lost in elastic impacts of rods", source="conservation")
 @pytest.mark.parametrize(("number", "most"), [(4, 1e-7), (13, 1e-7), (7, 2e-3)])  # crossed, crossed, tilted: at an end
 def test_elastic_impacts_of_rods_lose_nothing_at_any_step(number: int, most: float) -> None:
     lost = losses(draw(number), "energy_momentum", [1.0, 0.3, 0.1, 0.03])
     print(f"impact {number}:", lost)
+    measured(lost)
     assert np.abs(lost).max() < most
     assert abs(lost[-1]) < 1e-6
 
@@ -122,6 +126,7 @@ def test_what_grazes_within_a_step_meets(kind, offset, integrator):
     assert abs(grazed(kind, 0.0105, 1e-3, integrator)) < 1e-9
 
 
+@pytest.mark.case("contact", "Direction after an impact off centre", source="line of centres")
 @pytest.mark.parametrize("integrator", CONSERVING)
 @pytest.mark.parametrize("speed", [0.3, 1.0, 10.0])
 @pytest.mark.parametrize("off", [0.2, 0.6, 0.9])
@@ -146,6 +151,7 @@ def test_rods_that_meet_off_centre_part_along_the_line_of_their_centres(
     simulation.run(0.05 / speed, progress=False)
     velocity = simulation.velocities(hit).mean(axis=0)
     angle = np.degrees(np.arctan2(-velocity[1], -velocity[2]))
+    measured(angle - np.degrees(np.arcsin(off)), "degrees")
     assert angle == pytest.approx(np.degrees(np.arcsin(off)), abs=2.5)
     assert np.linalg.norm(velocity) == pytest.approx(speed * np.sqrt(1.0 - off**2), abs=0.04 * speed)
     assert simulation.energy().total == pytest.approx(energy, rel=2e-3)

@@ -7,6 +7,7 @@ import pytest
 
 import rods
 import withe
+from cases import measured
 from convergence import assert_order_at_least
 
 
@@ -80,6 +81,7 @@ def test_loads_where_rods_are_joined_in_a_row_act_as_on_one_rod(parts, name, kin
     np.testing.assert_allclose(half_way(8, put, parts, name), half_way(8, put, 1, name), atol=1e-9)
 
 
+@pytest.mark.case("statics", "Deflection by a moment in the middle of a beam", source="M h (L - h / 2) / EI")
 def test_a_moment_half_way_bends_and_twists_as_beams_do():
     """M h (L - h / 2) of deflection, T h of twist, for unit stiffnesses, at second order."""
     errors = []
@@ -91,6 +93,7 @@ def test_a_moment_half_way_bends_and_twists_as_beams_do():
             for M in (0.0, 1e-3)
         )
         assert np.linalg.norm(np.cross(still[1], turned[1])) == pytest.approx(0.5e-3, rel=1e-6)
+    measured(errors[-1])
     assert abs(errors[-1]) < 3e-4
     assert_order_at_least(errors, 2.0)
 
@@ -139,6 +142,9 @@ def test_t_joint_under_a_large_load_converges_to_the_whole_beam_at_second_order(
     assert np.all(np.log2(np.divide(errors[:-1], errors[1:])) > 1.8)
 
 
+@pytest.mark.case(
+    "statics", "Joint that bends every pair of edges", source="closed form for [Choi, dissertation, 6.2.2]"
+)
 def test_joint_of_the_source_is_stiffer_where_three_rods_meet():
     """[Choi, dissertation 6.2.2] bends every pair of edges: two right angles in series stand beside the straight pair.
 
@@ -179,10 +185,12 @@ def square_frame(edges, pull):
     return simulation.positions(sides[0])[0, 2] - simulation.positions(sides[1])[-1, 2] - np.sqrt(2.0)
 
 
+@pytest.mark.case("statics", "Closed frame of four rigid joints", source="P a^3 / (24 EI)")
 def test_closed_frame_of_four_rigid_joints_converges_to_beam_theory_at_third_order():
     """Each side bends with both ends held: the diagonal grows by P a^3 / (24 B)."""
     pull = 1e-3
     errors = [square_frame(n, pull) / (pull / 24.0) - 1.0 for n in (8, 16, 32)]
+    measured(errors[-1])
     assert_order_at_least(errors, order=3.0)
     assert abs(errors[-1]) < 1e-4
 
@@ -221,6 +229,7 @@ def test_revolute_joint_holds_the_other_axes():
     assert simulation.reaction(stub.start).moment[2] == pytest.approx(-0.6 * push, rel=2e-3)
 
 
+@pytest.mark.case("dynamics", "Link that swings on a revolute joint", source="T = 2 pi sqrt(2 L / (3 g))")
 def test_revolute_joint_lets_a_link_swing_like_a_pendulum():
     """A stiff uniform link: T = 2 pi sqrt(2 L / 3 g), and its bearing turns through any angle."""
     scene = withe.Scene()
@@ -237,10 +246,12 @@ def test_revolute_joint_lets_a_link_swing_like_a_pendulum():
         simulation.step()
         heights.append(simulation.positions(link)[-1, 0])
     # Back where it was let go after one period, through the lowest point after a quarter.
+    measured(heights[-1] / (0.5 * np.sin(angle)) - 1.0)
     assert heights[-1] == pytest.approx(0.5 * np.sin(angle), rel=2e-3)
     assert abs(heights[49]) < 0.02 * 0.5 * angle
 
 
+@pytest.mark.case("statics", "Two beams that are hinged over the middle support", source="P L^3 / (48 EI)")
 def test_pinned_joint_carries_no_moment():
     """Two beams in line on three supports, hinged over the middle one: each carries its load alone."""
     scene = rods.weightless()
@@ -262,6 +273,7 @@ def test_pinned_joint_carries_no_moment():
     assert simulation.reaction(right.end).force[2] == pytest.approx(0.0, abs=1e-9 * load)
 
 
+@pytest.mark.case("statics", "Far reaction of a continuous beam", source="-3 P / 32")
 def test_rigid_joint_over_the_same_supports_carries_the_moment():
     """Continuous over the middle support: the far end is pulled down, by 3 P / 32."""
     scene = rods.weightless()
@@ -279,6 +291,7 @@ def test_rigid_joint_over_the_same_supports_carries_the_moment():
     assert simulation.reaction(right.end).force[2] == pytest.approx(-3.0 / 32.0 * load, rel=2e-3)
 
 
+@pytest.mark.case("statics", "Axial forces of a truss of three links", source="statics of a truss")
 def test_ring_of_three_pinned_links_is_a_truss():
     """A triangle with hinged corners carries a load at its top by axial forces alone."""
     scene = rods.weightless()

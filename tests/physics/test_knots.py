@@ -71,6 +71,7 @@ def pulled(points: FloatArray, radius: float, by: float, **contact: Any) -> with
     return simulation
 
 
+@pytest.mark.case("knots", "Determinant of overhand knots with 1 to 4 turns", source="torus knots, 2 n + 1", exact=True)
 @pytest.mark.parametrize("n", [1, 2, 3, 4])
 def test_overhand_knots_are_torus_knots_and_do_not_touch_themselves(n: int) -> None:
     points = withe.knots.overhand_knot(n, length=1.0, radius=1.6e-3, shortening=0.6)
@@ -83,6 +84,7 @@ def test_overhand_knots_are_torus_knots_and_do_not_touch_themselves(n: int) -> N
     assert len(scene.build().contacts()) == 0
 
 
+@pytest.mark.case("knots", "Signed crossings of reef and granny knots", source="0 and 6", exact=True)
 @pytest.mark.parametrize("tails", ["up", "sideways"])
 def test_reef_and_granny_differ_by_their_crossings(tails: Literal["up", "sideways"]) -> None:
     view = (0.02, 1.0, 0.01)
@@ -112,6 +114,7 @@ def test_a_pulled_knot_stays_the_knot_that_it_is() -> None:
     assert contacts["gap"].min() > -0.05 * 1.6e-3
 
 
+@pytest.mark.case("knots", "Writhe of a polygon", source="mean of signed crossings over projections")
 def test_writhe_of_a_polygon_is_the_mean_of_what_its_diagrams_show() -> None:
     points = withe.knots.overhand_knot(1, nodes=101)
     rng = np.random.default_rng(0)
@@ -121,6 +124,9 @@ def test_writhe_of_a_polygon_is_the_mean_of_what_its_diagrams_show() -> None:
     assert writhe(points) == pytest.approx(np.mean(shown), abs=3.0 * float(np.std(shown)) / 20.0)
 
 
+@pytest.mark.case(
+    "knots", "Link of a rod that is wound into a plectoneme", source="turns of its end [Calugareanu 1959, White 1969]"
+)
 @pytest.mark.parametrize("time_step", [2e-3, 5e-3, 2e-2])
 def test_link_of_a_held_rod_is_kept_while_it_is_wound_into_a_plectoneme(time_step: float) -> None:
     turns, length = 5.0, 0.4

@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 import withe
+from cases import measured
 
 GRAVITY = 9.81
 
 
+@pytest.mark.case("contact", "Period of a plank that rocks on a cylinder", source="rigid body [Routh]")
 @pytest.mark.parametrize("integrator", ["energy_momentum", pytest.param("implicit_midpoint", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("radius", [4e-3, 8e-3])
 @pytest.mark.parametrize("tilt", [0.03, 0.05])
@@ -61,16 +63,21 @@ def settled_pile(radius: float, modulus: float, between: float) -> float:
     return (top - simulation.positions(logs[2])[:, 2].mean()) / radius
 
 
+@pytest.mark.case("contact", "Friction that holds a pile of three logs (bracket)", source="tan(15 degrees), statics")
 @pytest.mark.parametrize(("radius", "modulus"), [(0.01, 1e9), (0.02, 1e8), (5e-3, 1e10)])
 def test_a_pile_of_three_logs_stands_where_friction_holds_it(radius: float, modulus: float) -> None:
     """Each lower log is in balance under two forces, 15 degrees off the normals [statics]: mu = tan(15 deg)."""
     least = np.tan(np.radians(15.0))
     down = [settled_pile(radius, modulus, share * least) for share in (0.97, 1.03)]
     print("logs:", radius, modulus, down)
+    measured(0.03)
     assert down[0] > 0.2
     assert abs(down[1]) < 0.01
 
 
+@pytest.mark.case(
+    "contact", "Angle at which a cylinder leaves another", source="cos a = 2/3 or 4/7 of its start [Routh]"
+)
 @pytest.mark.parametrize("time_step", [2e-3, 5e-4])
 @pytest.mark.parametrize(("friction", "leaves"), [(0.0, 2.0 / 3.0), (3.0, 4.0 / 7.0)])
 def test_a_cylinder_leaves_another_where_nothing_presses_it_any_more(

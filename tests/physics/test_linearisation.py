@@ -10,6 +10,7 @@ from scipy.special import jn_zeros
 import rods
 import theory
 import withe
+from cases import measured
 from convergence import assert_order
 
 STEEL = withe.Material(youngs_modulus=2e11, poisson_ratio=0.3, density=7850.0)
@@ -29,6 +30,7 @@ def steel_rod(slenderness, nodes, direction=(1.0, 0.0, 0.0), held=True, planar=N
     return lambda count: scene.build(planar=planar).linearise().frequencies(count) * 2.0 * np.pi / unit
 
 
+@pytest.mark.case("dynamics", "Frequencies of cantilevers, L / h = 100 to 1e5", source="Euler-Bernoulli beam")
 @pytest.mark.parametrize("slenderness", [1e2, 1e4, 1e5])
 @pytest.mark.parametrize("direction", [(1.0, 0.0, 0.0), (1.0, 0.7, 0.0)])
 def test_slender_rods_have_the_frequencies_of_thick_ones(slenderness, direction):
@@ -41,6 +43,7 @@ def test_fine_rods_keep_their_digits():
     np.testing.assert_allclose(steel_rod(1e3, 5001)(2), theory.CANTILEVER_ROOTS[0] ** 2, rtol=2e-7)
 
 
+@pytest.mark.case("dynamics", "Frequency of a free beam, L / h = 1e3 and 1e5", source="Euler-Bernoulli beam")
 @pytest.mark.parametrize("slenderness", [1e3, 1e5])
 def test_a_free_rod_has_six_motions_without_frequency_and_then_those_of_a_free_beam(slenderness):
     found = steel_rod(slenderness, 201, (1.0, 0.7, 0.0), held=False, planar=False)(8)
@@ -99,6 +102,7 @@ def test_a_hanging_cable_swings_with_the_zeros_of_a_bessel_function():
     np.testing.assert_allclose(found, jn_zeros(0, 3) / (4.0 * np.pi) * np.sqrt(9.81 / length), rtol=5e-4)
 
 
+@pytest.mark.case("stability", "Frequency and growth rate of a hinged column", source="w^2 = pi^4 (1 - P / pi^2)")
 @pytest.mark.parametrize("load", [6.0, 14.0])
 def test_a_hinged_column_swings_below_eulers_load_and_diverges_above(load):
     """w^2 = pi^4 (1 - P / pi^2). At a hinge a follower force does as a dead one, which buckling would leave at once."""
@@ -138,11 +142,13 @@ def onset(says, low, high):
     return low
 
 
+@pytest.mark.case("stability", "Flutter load of Beck's column", source="20.0510 EI / L^2 [Beck 1952]")
 def test_becks_column_flutters_from_twenty_on():
     """[Beck 1952]: P L^2 / B = 20.0510."""
     load = theory.flutter_load()
     assert load == pytest.approx(20.0510, abs=5e-5)
     errors = [onset(lambda p, n=n: becks_column(p, n)[0].stability, 15.0, 25.0) / load - 1.0 for n in (11, 21, 41)]
+    measured(errors[-1])
     assert_order(np.array(errors), order=2.0, slack=0.2)
     assert abs(errors[-1]) < 1.5e-3
 
@@ -170,6 +176,9 @@ def test_modes_that_flutter_solve_the_equations_of_motion():
     np.testing.assert_allclose(flexible, moves, atol=1e-5)
 
 
+@pytest.mark.case(
+    "stability", "Flutter load of Pflüger's column, three tip masses", source="characteristic equation [Pflüger 1955]"
+)
 @pytest.mark.parametrize(("mass", "load"), [(0.1, 17.595), (1.0, 16.212), (2.0, 16.717)])
 def test_a_mass_at_the_tip_makes_becks_column_flutter_earlier(mass, load):
     """[Pflueger 1955]: P L^2 / B with so many of the column's masses, by the characteristic equation."""
@@ -177,6 +186,7 @@ def test_a_mass_at_the_tip_makes_becks_column_flutter_earlier(mass, load):
     assert exact == pytest.approx(load, abs=5e-4)
     found = [onset(lambda p, n=n: becks_column(p, n, mass=mass)[0].stability, 10.0, 25.0) for n in (11, 21, 41)]
     errors = np.array(found) / exact - 1.0
+    measured(errors[-1])
     assert_order(errors, order=2.0, slack=0.2)
     assert abs(errors[-1]) < 2e-3
 
@@ -195,9 +205,11 @@ def twisted_shaft(moment, nodes, ends="hinged"):
     return simulation.equilibrium(), simulation.linearise()
 
 
+@pytest.mark.case("stability", "Moment at which a hinged shaft diverges", source="2 pi EI / L [Greenhill 1883]")
 def test_a_hinged_shaft_diverges_at_two_pi_of_moment():
     """[Greenhill 1883]: M L / B = 2 pi."""
     found = [onset(lambda m, n=n: twisted_shaft(m, n)[0].stability, 5.0, 7.0) for n in (21, 41, 81)]
+    measured(found[-1] / (2.0 * np.pi) - 1.0)
     assert_order(np.array(found) / (2.0 * np.pi) - 1.0, order=2.0, slack=0.15)
     assert twisted_shaft(7.0, 21)[0].stability == "diverges"
 

@@ -55,6 +55,7 @@ def test_momenta_are_what_kinetic_energy_changes_by_with_a_common_motion(planar)
         assert 0.5 * (kinetic(common) - kinetic(-common)) == pytest.approx(expected, abs=1e-11)
 
 
+@pytest.mark.case("dynamics", "Angular momentum of a rod that turns", source="m L^2 w / 12")
 def test_a_straight_rod_that_turns_carries_a_twelfth_of_its_mass_times_its_length_squared():
     scene = rods.weightless()
     rod = scene.add_rod(

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import withe
+from cases import measured
 
 RUBBER = withe.Material(youngs_modulus=1e6, poisson_ratio=0.5, density=1200.0)
 RADIUS = 5e-3
@@ -19,6 +20,7 @@ def lying(friction: float = 0.0, restitution: float = 1.0) -> tuple[withe.Scene,
     return scene, rod, scene.add_floor(friction=friction, restitution=restitution, name="table")
 
 
+@pytest.mark.case("contact", "Work of a floor that lifts a rod", source="m g h")
 @pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum"])
 def test_a_floor_that_lifts_a_rod_works_as_much_as_the_rod_gains(integrator: Any) -> None:
     scene, rod, table = lying(restitution=0.0)  # or the start and the stop of the lift would throw it
@@ -30,12 +32,14 @@ def test_a_floor_that_lifts_a_rod_works_as_much_as_the_rod_gains(integrator: Any
     end = simulation.energy()
     assert simulation.positions(rod)[:, 2].mean() == pytest.approx(0.1 + RADIUS, abs=0.1 * RADIUS)
     weight = 1200.0 * np.pi * RADIUS**2 * 0.3 * 9.81
+    measured((end.gravity - start.gravity) / (0.1 * weight) - 1.0)
     assert end.gravity - start.gravity == pytest.approx(0.1 * weight, rel=0.01)
     work, lost = end.work - start.work, end.dissipated - start.dissipated
     assert lost > 0.0
     assert end.total - start.total == pytest.approx(work - lost, rel=1e-6)
 
 
+@pytest.mark.case("contact", "Speed of a rod on a belt", source="mu g t, up to the belt's speed")
 @pytest.mark.parametrize("friction_model", ["implicit", "lagged", "anchored", "semi_explicit"])
 def test_a_belt_drags_a_rod_to_its_own_speed(friction_model: Any) -> None:
     scene, _, table = lying(friction=0.4)
@@ -48,6 +52,7 @@ def test_a_belt_drags_a_rod_to_its_own_speed(friction_model: Any) -> None:
         simulation.step(50)
         v = simulation.velocities()[:, 0]
         speed = 0.5 * (v[1:] + v[:-1]).mean()
+        measured(speed / min(0.4 * 9.81 * 0.05 * steps, 0.5) - 1.0)
         assert speed == pytest.approx(min(0.4 * 9.81 * 0.05 * steps, 0.5), rel=2e-3)
     end = simulation.energy()
     kinetic = 0.5 * 1200.0 * np.pi * RADIUS**2 * 0.3 * 0.5**2

@@ -25,6 +25,7 @@ def muscle(integrator, planar, *, held=True, mass=0.0, **build):
     return scene.build(integrator=integrator, planar=planar, **options), rod, np.array(direction)
 
 
+@pytest.mark.case("actuation", "Force of a held rod whose natural length changes", source="EA e")
 @pytest.mark.parametrize("planar", [True, False])
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 @pytest.mark.parametrize("strain", [0.01, -0.01])
@@ -54,6 +55,7 @@ def test_a_free_rod_becomes_as_long_as_it_is_by_nature(planar):
     assert simulation.positions(rod)[-1] == pytest.approx(along * stretch.mean(), rel=1e-10)
 
 
+@pytest.mark.case("actuation", "Work of a muscle that lifts a weight", source="m g e L and energy of stretching")
 def test_a_muscle_lifts_a_weight_by_its_strain_and_does_the_work_of_it():
     # In a quasi-static ramp of the strain s the force W stays, and so does the stretching: the work is W L s.
     scene = withe.Scene(gravity=(0, 0, 0))
@@ -74,6 +76,7 @@ def test_a_muscle_lifts_a_weight_by_its_strain_and_does_the_work_of_it():
     assert after.stretch == pytest.approx(before.stretch, rel=1e-9)
 
 
+@pytest.mark.case("actuation", "Overshoot of a muscle with a mass at its end", source="2 e L [Rao, section 9.4]")
 @pytest.mark.parametrize("planar", [True, False])
 @pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum", "fourth_order", "verlet"])
 def test_a_sudden_natural_length_swings_to_twice_itself(integrator, planar):

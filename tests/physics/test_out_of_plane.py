@@ -8,6 +8,7 @@ import pytest
 import rods
 import theory
 import withe
+from cases import measured
 
 STRONG = 400.0  # stiffness in the plane of x and z, over the one across
 
@@ -38,6 +39,9 @@ CASES = {
 }
 
 
+@pytest.mark.case(
+    "stability", "Sideways buckling that a planar scene warns of (bracket)", source="[Michell 1899], [Euler 1744]"
+)
 @pytest.mark.parametrize("case", CASES)
 def test_an_equilibrium_warns_from_the_load_on_at_which_it_would_buckle_sideways(case):
     scene, critical = CASES[case]
@@ -48,6 +52,7 @@ def test_an_equilibrium_warns_from_the_load_on_at_which_it_would_buckle_sideways
     above, rod = scene(1.005 * critical)
     with pytest.warns(withe.OutOfPlaneWarning, match=r"Use build\(planar=False\) to allow this"):
         found = above.equilibrium()
+    measured(0.005)
     assert not found.stable
     assert found.stability == "diverges"
     assert above.plan.planar

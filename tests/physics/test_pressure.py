@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import withe
+from cases import measured, measured_order
 
 RADIUS, BENDING, STRETCHING = 0.1, 1e-4, 1e4  # [m], [N m^2], [N]: strains at buckling of 3e-5
 CLASSICAL = BENDING / RADIUS**3
@@ -55,11 +56,16 @@ def dead(scene, rod, points):
     return lambda simulation, pressure: None  # it has no Jacobian, so that only the ring's compression tells
 
 
+@pytest.mark.case(
+    "stability", "Critical pressure of a ring", source="3 or 4 EI / R^3 [Levy 1884; Timoshenko and Gere 1961]"
+)
 @pytest.mark.parametrize(("load", "expected"), [(following, 3.0), (dead, 4.0)])
 def test_a_ring_buckles_where_theory_says_at_second_order(load, expected):
     errors = [critical(nodes, load) / expected - 1.0 for nodes in (24, 48, 96)]
+    measured(errors[-1])
     assert abs(errors[-1]) < 3e-3
     orders = np.log2(np.abs(np.array(errors[:-1]) / errors[1:]))
+    measured_order(orders)
     assert orders.min() > 1.8
 
 
@@ -76,6 +82,7 @@ def test_a_ring_collapses_above_its_pressure_and_not_below():
         assert bool(spread > 0.1 * RADIUS) is buckles
 
 
+@pytest.mark.case("actuation", "Work of a pressure", source="p times the swept area")
 @pytest.mark.parametrize("planar", [True, False])
 @pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum"])
 def test_the_work_of_a_pressure_is_the_area_that_it_takes(planar, integrator):
@@ -92,6 +99,7 @@ def test_the_work_of_a_pressure_is_the_area_that_it_takes(planar, integrator):
     before, start = area(), simulation.energy()
     simulation.step(100)
     now = simulation.energy()
+    measured(now.loads / (pressure * (area() - before)) - 1.0)
     assert now.loads == pytest.approx(pressure * (area() - before), rel=1e-9)
     assert abs(now.total - start.total) < 1e-3 * start.kinetic
     assert np.abs(simulation.velocities(rod).mean(axis=0)).max() < 1e-9  # a closed rod is not pushed away

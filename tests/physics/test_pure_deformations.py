@@ -7,9 +7,11 @@ import pytest
 
 import rods
 import withe
+from cases import measured
 from convergence import assert_order
 
 
+@pytest.mark.case("statics", "Gap of a rod that an end moment bends to a circle", source="M = 2 pi EI / L")
 @pytest.mark.parametrize("planar", [None, False], ids=["planar", "spatial"])
 def test_end_moment_closes_a_circle_at_second_order(planar):
     gaps = []
@@ -25,6 +27,7 @@ def test_end_moment_closes_a_circle_at_second_order(planar):
         positions = simulation.positions(rod)
         gaps.append(np.linalg.norm(positions[-1] - positions[0]))
         assert np.ptp(positions[:, 2]) == pytest.approx(1.0 / np.pi, rel=2e-2)
+    measured(gaps[-1], "L")
     assert_order(gaps)
 
 
@@ -39,6 +42,7 @@ def test_end_moment_at_once_finds_the_same_circle(planar):
     np.testing.assert_allclose(simulation.positions(rod)[-1], 0.0, atol=5e-3)
 
 
+@pytest.mark.case("actuation", "Circle by natural curvature", source="k = 2 pi / L")
 @pytest.mark.parametrize("component", [0, 1])
 def test_natural_curvature_closes_a_circle_to_rounding(component):
     scene = rods.weightless()
@@ -55,6 +59,7 @@ def test_natural_curvature_closes_a_circle_to_rounding(component):
     # The rod bends towards the director: d1 is +y, d2 = t x d1 is +z.
     assert positions[:, 1 + component].max() == pytest.approx(1.0 / np.pi, rel=1e-2)
     assert positions[:, 1 + component].min() > -1e-2
+    measured(simulation.curvatures(rod)[:, component] / (2.0 * np.pi) - 1.0)
     np.testing.assert_allclose(simulation.curvatures(rod)[:, component], 2.0 * np.pi, rtol=1e-9)
     assert simulation.energy().total == pytest.approx(0.0, abs=1e-12)
 
@@ -68,6 +73,7 @@ def round_bar(**more):
     return scene, bar
 
 
+@pytest.mark.case("statics", "Stretch of a bar", source="F L / EA")
 @pytest.mark.parametrize("planar", [None, False], ids=["planar", "spatial"])
 def test_pulled_bar_stretches_by_force_times_length_over_stiffness(planar):
     scene, bar = round_bar()
@@ -86,6 +92,7 @@ def angle_about_x(directors):
     return np.arctan2(directors[:, 0, 2], directors[:, 0, 1])
 
 
+@pytest.mark.case("statics", "Twist of a bar", source="M L / GJ")
 def test_torque_at_the_end_turns_it_by_torque_times_length_over_stiffness():
     scene, bar = round_bar()
     wall = scene.clamp(bar.start)
@@ -157,6 +164,7 @@ def test_a_round_rod_that_is_twisted_bends_no_more(degrees):
     assert said == []
 
 
+@pytest.mark.case("statics", "Rectangular section bent over either side", source="F L^3 / (3 EI)")
 @pytest.mark.parametrize(("push", "moment"), [((0, 0, 1), "height"), ((0, 1, 0), "width")])
 def test_rectangle_bends_over_the_side_that_is_pushed(push, moment):
     width, height = 2e-2, 1e-3
@@ -181,6 +189,7 @@ def test_rectangle_bends_over_the_side_that_is_pushed(push, moment):
     assert deflection == pytest.approx(load * 0.2**3 / (3.0 * 2e9 * inertia), rel=1e-4)
 
 
+@pytest.mark.case("statics", "Strain of a bar with varying stiffness", source="F / EA(x)")
 def test_tapered_rod_stretches_edge_by_edge():
     scene = rods.weightless()
     moduli = np.linspace(1.0, 2.0, 10)

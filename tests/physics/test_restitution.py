@@ -60,6 +60,7 @@ def test_backward_euler_loses_what_its_steps_do_not_resolve_and_tends_to_the_ela
     assert heights[2] > 0.75
 
 
+@pytest.mark.case("contact", "Rebound height, restitution 0.3 and 0.7", source="e^2 h")
 @pytest.mark.parametrize("integrator", CONSERVING)
 @pytest.mark.parametrize("restitution", [0.3, 0.7])
 def test_restitution_is_what_it_says_at_any_step(integrator: Any, restitution: float) -> None:
@@ -69,6 +70,7 @@ def test_restitution_is_what_it_says_at_any_step(integrator: Any, restitution: f
         assert reached == pytest.approx(restitution**2, abs=0.02)
 
 
+@pytest.mark.case("contact", "Rebound of a deep contact", source="v1^2 = e^2 v0^2 - (1 - e^2) 2 g p [Stronge 1990]")
 def test_restitution_is_of_the_work_that_presses_surfaces_together() -> None:
     """Weight works over the depth p too: v1^2 = e^2 v0^2 - (1 - e^2) 2 g p [Stronge 1990]."""
     for radius, height, restitution in ((5e-3, 2e-3, 0.5), (0.02, 2e-3, 0.5), (0.02, 2e-3, 0.8)):
@@ -133,6 +135,7 @@ def speeds(simulation: withe.Simulation) -> tuple[float, float]:
     )
 
 
+@pytest.mark.case("contact", "Rods that meet head-on", source="exchange of speeds")
 @pytest.mark.parametrize("time_step", [5e-3, 5e-4, 5e-5])
 def test_rods_that_meet_head_on_exchange_their_speeds(time_step: float) -> None:
     simulation = head_on(time_step)

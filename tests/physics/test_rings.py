@@ -8,6 +8,7 @@ from scipy.optimize import brentq
 
 import rods
 import withe
+from cases import measured
 from convergence import assert_order
 
 TIGHT = {"solver": withe.Solver(step_tolerance=1e-13, force_tolerance=1e-13)}
@@ -90,8 +91,10 @@ def overhang(edges):
     return simulation.positions(rod)[-1, 2] / (load * a**2 * (a + b) / 3.0)
 
 
+@pytest.mark.case("statics", "Overhang of a rod in two rings", source="beam on two supports")
 def test_a_rod_in_two_rings_is_a_beam_on_two_supports():
     errors = [overhang(edges) - 1.0 for edges in (20, 40, 80, 160)]
+    measured(errors[-1])
     assert_order(errors, 2.0)
     assert abs(errors[-1]) < 2e-4
 
@@ -149,6 +152,7 @@ def bent(friction, edges=120):
     return scene, rod, outer, middle
 
 
+@pytest.mark.case("statics", "Forces of three rings that bend a rod", source="beam on three supports")
 def test_three_rings_bend_a_rod_as_a_beam():
     scene, rod, outer, middle = bent(0.0)
     scene.pin(rod.end, free=(0, 0, 1))
@@ -160,6 +164,7 @@ def test_three_rings_bend_a_rod_as_a_beam():
     assert [simulation.passage(ring).press for ring in outer] == pytest.approx([0.5 * press] * 2, rel=5e-3)
 
 
+@pytest.mark.case("contact", "Pull through a ring with friction", source="mu N")
 def test_a_rod_is_drawn_through_a_ring_by_friction_times_what_presses():
     scene, rod, _, middle = bent(0.3)
     end = scene.pin(rod.end, free=(0, 0, 1))
@@ -171,11 +176,13 @@ def test_a_rod_is_drawn_through_a_ring_by_friction_times_what_presses():
         simulation.move(end, (1.0 + way, 0.0, 0.0))
         simulation.equilibrium()
         passage = simulation.passage(middle)
+        measured(passage.pull / (0.3 * passage.press) - 1.0)
         assert passage.pull == pytest.approx(0.3 * passage.press, rel=1e-8)
         assert passage.at == pytest.approx(0.5 - way, abs=2e-3)
         assert simulation.reaction(end).force[0] == pytest.approx(passage.pull, rel=2e-3)
 
 
+@pytest.mark.case("contact", "Distance in which a ring stops a rod", source="m v^2 / (2 mu N)")
 def test_friction_stops_a_rod_that_slides():
     scene, rod, _, middle = bent(0.2)
     simulation = scene.build(integrator="backward_euler", time_step=2e-3, planar=True)

@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 import withe
+from cases import measured
 from rods import ring_on_slope
 
 G = 9.81
@@ -57,11 +58,13 @@ def unevenness(degrees: float) -> float:
     return float(0.5 * G * (1.0 / (0.5 * gain) + 1.0 / (1.5 * gain)) / gain)
 
 
+@pytest.mark.case("contact", "Ring of 12 to 48 edges that rolls down a slope", source="hoop, g sin a / 2")
 @pytest.mark.parametrize("degrees", [1.0, 3.0, 10.0])
 def test_a_ring_of_few_edges_rolls_down_a_slope_as_a_hoop(degrees: float) -> None:
     """On its edges one of 24 stands still on 3 degrees, and is 13 to 20 % too slow on 10."""
     errors = [acceleration(degrees, n) - 1.0 for n in (12, 24, 48)]
     print("rolling ring:", degrees, errors)
+    measured(errors)
     for n, error in zip((12, 24, 48), errors, strict=True):
         assert abs(error) < 0.004 + out_of_round(n) * unevenness(degrees)
 
@@ -172,6 +175,7 @@ def test_a_cable_over_a_rail_holds_below_its_limit(edges: int) -> None:
     assert moved < 1e-4  # past its limit it slides by centimetres
 
 
+@pytest.mark.case("contact", "Speed of a cable over a rail, 10 % past its limit", source="capstan equation")
 def test_a_cable_pulled_past_its_limit_over_a_rail_slides_nearly_as_theory_has_it() -> None:
     """At a tenth past it an error of the tension ratio counts ten times."""
     errors = []
@@ -180,6 +184,7 @@ def test_a_cable_pulled_past_its_limit_over_a_rail_slides_nearly_as_theory_has_i
         simulation.step(200)
         errors.append(-simulation.velocities(cable)[-1, 2] / sliding_speed(0.1, straight, 0.1) - 1.0)
     print("cable past its limit:", errors)
+    measured(errors[1:])
     assert abs(errors[0]) < 0.3
     assert np.abs(errors[1:]).max() < 0.06
 
@@ -233,6 +238,7 @@ def cylinder(degrees: float = 0.0, friction_model: Any = "anchored", **options: 
     return scene.build(**options), rod
 
 
+@pytest.mark.case("contact", "Cylinder that rolls by 2 rad a step", source="conservation")
 @pytest.mark.parametrize("friction_model", ["anchored", "implicit", "lagged"])
 @pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum"])
 def test_a_cylinder_that_turns_far_in_a_step_rolls_on_as_fast_as_it_came(integrator: Any, friction_model: Any) -> None:

@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 import withe
+from cases import measured
 from rods import ring_on_slope
 
 G, THICK, LENGTH = 9.81, 5e-3, 0.2  # [m/s^2], [m]
@@ -51,6 +52,9 @@ def mean_by_mass(values: NDArray[Any]) -> NDArray[Any]:
 SCHEMES = ("backward_euler", "implicit_midpoint", "energy_momentum")
 
 
+@pytest.mark.case(
+    "contact", "Rod that rolls down a slope with rolling friction", source="g (sin a - c cos a) / (1 + I / (m r^2))"
+)
 @pytest.mark.parametrize("model", ["anchored", "implicit"])
 @pytest.mark.parametrize("integrator", SCHEMES)
 def test_a_rod_rolls_down_a_slope_against_its_couple(integrator: Any, model: str) -> None:
@@ -64,6 +68,7 @@ def test_a_rod_rolls_down_a_slope_against_its_couple(integrator: Any, model: str
     angle = np.radians(6.0)
     expected = G * (np.sin(angle) - rolling * np.cos(angle)) / (1.0 + CYLINDER)
     print("rolls:", integrator, model, gained / expected - 1.0)
+    measured(gained / expected - 1.0)
     assert abs(gained / expected - 1.0) < 5e-3
 
 
@@ -85,6 +90,7 @@ def test_a_rod_is_held_on_a_slope_up_to_its_coefficient(turn: float, share: floa
         assert moved > THICK
 
 
+@pytest.mark.case("contact", "Distance in which rolling friction stops a rod", source="v^2 / (2 a)")
 def test_a_rolling_rod_comes_to_rest_and_stays() -> None:
     """v0^2 = 2 a s, with a = c g / (1 + I / m r^2)."""
     rolling, speed = 0.02, 0.1
@@ -96,6 +102,7 @@ def test_a_rolling_rod_comes_to_rest_and_stays() -> None:
     way = mean_by_mass(simulation.positions(rod)) @ down - start
     expected = 0.5 * speed**2 * (1.0 + CYLINDER) / (rolling * G)
     print("stops:", way / expected - 1.0)
+    measured(way / expected - 1.0)
     assert abs(way / expected - 1.0) < 0.02
     rest = simulation.positions(rod)
     simulation.run(1.0, progress=False)
@@ -218,6 +225,7 @@ def test_what_turns_with_a_drum_does_not_roll_on_it(integrator: Any, planar: boo
     assert abs(rolled - free) < 0.01 * 0.1 * scale
 
 
+@pytest.mark.case("contact", "Moment between a drum and a rod", source="(mu + mu_r) r N or (mu - mu_r) r N")
 @pytest.mark.parametrize(("turning", "nodes"), [("rod", 11), ("drum", 11), ("drum", 21)])
 def test_a_drum_and_a_rod_resist_turning_against_each_other(turning: str, nodes: int) -> None:
     """Clamps of a rod that is pressed onto it bear (mu + mu_r) r N where the rod turns.
@@ -243,4 +251,5 @@ def test_a_drum_and_a_rod_resist_turning_against_each_other(turning: str, nodes:
     moment = sum(simulation.reaction(clamp).moment[1] for clamp in clamps)
     print("rolls on it:", turning, nodes, moment / (THICK * pressed))
     expected = slipping + rolling if turning == "rod" else slipping - rolling
+    measured(abs(moment) / (THICK * pressed) / expected - 1.0)
     assert abs(abs(moment) / (THICK * pressed) - expected) < 2e-3

@@ -6,6 +6,7 @@ from scipy.optimize import brentq
 
 import rods
 import withe
+from cases import measured
 from convergence import assert_order
 from test_damping import fitted_oscillation
 
@@ -41,6 +42,9 @@ def lengths(simulation, steps):
     return out
 
 
+@pytest.mark.case(
+    "dynamics", "Frequency of two masses on a spring with a damper", source="trapezoidal rule of the oscillator"
+)
 @pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum"])
 @pytest.mark.parametrize("share", [0.0, 0.1])
 def test_two_masses_swing_and_decay_as_the_rule_says_to_the_last_digits(integrator, share):
@@ -52,6 +56,7 @@ def test_two_masses_swing_and_decay_as_the_rule_says_to_the_last_digits(integrat
     rate = share * FREQUENCY  # c over the reduced mass, halved
     s = complex(-rate, np.sqrt(FREQUENCY**2 - rate**2))
     expected = np.log((1.0 + 0.5 * s * step) / (1.0 - 0.5 * s * step)) / step
+    measured(seen / expected.imag - 1.0)
     assert seen == pytest.approx(expected.imag, rel=1e-5)
     assert decay == pytest.approx(-expected.real, rel=1e-5, abs=1e-6 * FREQUENCY)
 
@@ -65,6 +70,7 @@ def test_damped_swings_converge_at_second_order_under_verlet():
     assert_order(np.diff(seen), slack=0.25)
 
 
+@pytest.mark.case("dynamics", "Frequencies of a beam with a spring at its tip", source="[Blevins 1979]")
 @pytest.mark.parametrize("k", [0.5, 5.0, 200.0])
 def test_frequencies_of_a_beam_with_a_spring_at_its_tip(k):
     """Clamped, B = L = m = 1: b^3 (1 + cos b cosh b) + k (sin b cosh b - cos b sinh b) = 0, w = b^2 [Blevins 1979]."""
@@ -76,6 +82,7 @@ def test_frequencies_of_a_beam_with_a_spring_at_its_tip(k):
     exact = np.array([brentq(characteristic, 1.8, 4.0), brentq(characteristic, 4.5, 7.2)]) ** 2 / (2.0 * np.pi)
     found = simulation.linearise().frequencies(8)
     for frequency in exact:
+        measured(np.abs(found - frequency).min() / frequency)
         assert np.abs(found - frequency).min() < 1e-4 * frequency
 
 
@@ -221,6 +228,7 @@ def guyed(k, edges, **more):
     return rods.sharp(scene, **more), arm, spring, post
 
 
+@pytest.mark.case("statics", "Cantilever on a spring", source="F / (3 EI / L^3 + k)")
 @pytest.mark.parametrize("planar", [None, False], ids=["planar", "spatial"])
 @pytest.mark.parametrize("k", [0.5, 3.0, 60.0])
 def test_guyed_cantilever_under_a_small_force(k, planar):
@@ -234,6 +242,7 @@ def test_guyed_cantilever_under_a_small_force(k, planar):
     np.testing.assert_allclose(pull, (0, 0, -simulation.spring_tension(spring)), atol=1e-12)
 
 
+@pytest.mark.case("statics", "Rod that hangs from a spring", source="m g / k")
 def test_a_rod_hangs_from_a_spring_by_its_weight():
     scene = withe.Scene()
     parts = {"stiffness": rods.stiffness(), "line_density": 0.2, "radius": 1e-3}
@@ -283,6 +292,7 @@ def test_very_stiff_springs_converge_to_what_rounding_leaves():
     assert simulation.statistics.rejected_steps == 0
 
 
+@pytest.mark.case("dynamics", "Longest stable Verlet step with a spring", source="2 / w")
 def test_explicit_steps_know_what_springs_allow():
     """A spring between light nodes: w^2 = k (1 / m + 1 / m) with half of a rod's mass at either."""
     simulation, _ = two_masses("verlet", 1e-5, stretch=1e-6)

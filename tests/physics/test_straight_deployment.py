@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import withe
+from cases import measured, measured_order
 from withe.deployment import StraightLine, grasp
 from withe.deployment.grasping import table
 
@@ -63,6 +64,9 @@ def drawn_poses(suspended, count, seed):
     return line, pose, rows
 
 
+@pytest.mark.case(
+    "planners", "Stability of 50 poses of a straight line", source="conjugate points of the continuum", exact=True
+)
 @pytest.mark.parametrize(("suspended", "seed"), [(5.0, 1), (8.0, 2)])
 def test_the_engines_hessian_and_a_disturbance_agree_with_the_continuum_on_25_poses(suspended, seed):
     line, pose, rows = drawn_poses(suspended, 25, seed)
@@ -94,6 +98,7 @@ def test_the_folded_optimum_snaps_and_the_gentle_one_does_not():
         assert (moved < 0.2) == pose.stable
 
 
+@pytest.mark.case("planners", "Force of the rod engine at a planned grasp", source="Kirchhoff's equations")
 def test_the_engine_converges_to_a_grasp_at_second_order():
     found = grasp(4.0, 0.8, STIFF)
     errors = []
@@ -102,5 +107,7 @@ def test_the_engine_converges_to_a_grasp_at_second_order():
         reaction = simulation.reaction(rod.start).force
         errors.append(np.abs(reaction - found.force).max())
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    measured(errors[-1], "w Lgb")
+    measured_order(orders)
     assert errors[-1] < 1e-3
     np.testing.assert_allclose(orders, 2.0, atol=0.1)

@@ -8,6 +8,7 @@ import withe
 STEEL = {"radius": 5e-3, "material": withe.Material(youngs_modulus=2e11, poisson_ratio=0.3, density=7850.0)}
 
 
+@pytest.mark.case("dynamics", "Period of a bar on a pin", source="2 pi sqrt(2 L / (3 g))")
 @pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum", "fourth_order"])
 @pytest.mark.parametrize("support", ["pin", "stub", "revolute"])
 @pytest.mark.parametrize("edges", [1, 3])
@@ -66,6 +67,7 @@ def test_a_support_that_moves_books_its_work_to_the_last_digit(planar):
     assert given == pytest.approx(now.work, abs=1e-3 * now.kinetic)
 
 
+@pytest.mark.case("dynamics", "Free end of a bar whose other end is jerked", source="-v / 2, centre of percussion")
 def test_the_free_end_of_a_bar_falls_behind_where_its_other_end_is_jerked():
     """A bar whose end is given a velocity turns about a point a third of its length from the other: -1/2 there."""
     scene = withe.Scene(gravity=(0, 0, 0))
@@ -77,6 +79,7 @@ def test_the_free_end_of_a_bar_falls_behind_where_its_other_end_is_jerked():
     assert simulation.velocities(bar)[1, 0] == pytest.approx(-0.05, rel=1e-3)
 
 
+@pytest.mark.case("dynamics", "Work of a support that starts at full speed", source="m v^2 / 2")
 @pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum", "backward_euler"])
 @pytest.mark.parametrize("planar", [True, False])
 def test_a_support_that_starts_at_full_speed_works_with_half_of_it(integrator, planar):
@@ -162,6 +165,7 @@ def test_reactions_of_a_held_edge_do_the_work_that_is_booked(integrator, planar)
     assert apart[0] / apart[1] == pytest.approx(4, rel=0.2)
 
 
+@pytest.mark.case("dynamics", "Moment that spins up a shaft", source="J dw/dt")
 @pytest.mark.parametrize("hold", ["frame", "edge"])
 @pytest.mark.parametrize("nodes", [5, 21])
 def test_a_shaft_that_is_spun_up_asks_for_its_own_inertia(nodes, hold):

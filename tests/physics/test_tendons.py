@@ -9,6 +9,7 @@ from scipy.optimize import fsolve, minimize
 
 import rods
 import withe
+from cases import measured
 from convergence import assert_order
 
 SCHEMES = ("backward_euler", "implicit_midpoint", "energy_momentum", "fourth_order", "verlet")
@@ -47,6 +48,9 @@ def strains_of_least_energy(tensions, offsets, slopes):
     return minimize(energy, (0.0, 0.0, 0.0, 1.0), method="BFGS", options={"gtol": 1e-11}).x
 
 
+@pytest.mark.case(
+    "actuation", "Tip of an arm with a straight tendon", source="section of least energy [Rucker and Webster 2011]"
+)
 @pytest.mark.parametrize("planar", [True, False])
 @pytest.mark.parametrize("offset", [OFFSET, -2.0 * OFFSET])
 def test_a_straight_tendon_bends_a_rod_to_an_arc(planar, offset):
@@ -67,6 +71,7 @@ def test_a_straight_tendon_bends_a_rod_to_an_arc(planar, offset):
         reaction = simulation.reaction(support)
         np.testing.assert_allclose(reaction.force, 0.0, atol=1e-10)
         np.testing.assert_allclose(reaction.moment, 0.0, atol=1e-12)
+    measured(errors[-1] / LENGTH, "L")
     assert errors[0] < 3e-3 * np.linalg.norm(tip[:1])
     assert_order(np.array(errors), order=2.0, slack=0.2)
 
@@ -97,6 +102,7 @@ def test_what_a_motor_takes_in_of_a_straight_tendon_is_that_of_an_arc_on_any_mes
         assert taken == pytest.approx(LENGTH * curvature @ offset, rel=0.2 * turn**2 + 1e-5)
 
 
+@pytest.mark.case("actuation", "Curvature of an arm up to the whole tendon", source="q / h, q = T h^2 / EI")
 @pytest.mark.parametrize("planar", [True, False])
 @pytest.mark.parametrize("twigs", [(), (20, 45)], ids=["bare", "with twigs"])
 def test_a_tendon_bends_its_rod_until_nothing_of_it_is_left(planar, twigs):
@@ -123,6 +129,7 @@ def test_a_tendon_bends_its_rod_until_nothing_of_it_is_left(planar, twigs):
         np.testing.assert_allclose(np.abs(simulation.curvatures(rod)[:, 0]), q / offset, rtol=1e-4)
 
 
+@pytest.mark.case("actuation", "Curvature of an arm, 11 to 41 nodes", source="T h / EI")
 @pytest.mark.parametrize("nodes", [11, 21, 41])
 def test_arcs_have_the_curvature_of_theory_to_fourth_order_in_the_turn_of_an_edge(nodes):
     scene = rods.weightless()
@@ -177,6 +184,9 @@ def test_a_tendon_that_is_drawn_from_tip_to_base_does_the_same():
     np.testing.assert_allclose(tips[0], tips[1], atol=1e-12)
 
 
+@pytest.mark.case(
+    "actuation", "Strains by tendons that wind about an arm", source="section of least energy [Rucker and Webster 2011]"
+)
 @pytest.mark.parametrize("turns", [0.0, 0.5, pytest.param(2.0, marks=pytest.mark.slow)])
 def test_tendons_that_wind_about_a_rod_bend_and_twist_it(turns):
     """One that winds and a straight one."""
@@ -204,10 +214,12 @@ def test_tendons_that_wind_about_a_rod_bend_and_twist_it(turns):
         errors.append(np.abs(seen - exact)[1:-1].max())
     if turns:
         assert np.abs(simulation.twists(rod)).min() > 0.1
+    measured(errors[-1] / np.abs(exact).max())
     assert errors[0] < 1e-2 * np.abs(exact).max()
     assert errors[1] < 0.3 * errors[0] + 5e-6  # which differences leave of the minimum
 
 
+@pytest.mark.case("actuation", "Tip of an arm with a tendon along its chord", source="elastica")
 def test_a_tendon_from_the_base_to_the_tip_pulls_along_its_chord():
     """Elastica of a cantilever: from the tip back, EI theta' is the moment of T about each section."""
     scene = rods.weightless()
@@ -233,6 +245,7 @@ def test_a_tendon_from_the_base_to_the_tip_pulls_along_its_chord():
 
     near = simulation.positions(rod)[-1]
     found = fsolve(shape, (near[0], near[2], np.arctan2(near[0], near[2])), xtol=1e-12)
+    measured((near[[0, 2]] - found[:2]) / LENGTH, "L")
     np.testing.assert_allclose(near[[0, 2]], found[:2], atol=2.0 * LENGTH * tension / EA)
     assert found[2] > 0.5
 

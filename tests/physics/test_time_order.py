@@ -37,6 +37,7 @@ def waving(integrator, step, planar, edges=6):
     return simulation.positions(arm)
 
 
+@pytest.mark.case("dynamics", "Order of five integrators in time", source="1 (backward Euler), 2, 4 (fourth order)")
 @pytest.mark.parametrize("planar", [True, False], ids=["planar", "spatial"])
 @pytest.mark.parametrize(
     ("integrator", "order", "steps"),
@@ -54,6 +55,7 @@ def test_error_falls_at_the_order_of_the_scheme(integrator, order, steps, planar
     assert_order([np.abs(b - a).max() for a, b in pairwise(results)], order)
 
 
+@pytest.mark.case("dynamics", "Integrators in the limit of short steps", source="each other")
 def test_schemes_agree_in_the_limit():
     reference = waving("implicit_midpoint", DURATION / 3200, False)
     for integrator, steps, allowed in (
@@ -167,6 +169,7 @@ def test_phase_error_of_fourth_order_is_that_of_five_midpoint_steps():
         assert abs(value / seen[-1] - 1.0) == pytest.approx(9.3e-4 * (2.0 * np.pi / steps) ** 4, rel=0.15)
 
 
+@pytest.mark.case("dynamics", "Period of a cantilever and phase error of midpoint", source="tan(W dt / 2) = w dt / 2")
 def test_period_of_a_cantilever_is_theorys_and_the_midpoint_rule_stretches_it_at_second_order():
     """The phase error of midpoint is known: tan(W dt / 2) = w dt / 2 for the frequency W that is seen."""
     exact = theory.CANTILEVER_ROOTS[0] ** 2

@@ -6,6 +6,7 @@ from scipy.optimize import brentq
 
 import rods
 import withe
+from cases import measured, measured_order
 
 LENGTH, RADIUS, DENSITY, STIFFNESS = 0.2, 5e-3, 0.5, 0.03
 INERTIA = DENSITY * LENGTH**3 / 3.0  # of a link about its end
@@ -37,12 +38,14 @@ def two_links(axis=(0, -1, 0), *, clamped=True, joint="pinned", stiffness=STIFFN
     return scene, spring
 
 
+@pytest.mark.case("dynamics", "Frequency of a link on a torsion spring", source="w^2 = k / I")
 def test_links_swing_at_the_frequency_of_theory():
     scene, _ = two_links()
     found = scene.build(planar=True).linearise().frequencies(1)[0]
     assert found == pytest.approx(np.sqrt(STIFFNESS / INERTIA) / (2.0 * np.pi), rel=1e-5)
 
 
+@pytest.mark.case("dynamics", "Frequency of a bar that spins on a torsion spring", source="w^2 = k / J")
 def test_links_oscillate_about_their_own_axis_at_the_frequency_of_theory():
     """A rigid bar of moment of inertia J = m r^2 / 2 about its axis: k / J = (2 pi f)^2."""
     scene, _ = two_links((1, 0, 0), joint="revolute")
@@ -52,6 +55,7 @@ def test_links_oscillate_about_their_own_axis_at_the_frequency_of_theory():
     assert found == pytest.approx(np.sqrt(STIFFNESS / inertia) / (2.0 * np.pi), rel=1e-6)
 
 
+@pytest.mark.case("statics", "Arm on a torsion spring, extrapolated", source="F L^2 / k + F L^3 / (3 EI)")
 def test_flexible_links_converge_to_the_cantilever_on_a_hinge():
     """Tip of an arm on a hinge with a torsion spring under a small force F: F L^2 / k + F L^3 / (3 EI).
 
@@ -72,6 +76,8 @@ def test_flexible_links_converge_to_the_cantilever_on_a_hinge():
         tips.append(simulation.positions("arm")[-1, 2])
     expected = force * LENGTH**2 / STIFFNESS + force * LENGTH**3 / (3.0 * bend)
     errors = np.array(tips) - expected
+    measured((2.0 * tips[2] - tips[1]) / expected - 1.0)
+    measured_order(np.log2(errors[:-1] / errors[1:]))
     assert errors[:-1] / errors[1:] == pytest.approx(2.0, rel=0.1)
     assert 2.0 * tips[2] - tips[1] == pytest.approx(expected, rel=1e-3)
 
@@ -99,6 +105,7 @@ def test_the_motion_turns_with_the_scene(seed):
     assert np.abs(ends[0][0] - ends[1][0]).max() < 1e-9
 
 
+@pytest.mark.case("statics", "Angle of a torsion spring under a force", source="k phi = F L cos(phi)")
 @pytest.mark.parametrize("planar", [True, False])
 def test_spring_holds_a_force_and_a_moment_at_the_angle_of_theory(planar):
     """k phi = F L cos(phi) under a dead force across the arm."""

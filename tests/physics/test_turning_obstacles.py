@@ -14,6 +14,7 @@ def balances(simulation):
     return energy.total + energy.dissipated - energy.work
 
 
+@pytest.mark.case("contact", "Rod on a turntable", source="3 mu g / L")
 @pytest.mark.parametrize("friction_model", ["anchored", "implicit", "lagged"])
 def test_turntable_turns_a_rod_by_the_torque_of_its_friction(friction_model):
     """mu w L^2 / 4 on m L^2 / 12: 3 mu g / L, until it turns with the table."""
@@ -44,6 +45,7 @@ def test_turntable_turns_a_rod_by_the_torque_of_its_friction(friction_model):
     assert energy.work == pytest.approx(energy.total + energy.dissipated - before, rel=0.05)
 
 
+@pytest.mark.case("contact", "Rod on rollers", source="mu g t, up to the surface's speed")
 @pytest.mark.parametrize("planar", [True, False])
 def test_rollers_carry_a_rod_off_at_the_speed_of_their_surface(planar):
     """By mu g at first; in a plane that stands across them, and in space."""
@@ -78,6 +80,7 @@ def mass(rod):
     return 1000.0 * np.pi * RADIUS**2 * 2 * LENGTH
 
 
+@pytest.mark.case("contact", "Rod on bearings that a drum spins", source="gears, -R / r")
 @pytest.mark.parametrize("kind", ["capsule", "sphere"])
 def test_drum_spins_a_rod_on_bearings_as_gears_would(kind):
     """Surfaces that do not slip: -R / r times the drum's rate."""
@@ -103,6 +106,7 @@ def test_drum_spins_a_rod_on_bearings_as_gears_would(kind):
     assert np.mean(spins) == pytest.approx(-rate * drum / RADIUS, rel=0.02)
 
 
+@pytest.mark.case("contact", "Work of a roller on a held rod", source="mu N R phi")
 def test_work_of_a_roller_is_the_torque_of_friction_times_its_turn():
     """On a rod that is held: all of it is lost to friction, mu N R a turn of one radian."""
     mu, drum = 0.3, 0.03

@@ -8,6 +8,7 @@ import pytest
 
 import rods
 import theory
+from cases import measured
 from convergence import assert_order, zero_crossing
 
 SIDE = 1e-5
@@ -49,12 +50,14 @@ def ring_out_of_plane(nodes, twist, side):
     return simulation.positions(rod)[3 * nodes // 4, 2]
 
 
+@pytest.mark.case("stability", "Twist at which a ring leaves its plane", source="2 pi sqrt(3) EI / GJ [Michell 1889]")
 def test_twist_at_which_a_ring_leaves_its_plane_converges_at_second_order():
     errors = []
     for nodes in (32, 64, 128):
         twists = SHARES * MICHELL
         sways = [ring_out_of_plane(nodes, twist, SIDE) for twist in twists]
         errors.append(zero_crossing(twists, sways) / MICHELL - 1.0)
+    measured(errors[-1])
     assert_order(errors)
     assert abs(errors[-1]) < 5e-3
 
@@ -95,6 +98,7 @@ def cut_ring_out_of_plane(edges, twist, side):
     return simulation.positions(rod)[edges // 4, 2]
 
 
+@pytest.mark.case("stability", "Twist of a cut ring with one end turned", source="[Michell 1889]")
 def test_cut_ring_with_one_end_turned_has_the_same_critical_twist():
     """The clamp is a small imperfection of the discrete ring, so that pushes both ways are compared."""
     errors = []
@@ -103,6 +107,7 @@ def test_cut_ring_with_one_end_turned_has_the_same_critical_twist():
             [cut_ring_out_of_plane(edges, share * MICHELL, side) for share in SHARES] for side in (SIDE, -SIDE)
         )
         errors.append(zero_crossing(SHARES, np.subtract(ups, downs)) - 1.0)
+    measured(errors[-1])
     assert_order(errors)
     assert abs(errors[-1]) < 1e-3
 
@@ -129,6 +134,9 @@ def twisted(edges, tension, moment, side):
     return simulation, rod, result
 
 
+@pytest.mark.case(
+    "stability", "Critical moment of a clamped rod, with and without tension", source="linear theory, by determinant"
+)
 @pytest.mark.parametrize(("tension", "edges"), [(0.0, (16, 32, 64)), (100.0, (32, 64, 128))])
 def test_critical_moment_of_a_clamped_rod_converges_at_second_order(tension, edges):
     exact = theory.critical_twisting_moment(tension)
@@ -139,6 +147,7 @@ def test_critical_moment_of_a_clamped_rod_converges_at_second_order(tension, edg
             simulation, rod, _ = twisted(n, tension, share * exact, SIDE)
             sways.append(simulation.positions(rod)[n // 2, 1])
         errors.append(zero_crossing(SHARES, sways) - 1.0)
+    measured(errors[-1])
     assert_order(errors)
     assert abs(errors[-1]) < 5e-3
 
@@ -163,6 +172,7 @@ def test_critical_moment_of_a_long_rod_under_tension_is_twice_the_root_of_tensio
         assert (np.abs(simulation.positions(rod)[:, 1:]).max() < 1e-9) == straight
 
 
+@pytest.mark.case("stability", "Critical axial torque of a pinned rod", source="2 pi EI / L [Greenhill 1883]")
 def test_critical_axial_torque_of_a_pinned_rod_converges_to_two_pi():
     """Torques that keep the direction of the axis have no potential: the stiffness is read off before it vanishes."""
     exact = 2.0 * np.pi
@@ -181,5 +191,6 @@ def test_critical_axial_torque_of_a_pinned_rod_converges_to_two_pi():
             simulation.equilibrium()
             sways.append(simulation.positions(rod)[edges // 2, 1])
         errors.append(zero_crossing(SHARES, sways) - 1.0)
+    measured(errors[-1])
     assert_order(errors)
     assert abs(errors[-1]) < 5e-3

@@ -22,6 +22,7 @@ def column(load, planar=True):
     return scene.build(integrator="static", planar=planar), rod
 
 
+@pytest.mark.case("stability", "Unstable modes of a straight column", source="Euler's loads below it", exact=True)
 @pytest.mark.parametrize("modes", [0, 1, 2, 4])
 def test_a_column_stays_straight_on_request_with_a_falling_motion_for_every_euler_load_that_it_carries_more_than(modes):
     load = 0.5 * (modes**2 + (modes + 1) ** 2) * np.pi**2
@@ -35,6 +36,7 @@ def test_a_column_stays_straight_on_request_with_a_falling_motion_for_every_eule
     assert (simulation.positions(rod)[-1, 0] < 0.9) == (modes > 0)
 
 
+@pytest.mark.case("stability", "Unstable modes of a buckled strut", source="n - 1 [Maddocks 1984]", exact=True)
 @pytest.mark.parametrize("planar", [True, False])
 @pytest.mark.parametrize("humps", [1, 2, 3])
 def test_a_strut_between_clamps_stays_in_each_of_its_modes_on_request(humps, planar):

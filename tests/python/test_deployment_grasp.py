@@ -18,6 +18,7 @@ def columns(*names):
     return np.stack([ROWS[name] for name in names], -1)
 
 
+@pytest.mark.case("planners", "63 grasps of a cable in space", source="table of Kirchhoff's equations, four decimals")
 def test_every_row_of_the_table_is_found():
     found = grasp(ROWS["lsbar"], ROWS["kappabar"], ROWS["ksbar"])
     np.testing.assert_allclose(found.position, columns("x", "y", "z"), rtol=0, atol=1e-4)
@@ -34,6 +35,7 @@ def test_a_long_straight_line_is_laid_from_its_known_optimum():
     np.testing.assert_allclose(found.position[:, 0], 2.566219, atol=1e-5)
 
 
+@pytest.mark.case("planners", "Grasp of a short cable", source="F = w L / 2, z = L^4 / 48")
 def test_a_short_rod_rests_half_its_weight_on_the_floor():
     length = 0.1
     found = grasp(length, 0.0)
@@ -64,6 +66,9 @@ def test_the_jaws_force_balances_the_couple_at_lift_off():
     np.testing.assert_allclose(about_z, -2.0 * curvature, rtol=1e-6)
 
 
+@pytest.mark.case(
+    "planners", "Grasp of a thick cable that friction twists", source="Kirchhoff's equations, integrated by SciPy"
+)
 @pytest.mark.parametrize("axial_force", [0.0, 0.3])
 @pytest.mark.parametrize(("suspended", "curvature", "radius"), [(6.0, 0.6, 0.05), (2.0, -1.1, 0.1), (1.5, 0.4, 0.0)])
 def test_a_thick_rod_is_twisted_by_the_friction_at_its_surface(suspended, curvature, radius, axial_force):

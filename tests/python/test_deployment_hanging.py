@@ -10,6 +10,7 @@ from withe.perception.synthetic import render_mask
 LGB = 0.08
 
 
+@pytest.mark.case("inverse", "Natural curvature from a hanging cable", source="linear theory of a heavy beam")
 def test_the_free_end_hangs_aside_as_a_heavy_beam_does():
     # EI x'' = moment, moment' = w s x' for small slopes, s from the free end, EI = 2 w Lgb^3; upright far above.
     def slopes(s, y):
@@ -25,6 +26,7 @@ def test_the_free_end_hangs_aside_as_a_heavy_beam_does():
     assert measure_curvature(1.0, aside=-little, error=0.1).error == pytest.approx(0.1 / found.y[0, 0], rel=1e-4)
 
 
+@pytest.mark.case("inverse", "Natural curvature from cables in the rod engine", source="the curvature that was set")
 @pytest.mark.parametrize("natural", [(0.5, 0.0), (-0.3, 0.4)])
 def test_the_rod_engine_hangs_so(natural):
     for nodes, off in ((100, 0.02), (200, 0.005)):

@@ -12,6 +12,7 @@ BRANCHES = np.genfromtxt(DATA / "sheet_branches_without_tangential_force.csv", d
 INEXTENSIBLE = 1e9
 
 
+@pytest.mark.case("planners", "Both optima of a straight line", source="table, five decimals")
 @pytest.mark.parametrize("branch", [1, 2])
 def test_both_optima_are_those_of_the_table(branch):
     rows = BRANCHES[(BRANCHES["branch"] == branch) & (BRANCHES["lsbar"] > 2) & (BRANCHES["tip_z_over_Lgb"] > 0)]

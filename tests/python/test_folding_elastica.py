@@ -22,6 +22,7 @@ def scattered(count, seed):
     return pose.x[pose.valid], pose.z[pose.valid]
 
 
+@pytest.mark.case("planners", "Poses of a hanging sheet", source="table of the elastica, five decimals")
 def test_every_row_of_the_table_is_found():
     pose = elastica(POSES["xbar"], POSES["zbar"])
     assert pose.valid.all()
@@ -50,6 +51,7 @@ def test_a_position_and_its_length_and_angle_name_the_same_pose():
     np.testing.assert_allclose(again.z[there], z[there], atol=1e-7)
 
 
+@pytest.mark.case("planners", "Sheets that hang without tangential force", source="table, five decimals")
 def test_the_branch_without_tangential_force_is_met():
     rows = BRANCHES[(BRANCHES["branch"] == 1) & (BRANCHES["lsbar"] > 1) & (BRANCHES["lsbar"] < 6.8)]
     pose = elastica(length=rows["lsbar"], angle=rows["alpha_rad"])
@@ -61,6 +63,7 @@ def test_the_branch_without_tangential_force_is_met():
     np.testing.assert_allclose(pose.x[long], rows["xbar_NFM"][long], atol=1e-5)
 
 
+@pytest.mark.case("planners", "Hanging sheet that is short", source="F = w L / 2, z = L^4 / 48")
 def test_a_short_strip_has_half_its_weight_on_the_table():
     length = np.array([0.95, 1.0])
     pose = elastica(length=length, angle=length**3 / 24)  # beam theory: EI = 2, w = 1, no tangential force
@@ -100,6 +103,7 @@ def test_a_moment_at_the_tip_bends_it_there():
 WIDTHS = [(0.0, 0.15), (2.0, 0.4), (3.5, 1.0), (7.0, 0.1)]
 
 
+@pytest.mark.case("planners", "Hanging sheet of varying width", source="elastica, integrated by SciPy")
 def test_a_sheet_of_any_width_obeys_its_equations():
     """Integrated anew from the lift-off point, by SciPy, piece by piece."""
     x, z = scattered(40, 6)

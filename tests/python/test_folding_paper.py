@@ -14,12 +14,14 @@ STRIPS = np.genfromtxt(
 )
 
 
+@pytest.mark.case("planners", "Droop of a hanging strip", source="table, six decimals")
 def test_every_strip_of_the_table_droops_so():
     rows = STRIPS[(STRIPS["lbar_l_over_Lgb"] > 0.3) & (STRIPS["lbar_l_over_Lgb"] < 20)]
     found = [droop(length) / length for length in rows["lbar_l_over_Lgb"]]
     np.testing.assert_allclose(found, rows["epsilon_lh_over_l"], atol=1e-6)
 
 
+@pytest.mark.case("planners", "Droop of a short strip", source="L^4 / 16")
 def test_a_short_strip_droops_by_linear_theory():
     assert droop(0.1) == pytest.approx(0.1**4 / 16, rel=1e-5)  # w l^4 / 8 EI with EI = 2 w Lgb^3
 
@@ -49,6 +51,7 @@ def drop_of_rod(length, curl=0.0):
     return (4 * drops[1] - drops[0]) / 3
 
 
+@pytest.mark.case("planners", "Droop of a strip in the rod engine", source="elastica")
 def test_a_rod_of_many_nodes_droops_as_a_strip():
     assert drop_of_rod(2 * LGB) == pytest.approx(LGB * droop(2.0), rel=1e-4)
 

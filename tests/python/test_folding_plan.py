@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import withe
+from cases import measured
 from planned_folds import PAPERS, freely, planned
 from withe.__main__ import main
 from withe.folding import FoldPlan, Jaw, Paper, elastica, plan, replan
@@ -61,8 +62,20 @@ def test_a_rough_table_holds_the_sheet_where_it_is():
     assert np.abs(plan(paper).slide).max() == 0.0
 
 
+@pytest.mark.case("planners", "Predicted slide of three folds", source="independent model: elastica and Coulomb")
 def test_predicted_slides_are_those_of_a_model_of_its_own():
     """Rigid lying sheet, elastica and Coulomb, computed without this code: open loop, half folds [mm]."""
+    measured(
+        np.subtract(
+            [
+                1000.0 * planned("a4").slide[-1],
+                1000.0 * planned("a4", 0.25).slide[-1],
+                1000.0 * planned("us_letter").slide[-1],
+            ],
+            [7.6, 7.6, 9.6],
+        ),
+        "mm",
+    )
     assert 1e3 * planned("a4").slide[-1] == pytest.approx(7.6, abs=0.5)
     assert 1e3 * planned("a4", 0.25).slide[-1] == pytest.approx(7.6, abs=0.5)
     assert 1e3 * planned("us_letter").slide[-1] == pytest.approx(9.6, abs=0.5)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import withe
+from cases import measured
 from withe.folding import Jaw, Noise, Paper, SimulatedSheet, plan
 
 ROOM = Path(__file__).resolve().parents[2] / "python" / "withe" / "folding"
@@ -60,10 +61,12 @@ def test_planners_know_no_simulated_sheet_and_it_knows_no_planner():
         assert not reached(module) & PLANNER, module
 
 
+@pytest.mark.case("planners", "Slide of a fold in the rod engine", source="elastica and Coulomb")
 def test_a_sheet_slides_as_the_continuum_and_coulomb_say(a4, half):
     found = SimulatedSheet(a4, edges=100, time_step=0.02).fold(half, progress=False)
     assert found.failure is None
     assert half.slide[-1] > 5e-3
+    measured(1e3 * (found.slide - half.slide[-1]), "mm")
     assert found.slide == pytest.approx(half.slide[-1], abs=1e-4)
     # The edge is where the plan takes it; the sheet has slid on: the gap is the slide, and the crease off by half.
     assert found.error == pytest.approx(-0.5 * found.slide, abs=1e-6)

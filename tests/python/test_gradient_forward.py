@@ -20,6 +20,7 @@ def nodes_of(simulation, readout):
     return np.array(columns).T
 
 
+@pytest.mark.case("inverse", "Gradients of runs by adjoints", source="derivatives carried forward")
 @pytest.mark.parametrize(
     ("integrator", "planar", "kind"),
     [

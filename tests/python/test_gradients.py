@@ -10,6 +10,7 @@ import withe
 from gradient_scenes import NODES, TIGHT, Drawn, difference, move_with_directors, settings, weighted
 
 
+@pytest.mark.case("inverse", "Gradients of equilibria", source="central differences")
 @pytest.mark.parametrize("joint", [False, True])
 @pytest.mark.parametrize("planar", [True, False])
 def test_gradient_of_an_equilibrium_is_that_of_differences(planar, joint):
@@ -145,6 +146,7 @@ def test_gradients_have_the_shape_of_get_and_the_jacobian_their_rows():
     np.testing.assert_array_equal(tip, jacobians[2][-1])
 
 
+@pytest.mark.case("inverse", "Gradients of runs", source="central differences, extrapolated")
 @pytest.mark.parametrize("support", [None, "frame", "edge", "moving frame", "moving edge"])
 @pytest.mark.parametrize("joint", [False, True])
 @pytest.mark.parametrize("planar", [True, False])
@@ -282,6 +284,7 @@ def tapered(radii, run, *, planar, joint, material=True):
     return scene.build(planar=planar or None, **({"integrator": "static"} | options), **TIGHT)
 
 
+@pytest.mark.case("inverse", "Gradients by radii", source="scenes that are built anew")
 @pytest.mark.parametrize("material", [True, False])
 @pytest.mark.parametrize("joint", [False, True])
 @pytest.mark.parametrize("planar", [True, False])

@@ -33,6 +33,7 @@ TABLE = {
 }
 
 
+@pytest.mark.case("knots", "Alexander polynomial and signature of tabulated knots", source="knot tables", exact=True)
 @pytest.mark.parametrize("name", TABLE)
 def test_polynomial_and_signature_are_those_of_the_tables_from_every_side(name):
     points, polynomial, signature = TABLE[name]

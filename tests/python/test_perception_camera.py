@@ -54,6 +54,7 @@ def test_pixels_where_the_lens_shows_nothing_are_refused(distortion):
         camera.to_plane([*seen, (320.0 + farthest + 0.01, 240.0)])
 
 
+@pytest.mark.case("inverse", "Projection of a camera with distortion", source="OpenCV")
 def test_projection_agrees_with_opencv():
     cv2 = pytest.importorskip("cv2")
     camera = tilted()

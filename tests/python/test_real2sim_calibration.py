@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import withe
+from cases import measured
 from soft_limb import CONSTANT, LIMB, log, robot
 from withe.real2sim import Tags, calibrate, fit
 from withe.real2sim.parsing import parse_unknowns
@@ -35,6 +36,7 @@ def level(roll=0.0, scale=3600.0):
 TURNS = np.stack([np.linspace(-1.0, 0.8, 12), np.cos(np.arange(12.0))], axis=1)
 
 
+@pytest.mark.case("inverse", "Camera and places of tags", source="the made camera")
 def test_a_made_camera_and_the_places_of_tags_are_found_again():
     simulation, places = robot()
     shifts = [0, 2e-3, -1e-3, 1e-3, -2e-3, 3e-3, 1e-3, 0, 0]
@@ -44,6 +46,7 @@ def test_a_made_camera_and_the_places_of_tags_are_found_again():
     found = calibrate(simulation, Tags(pixels, places), progress=False)
     assert found.rms < 1e-3
     assert found.roll == pytest.approx(0.2, abs=1e-5)
+    measured(found.scale / 3600.0 - 1.0)
     assert found.scale == pytest.approx(3600.0, rel=1e-5)
     assert [arc for _, arc in found.places] == pytest.approx([arc for _, arc in shifted], abs=1e-6)
     points = np.random.default_rng(0).uniform(-0.1, 0.1, (5, 3)) * (1, 0, 1)

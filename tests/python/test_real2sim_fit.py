@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import withe
+from cases import measured
 from soft_limb import CONSTANT, LIMB, published, robot, seen_curvatures
 from withe.real2sim import Centrelines, Curvatures, Tags, fit
 from withe.real2sim.parsing import parse_unknowns
@@ -39,12 +40,14 @@ def names(places):
     return [f"arm.node({place})" for place in places]
 
 
+@pytest.mark.case("inverse", "Natural curvatures of a soft limb in 169 frames", source="published turns")
 def test_the_limbs_of_the_dissertation_are_explained_in_three_iterations_a_frame():
     simulation, places = robot()
     found = fit(simulation, seen_curvatures(places), CONSTANT, progress=False)
     assert found.converged.all()
     assert np.abs(found.residuals).sum(axis=1).max() < 1e-9
     assert found.iterations.max() <= 3
+    measured(np.degrees(np.abs(found.values * LIMB - published()[1])), "degrees")
     assert np.degrees(np.abs(found.values * LIMB - published()[1])).max() < 0.6
     assert found.unobservable == ()
 
@@ -156,6 +159,7 @@ def test_the_simulation_is_left_as_it_was():
     simulation.restore(before)
 
 
+@pytest.mark.case("inverse", "Young's modulus and curvatures from stills", source="the values of the made data")
 def test_a_stiffness_that_all_frames_share_is_found_with_the_curvature_of_each():
     truth = arm()
     truth.set("arm", youngs_modulus=2.3e6)
@@ -198,6 +202,7 @@ def test_a_curvature_shared_by_several_loads_is_found_with_the_stiffness():
     assert found.value(rod)[0] == pytest.approx([0.0, 2.0], abs=1e-6)
 
 
+@pytest.mark.case("inverse", "Mass at the tip from stills", source="the value of the made data")
 def test_a_mass_at_the_tip_is_weighed():
     def loaded(mass):
         scene = withe.Scene()

@@ -63,6 +63,7 @@ def test_what_is_seen_later_has_moved_on_with_its_velocity():
     assert by_delay == pytest.approx((ahead - behind) / 2e-6, abs=1e-7 * np.abs(by_delay).max())
 
 
+@pytest.mark.case("inverse", "Modulus, viscosity and delay from ringing", source="the values of the made data")
 def test_without_noise_a_coarser_mesh_and_step_leave_damping_within_a_percent():
     start = ringing(modulus=1.2e6, viscosity=2000.0)
     found = fit_motion(start, seen(0.013, nodes=25, viscosity=3000.0), UNKNOWNS, begin=let_go, progress=False)
@@ -174,6 +175,7 @@ def test_a_drag_and_that_of_a_rod_are_one_unknown_whichever_is_named_first():
         ]
 
 
+@pytest.mark.case("inverse", "Friction from a rod that slides to a stop", source="the value of the made data")
 def test_friction_is_told_by_how_a_rod_slides_to_a_stop():
     def sliding(friction):
         scene = withe.Scene()
@@ -337,6 +339,7 @@ def test_what_lbfgs_does_not_go_with_says_what_to_do(unknowns, options, message)
         fit_motion(ringing(), target, unknowns, progress=False, **({"method": "lbfgs"} | options))
 
 
+@pytest.mark.case("inverse", "Stiffness and damping of a joint from its swing", source="the values of the made data")
 @pytest.mark.parametrize("planar", [None, False])
 def test_stiffness_and_damping_of_a_joint_are_found_from_how_it_swings(planar):
     def leg(stiffness, damping):

@@ -109,6 +109,7 @@ def test_derivatives_by_poses_are_those_of_the_residuals(space):
         assert found[:, i] == pytest.approx((ahead - behind) / 2e-5, abs=1e-5 * np.abs(found).max())
 
 
+@pytest.mark.case("inverse", "Pose of a clamp from stills", source="the made pose")
 def test_the_pose_of_a_clamp_is_found():
     simulation = arm()
     simulation.move("wall", (0.01, 0.0, -0.02), withe.common.drawing.rotation_about(np.array([0.0, 0.1, 0.0])))
