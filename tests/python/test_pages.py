@@ -180,6 +180,14 @@ def a_cord_bends_its_arm(names):
     pytest.importorskip("pyvista").OFF_SCREEN = names["off_screen_before"]
 
 
+def test_every_error_and_warning_is_explained():
+    text = (ROOT / "docs/how_to/convergence.md").read_text()
+    overview, *remedies = text.split("\n## ")
+    for name in withe.errors.__all__:
+        assert f"| `{name}` |" in overview
+        assert any(f"`{name}`" in remedy for remedy in remedies), name
+
+
 def test_the_readme_is_one_page_whose_links_lead_to_files():
     text = (ROOT / "README.md").read_text()
     assert len(text.split()) <= 900
