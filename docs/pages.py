@@ -50,6 +50,34 @@ MADE_BY = {
     "withe.view.LiveView": "Simulation.view",
     "withe.view.SliderView": "Simulation.view",
 }
+# Benchmarks by topic, the most important first: title of the page, and the question that the benchmark answers.
+BENCHMARKS = {
+    "work_precision": ("Run time against error", "Which simulator reaches an error first, for beams and helices?"),
+    "friction_precision": ("Run time against error, friction", "Which simulator reaches an error first, with friction?"),
+    "rl_throughput": ("Throughput of learning tasks", "How many control steps a second do learning tasks reach?"),
+    "conservation": ("Conservation", "Which integrator conserves momentum, angular momentum and energy?"),
+    "robustness": ("Robustness", "Are results right in violent scenes with drawn parameters?"),
+    "contact": ("Contact", "How does the run time of contact grow with the size of a scene?"),
+    "contact_robustness": ("Robustness of contact", "Are results right in drawn scenes of impacts, piles and knots?"),
+    "contact_fold": ("Contact of a folded sheet", "How much of a fold's run time does contact take?"),
+    "parallel": ("Many simulations", "How do many simulations scale with threads?"),
+    "gradients": ("Gradients", "How much does a gradient cost, over the run or the equilibrium?"),
+    "settings": ("Settings", "How long does it take to set a parameter?"),
+    "skips": ("Shortcuts of the plan", "How much run time does each shortcut of `plan` save?"),
+    "ablation": ("Parts of Newton's method", "How much does each part of Newton's method save?"),
+    "newton_iteration": ("One Newton iteration", "How long does an iteration take, over LAPACK's band solver?"),
+    "sparse_solvers": ("Sparse solvers", "How fast is the sparse solver, beside Eigen and CHOLMOD?"),
+    "real2sim": ("Fits to camera data", "How accurate are fits to camera data?"),
+    "perception": ("Perception", "How accurate and fast is the tracing of cables in photographs?"),
+    "folding": ("Plans of folds", "How accurate and fast are plans of folds, and which friction do they need?"),
+    "folding_replay": ("A fold in PyElastica", "Does another simulator confirm the slide of a fold?"),
+    "folding_spin": ("Rotation of creases", "How far do creases turn in half folds of narrow and wide sheets?"),
+    "folding_trials": ("Folds with noise", "How accurate are folds with noise, beside the published robot?"),
+    "deployment": ("Grasps of a cable", "How accurate and fast are grasps that lay a cable?"),
+    "deployment_tables": ("Patterns laid by a gripper", "How accurate is a laid cable, beside the published robot?"),
+    "deployment_refining": ("Refinement of laid cables", "How do the mesh and the speed change a laid cable?"),
+    "deployment_uses": ("Posts and knots", "Does a gripper place cables between posts and tie knots?"),
+}
 ROOT = Path(__file__).resolve().parent.parent
 GENERATED = "generated"
 
@@ -234,15 +262,33 @@ def rooms(folder: Path) -> None:
 
 
 def benchmarks(folder: Path) -> None:
-    """Write a page for each benchmark, from the sections of benchmarks/README.md."""
+    """Write a page for each benchmark from the sections of benchmarks/README.md, and an index with their questions."""
     text = (ROOT / "benchmarks/README.md").read_text().replace("](pictures/", "](../../../benchmarks/pictures/")
-    head, *sections = text.split("\n## ")
-    names = []
-    for section in sections:
-        title, _, body = section.partition("\n")
-        names.append(title)
-        put(folder / f"{title}.md", [f"# {title}", *body.replace("\n### ", "\n## ").splitlines()])
-    put(folder / "index.md", [*head.splitlines(), "", "```{toctree}", ":maxdepth: 1", "", *names, "```"])
+    head, *parts = text.split("\n## ")
+    sections = dict(part.split("\n", 1) for part in parts)
+    if unknown := sections.keys() - BENCHMARKS.keys():
+        raise KeyError(f"docs/pages.py has no title and question of the benchmarks {', '.join(sorted(unknown))}")
+    names = [name for name in BENCHMARKS if name in sections]
+    rows = []
+    for name in names:
+        title, question = BENCHMARKS[name]
+        body = sections[name].replace("\n### ", "\n## ")
+        put(folder / f"{name}.md", [f"# {title}", "", question, "", *body.strip("\n").splitlines()])
+        took = re.search(r"took (\d+) s", body)
+        rows.append(f"| [{title}]({name}.md) | {question} | `make bench NAME={name}` | {duration(took)} |")
+    table = ["| benchmark | question | command | duration |", "|---|---|---|---|", *rows]
+    put(
+        folder / "index.md",
+        [*head.splitlines(), "", *table, "", "```{toctree}", ":maxdepth: 1", ":hidden:", "", *names, "```"],
+    )
+
+
+def duration(took: re.Match[str] | None) -> str:
+    """Return how long the last run of a benchmark took."""
+    if took is None:
+        return "-"
+    seconds = int(took[1])
+    return f"{seconds} s" if seconds < 100 else f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
 
 
 def put(path: Path, lines: list[str]) -> None:
