@@ -53,7 +53,10 @@ MADE_BY = {
 # Benchmarks by topic, the most important first: title of the page, and the question that the benchmark answers.
 BENCHMARKS = {
     "work_precision": ("Run time against error", "Which simulator reaches an error first, for beams and helices?"),
-    "friction_precision": ("Run time against error, friction", "Which simulator reaches an error first, with friction?"),
+    "friction_precision": (
+        "Run time against error, friction",
+        "Which simulator reaches an error first with friction?",
+    ),
     "rl_throughput": ("Throughput of learning tasks", "How many control steps a second do learning tasks reach?"),
     "conservation": ("Conservation", "Which integrator conserves momentum, angular momentum and energy?"),
     "robustness": ("Robustness", "Are results right in violent scenes with drawn parameters?"),
@@ -288,7 +291,9 @@ def duration(took: re.Match[str] | None) -> str:
     if took is None:
         return "-"
     seconds = int(took[1])
-    return f"{seconds} s" if seconds < 100 else f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
+    return (
+        f"{seconds} s" if seconds < 100 else f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
+    )
 
 
 def put(path: Path, lines: list[str]) -> None:

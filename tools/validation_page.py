@@ -80,14 +80,19 @@ def of(path: Path, root: Path) -> Iterator[Case]:
 def command(file: str, name: str, rest: str) -> str:
     """Return the command that runs a test: by the fewest words of its name that the rest of its file does not have.
 
-    `pytest -k` finds words in the names of tests, parameters, files and folders, in upper or lower case.
+    `pytest -k` finds words in the names of tests, parameters, files and folders, in upper or lower case. If the name of
+    another test begins with this name, the command excludes a word of that other test.
     """
     words, others = name.split("_")[1:], (rest + file).lower()
+    longer = re.findall(rf"\b{name}_(\w+)", others)
+    others = re.sub(rf"\b{name}_\w+", "", others)
+    excluded = "".join(f" and not {max(more.split('_'), key=len)}" for more in longer)
     for count in range(1, len(words) + 1):
         found = ["_".join(words[i : i + count]) for i in range(len(words) - count + 1)]
         found = [text for text in found if len(text) > 3 and text not in others]
         if found:
-            return f"python -m pytest {file} -k {max(found, key=len)}"
+            chosen = max(found, key=len) + excluded
+            return f"python -m pytest {file} -k " + (f'"{chosen}"' if excluded else chosen)
     return f"python -m pytest {file}::{name}"
 
 

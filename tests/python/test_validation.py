@@ -61,7 +61,9 @@ def test_commands_select_one_test_of_a_file():
         "python -m pytest tests/test_rings.py -k rolls",
         "python -m pytest tests/test_rings.py -k rings_roll",
     ]
-    assert validation_page.command("tests/test_a.py", "test_rolls", "test_rolls_on") == (
+    longer = validation_page.command("tests/test_a.py", "test_a_rod_rolls", "def test_a_rod_rolls_down(): pass")
+    assert longer == 'python -m pytest tests/test_a.py -k "rolls and not down"'
+    assert validation_page.command("tests/test_a.py", "test_rolls", "# it rolls") == (
         "python -m pytest tests/test_a.py::test_rolls"
     )
 
