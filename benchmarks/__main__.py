@@ -22,6 +22,7 @@ NAMES = (
     "parallel",
     "rl_throughput",
     "work_precision",
+    "peers",
     "friction_precision",
     "robustness",
     "ablation",

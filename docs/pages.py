@@ -53,6 +53,7 @@ MADE_BY = {
 # Benchmarks by topic, the most important first: title of the page, and the question that the benchmark answers.
 BENCHMARKS = {
     "work_precision": ("Run time against error", "Which simulator reaches an error first, for beams and helices?"),
+    "peers": ("Scenes in three simulators", "How fast are withe, PyElastica and MuJoCo at the same error?"),
     "friction_precision": (
         "Run time against error, friction",
         "Which simulator reaches an error first with friction?",

@@ -36,6 +36,7 @@ def run(name, folder, *arguments):
     "name",
     [
         "work_precision",
+        "peers",
         "friction_precision",
         "robustness",
         "ablation",
@@ -120,6 +121,27 @@ def test_a_push_is_off_by_its_worst_force_above_the_limit():
     off = {force: 1.0 + 0.01 * i for i, force in enumerate(SLIDING)}
     assert greatest_error(lambda force: (off[force] * block(force), 1.0)) == pytest.approx(0.06)
     assert greatest_error(lambda force: (np.nan, 1.0)) == np.inf
+
+
+def test_rods_of_three_simulators_sag_as_the_elastica(interpreted):
+    pytest.importorskip("mujoco")
+    from peer_rods import ElasticaRod, MujocoRod, Rod, elastica_tip, slowest, withe_rod
+
+    light = Rod(weight=0.5)
+    exact = elastica_tip(0.5)
+    assert exact[1] == pytest.approx(-0.5 / 8.0, rel=0.01)
+    simulation = withe_rod(light, 24, integrator="static")
+    simulation.equilibrium()
+    pace = slowest(light)
+    stepped = MujocoRod(light, 24, 0.2 / pace, damping=2.0 * pace)
+    stepped.run(40.0 / pace)
+    for tip, most in ((simulation.positions()[-1], 1e-3), (stepped.nodes[1][-1], 1e-2)):
+        assert tip[[0, 2]] / light.length == pytest.approx(exact, abs=most * abs(exact[1]))
+    # Interpreted steps are slow: PyElastica falls freely at first, as does the rod of withe.
+    falling, ours = ElasticaRod(light, 8, 0.5), withe_rod(light, 8, time_step=1e-4, planar=True)
+    falling.run(2e-3, 1)
+    ours.run(2e-3, progress=False)
+    assert falling.nodes[1][-1, 2] == pytest.approx(ours.positions()[-1, 2], rel=0.02)
 
 
 @pytest.mark.parametrize("method", ["backward_euler", "backward_euler, on centrelines", "PyElastica"])
