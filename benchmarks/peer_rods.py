@@ -1,4 +1,4 @@
-"""A straight rod, clamped level at one end, in withe, PyElastica and MuJoCo: one description and three simulators.
+"""A straight rod, clamped level at one end, in withe, PyElastica and MuJoCo; and a twisted ring in the first two.
 
 The clamps of PyElastica and MuJoCo hold the first element. The wall of both is therefore in the middle of that
 element, by a first node half an element behind it; otherwise the rods would be half an element too short. All masses
@@ -21,7 +21,18 @@ from scipy.optimize import brentq
 
 import withe
 
-__all__ = ["ElasticaRod", "MujocoRod", "Rod", "elastica_tip", "slowest", "withe_rod"]
+__all__ = [
+    "ElasticaRing",
+    "ElasticaRod",
+    "MujocoRod",
+    "Ring",
+    "Rod",
+    "elastica_tip",
+    "out_of_plane",
+    "slowest",
+    "withe_ring",
+    "withe_rod",
+]
 
 FloatArray = npt.NDArray[np.float64]
 GRAVITY = 9.81  # [m/s^2]
@@ -81,6 +92,59 @@ def elastica_tip(weight: float) -> FloatArray:
     return np.array([tip[2], -tip[3]])
 
 
+@dataclass(frozen=True)
+class Ring:
+    """A straight rod that is closed to a ring without twist, and whose natural twist then grows.
+
+    The ring leaves its plane at a total twist of 2 pi sqrt(3) EI / GJ [Michell 1889]. With GJ = 2.5 EI it does so
+    gradually; with the stiffness of a round section it folds over itself.
+
+    Attributes
+    ----------
+    radius, thickness : float [m]
+        Of the ring, and of its section.
+    modulus, density : float [Pa], [kg/m^3]
+    twist_ratio : float
+        GJ / EI.
+    share : float
+        Natural twist, over the critical one.
+    """
+
+    radius: float = 0.05
+    thickness: float = 1.5e-3
+    modulus: float = 1e7
+    density: float = 1200.0
+    twist_ratio: float = 2.5
+    share: float = 1.1
+
+    @property
+    def area(self) -> float:
+        """Area of the section [m^2]."""
+        return math.pi * self.thickness**2
+
+    @property
+    def bending(self) -> float:
+        """EI [N m^2]."""
+        return 0.25 * self.modulus * math.pi * self.thickness**4
+
+    @property
+    def natural_twist(self) -> float:
+        """Natural twist per length [rad/m]."""
+        return self.share * math.sqrt(3.0) / (self.twist_ratio * self.radius)
+
+    @property
+    def pace(self) -> float:
+        """Angular frequency of bending waves as long as the ring's radius [rad/s]."""
+        return math.sqrt(self.bending / (self.density * self.area)) / self.radius**2
+
+
+def out_of_plane(points: FloatArray) -> float:
+    """RMS distance of points from their plane, over the RMS of their greatest extent; zero for a flat ring."""
+    centred = points - points.mean(axis=0)
+    least, *_, greatest = np.linalg.eigvalsh(centred.T @ centred)
+    return math.sqrt(max(least, 0.0) / greatest)
+
+
 # --- withe -----------------------------------------------------------------------------------------------------
 
 
@@ -96,6 +160,29 @@ def withe_rod(rod: Rod, edges: int, **options: object) -> withe.Simulation:
     if rod.height is not None:
         scene.add_floor()
     return scene.build(**options)
+
+
+def withe_ring(ring: Ring, nodes: int) -> withe.Simulation:
+    """The twisted ring in withe, held by pins against rigid motion only."""
+    scene = withe.Scene(gravity=(0.0, 0.0, 0.0))
+    stiffness = withe.Stiffness(
+        stretch=ring.modulus * ring.area, bend=(ring.bending, ring.bending), twist=ring.twist_ratio * ring.bending
+    )
+    rod = scene.add_rod(
+        points=withe.shapes.circle(ring.radius, nodes),
+        closed=True,
+        natural="straight",
+        normal=(0.0, 0.0, 1.0),
+        radius=ring.thickness,
+        stiffness=stiffness,
+        line_density=ring.density * ring.area,
+    )
+    scene.pin(rod.node(0))
+    scene.pin(rod.node(nodes // 2), free=(1.0, 0.0, 0.0))
+    scene.pin(rod.node(nodes // 4), free=[(1.0, 0.0, 0.0), (0.0, 1.0, 0.0)])
+    simulation = scene.build(integrator="static", planar=False)
+    simulation.set(rod, natural_twist=ring.natural_twist)
+    return simulation
 
 
 # --- PyElastica ------------------------------------------------------------------------------------------------
@@ -182,6 +269,70 @@ class ElasticaRod:
         """Arc length from the wall over the length, and positions [m]."""
         rest = np.concatenate([[0.0], np.cumsum(self.rod.rest_lengths)])
         return (rest - 0.5 * rest[1]) / (rest[-1] - 0.5 * rest[1]), self.rod.position_collection.T.copy()
+
+
+class ElasticaRing:
+    """The twisted ring in PyElastica, which a small velocity across its plane disturbs.
+
+    Parameters
+    ----------
+    ring : Ring
+    elements : int
+    share : float
+        Time step, as that of `ElasticaRod`.
+    damping : float [1/s]
+        Rate at which velocities decay.
+    """
+
+    def __init__(self, ring: Ring, elements: int, share: float, damping: float) -> None:
+        import elastica
+        from elastica.timestepper.symplectic_steppers import PositionVerlet
+
+        class System(elastica.BaseSystemCollection, elastica.Constraints, elastica.Damping): ...
+
+        length = 2.0 * math.pi * ring.radius
+        edge = min(length / elements, 2.0 * ring.thickness)
+        self._step = np.float64(share * edge / math.sqrt(ring.modulus / ring.density))
+        self._system, self._stepper, self._time = System(), PositionVerlet(), np.float64(0.0)
+        self._reach = 10.0 * ring.radius
+        self.rod = elastica.CosseratRod.ring_rod(
+            elements,
+            ring_center_position=np.zeros(3),
+            direction=np.array([1.0, 0.0, 0.0]),
+            normal=np.array([0.0, 0.0, 1.0]),
+            base_length=length,
+            base_radius=ring.thickness,
+            density=ring.density,
+            youngs_modulus=ring.modulus,
+            shear_modulus=ring.modulus / 3.0,
+        )
+        self.rod.bend_matrix[2, 2] = ring.twist_ratio * ring.bending
+        self.rod.rest_kappa[:] = np.array([[0.0], [0.0], [ring.natural_twist]])
+        turns = 4.0 * np.pi * np.arange(elements) / elements
+        self.rod.velocity_collection[2] += 5e-3 * ring.pace * ring.radius * np.sin(turns)
+        self._system.append(self.rod)
+        self._system.dampen(self.rod).using(
+            elastica.AnalyticalLinearDamper, uniform_damping_constant=damping, time_step=float(self._step)
+        )
+        self._system.finalize()
+
+    def run(self, duration: float) -> tuple[float, FloatArray]:
+        """Processor time [s], and positions of the nodes, shape (nodes, 3) [m]; NaN where it diverged."""
+        count = max(1, round(duration / self._step))
+        step, system, now = self._stepper.step, self._system, self._time
+        start = time.thread_time()
+        with np.errstate(all="ignore"):
+            for _ in range(count):
+                now = step(system, now, self._step)
+        self._time = now
+        seconds, points = time.thread_time() - start, self.rod.position_collection.T.copy()
+        return seconds, points if np.abs(points).max() < self._reach else np.full_like(points, np.nan)
+
+    @property
+    def nodes(self) -> tuple[FloatArray, FloatArray]:
+        """Share of the circumference, and positions [m]."""
+        points = self.rod.position_collection.T.copy()
+        return np.arange(len(points)) / len(points), points
 
 
 # --- MuJoCo ----------------------------------------------------------------------------------------------------
