@@ -102,5 +102,5 @@ def test_ends_that_do_not_face_each_other_stay_apart():
     mask[60:70, 165:280] = True  # 25 px further on, and two widths aside
     assert len(trace_mask(mask)) == 2
     mask[60:70] = False
-    mask[41:48, 165:280] = True  # 0.7 times as wide
+    mask[42:48, 165:280] = True  # 0.6 times as wide
     assert len(trace_mask(mask)) == 2
