@@ -1,6 +1,7 @@
 #include "vision/labels.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -220,6 +221,23 @@ void paint_discs(const BitImage& mask, const Tracing& tracing, std::int32_t* lab
       if (over.closed || (row >= 0 && row < over.centreline.rows())) paint(crossing.over.cable, row);
     }
   }
+}
+
+double labelled_share(const BitImage& mask, const std::int32_t* labels) {
+  if (mask.count() == 0) return 1.0;
+  const BitImage opened = dilate(erode(mask));
+  std::size_t all = 0;
+  std::size_t labelled = 0;
+  for (int y = 0; y < opened.height(); ++y) {
+    const std::int32_t* row = labels + static_cast<std::ptrdiff_t>(y) * opened.width();
+    for (int w = 0; w < opened.words(); ++w) {
+      for (std::uint64_t rest = opened.row(y)[w]; rest != 0; rest &= rest - 1) {
+        ++all;
+        labelled += row[64 * w + std::countr_zero(rest)] > 0;
+      }
+    }
+  }
+  return all == 0 ? 0.0 : static_cast<double>(labelled) / static_cast<double>(all);
 }
 
 }  // namespace withe

@@ -4,6 +4,7 @@
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -102,6 +103,7 @@ py::dict trace_lines(const Bytes& mask, const std::optional<Bytes>& image, const
                     .cast<py::array_t<std::int32_t>>();
   std::int32_t* pixels = labels.mutable_data();
   Tracing tracing;
+  double labelled = 1.0;
   {
     const py::gil_scoped_release release;
     if (published) {
@@ -116,8 +118,12 @@ py::dict trace_lines(const Bytes& mask, const std::optional<Bytes>& image, const
       paint_labels(bits, tracing, pixels);
       watch.lap("labels");
     }
+    labelled = labelled_share(bits, pixels);
   }
-  return to_python(tracing, labels);
+  py::dict result = to_python(tracing, labels);
+  result["cover"] = static_cast<double>(bits.count()) / std::max(1.0, double(bits.height()) * double(bits.width()));
+  result["labelled"] = labelled;
+  return result;
 }
 
 Bytes hsv_mask(const Bytes& image, const std::vector<std::pair<std::array<int, 3>, std::array<int, 3>>>& ranges) {

@@ -10,6 +10,7 @@ __all__ = [
     "EnergyDriftWarning",
     "OutOfPlaneWarning",
     "PlausibilityWarning",
+    "PoorMaskWarning",
     "RingLeftWarning",
     "RodCrossingWarning",
     "SqueezedRodWarning",
@@ -80,6 +81,15 @@ class PlausibilityWarning(UserWarning):
     - a `withe.learning.Task.build` that draws random numbers without `redraw`, so that all robots are equal.
 
     ``warnings.simplefilter("ignore", withe.PlausibilityWarning)`` disables the warning.
+    """
+
+
+class PoorMaskWarning(UserWarning):
+    """The mask of a picture does not look like cables, so the tracing is probably wrong.
+
+    The message names what is unlike cables: the share of the picture, parts without a cable, many short pieces, or very
+    different widths. Give `mask=` to `withe.perception.trace`: a filter by colour (`color_filter`), a network
+    (`network_mask`), or an array. `Tracing.mask_quality` has the numbers.
     """
 
 

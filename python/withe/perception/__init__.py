@@ -7,6 +7,7 @@
 
 from withe.perception.camera import Camera
 from withe.perception.drawing import draw
+from withe.perception.mask_quality import MaskQuality
 from withe.perception.masks import border_filter, color_filter, ground_filter, network_mask
 from withe.perception.results import Ambiguity, Crossing, Joint, Tracing
 from withe.perception.tags import TagDetection, detect_tags
@@ -17,6 +18,7 @@ __all__ = [
     "Camera",
     "Crossing",
     "Joint",
+    "MaskQuality",
     "TagDetection",
     "Tracing",
     "border_filter",

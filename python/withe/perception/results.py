@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from withe.perception.camera import Camera
+from withe.perception.mask_quality import MaskQuality
 
 __all__ = ["Ambiguity", "Crossing", "Joint", "Tracing"]
 
@@ -86,6 +87,9 @@ class Tracing:
         Crossings of pairs of strands; three cables at one point have three crossings.
     joints : list of Joint
     ambiguous : list of Ambiguity
+    mask_quality : MaskQuality or None
+        Measures of the mask. ``mask_quality.is_good`` is False where the mask does not look like cables; then `trace`
+        warns with `PoorMaskWarning`. None for a tracing from `from_dict`.
     timings : dict of str to float [s]
         Time by step.
     """
@@ -97,6 +101,7 @@ class Tracing:
     crossings: list[Crossing] = field(default_factory=list)
     joints: list[Joint] = field(default_factory=list)
     ambiguous: list[Ambiguity] = field(default_factory=list)
+    mask_quality: MaskQuality | None = None
     timings: dict[str, float] = field(default_factory=dict)
 
     def points(self, cable: int, camera: Camera, height: float = 0.0, radius: float | None = None) -> Array:

@@ -11,6 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from withe import _core
 from withe.common.extras import require
+from withe.common.user_warnings import warn
+from withe.errors import PoorMaskWarning
+from withe.perception.mask_quality import measure_quality
 from withe.perception.masks import MaskFunction, ground_filter
 from withe.perception.results import Ambiguity, Crossing, Joint, Tracing
 
@@ -43,7 +46,15 @@ def check_mask(mask: ArrayLike, name: str = "mask") -> NDArray[np.uint8]:
 
 
 def _tracing(found: dict[str, Any]) -> Tracing:
+    quality = measure_quality(found["cover"], found["labelled"], found["centrelines"], found["widths"])
+    if not quality.is_good:
+        warn(
+            f"the mask does not look like cables: {', '.join(quality.reasons)}. Give mask= to trace, such as a "
+            "color_filter, a network_mask or an array, or take the picture on a plain ground",
+            PoorMaskWarning,
+        )
     return Tracing(
+        mask_quality=quality,
         centrelines=found["centrelines"],
         widths=found["widths"],
         closed=found["closed"],
@@ -121,6 +132,11 @@ def trace(
     Returns
     -------
     Tracing
+
+    Warns
+    -----
+    PoorMaskWarning
+        The mask does not look like cables, so the tracing is probably wrong.
 
     Raises
     ------
