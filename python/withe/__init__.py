@@ -16,6 +16,7 @@ from withe.batch import Batch
 from withe.batch.records import BatchRecord, Equilibria
 from withe.common.frames import EnergyHistory
 from withe.common.outlines import ObstacleOutline, RodOutline, SpringOutline, TendonOutline
+from withe.common.progress import progress as progress_bar
 from withe.errors import (
     BranchChangedWarning,
     CoarseMeshWarning,
@@ -126,6 +127,7 @@ __all__ = [
     "knots",
     "learning",
     "perception",
+    "progress_bar",
     "real2sim",
     "run_many",
     "shapes",

@@ -16,7 +16,7 @@ from withe.common.extras import require
 from withe.common.outlines import ObstacleOutline, RodOutline
 from withe.recording import Record
 from withe.recording.recorder import Recorder, present
-from withe.view import colors, figures, films, ghosts, graphics, rendering, scenery
+from withe.view import colors, films, ghosts, graphics, rendering, scenery, style
 
 
 @pytest.fixture
@@ -485,7 +485,7 @@ def test_every_label_of_a_scale_is_a_round_number():
 def test_ticks_of_a_box_keep_away_from_the_corners_where_labels_would_meet(limits):
     low, high = limits
     for count in (1, 2, 4):
-        ticks = figures._ticks(low, high, count)
+        ticks = style._ticks(low, high, count)
         assert len(ticks) >= min(count, 2)
         assert low + 0.1 * (high - low) <= min(ticks)
         assert max(ticks) <= high - 0.1 * (high - low)

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common.frames import Frames, edges_to_nodes, stencils_to_nodes
+from withe.view import style
 
 __all__ = [
     "BARS",
@@ -26,7 +27,7 @@ __all__ = [
 FloatArray = npt.NDArray[np.float64]
 ColorBy = Literal["rod", "tension", "curvature", "twist", "speed"]
 
-_PALETTE = ("#2a9d8f", "#e76f51", "#457b9d", "#e9b44c", "#8d6a9f", "#6a994e", "#c8553d", "#4f6d7a")
+_PALETTE = style.colors("light").cycle
 PLANE_COLOR, SOLID_COLOR = "#e3e8ec", "#b4bdc5"
 BARS = {
     "tension": ("tension [N]", "viridis"),

@@ -12,7 +12,7 @@ from withe.common.extras import require
 from withe.common.frames import Frames
 from withe.common.keywords import keyword_hints
 from withe.common.outlines import ObstacleOutline, RodOutline
-from withe.view import scenery
+from withe.view import scenery, style
 from withe.view.tendons import tendon_points
 
 __all__ = ["plot"]
@@ -21,7 +21,7 @@ FloatArray = npt.NDArray[np.float64]
 
 
 @keyword_hints
-def plot(record: Frames, *, shapes: int = 6) -> Any:
+def plot(record: Frames, *, shapes: int = 6, theme: style.Theme = "light") -> Any:
     """Draw the shapes of the rods at several times, and the energies over time.
 
     Obstacles near the rods are drawn too: in two dimensions planes as lines, and spheres and capsules as outlines; in
@@ -33,6 +33,8 @@ def plot(record: Frames, *, shapes: int = 6) -> Any:
     record : Record
     shapes : int
         Number of times, evenly chosen, with the first and last among them.
+    theme : {"light", "dark"}
+        Colours of the figure; see `withe.view.style`.
 
     Returns
     -------
@@ -43,7 +45,7 @@ def plot(record: Frames, *, shapes: int = 6) -> Any:
     Raises
     ------
     ValueError
-        A record without frames, or fewer than one shape.
+        A record without frames, fewer than one shape, or an unknown theme.
     ImportError
         matplotlib is not installed.
 
@@ -56,53 +58,40 @@ def plot(record: Frames, *, shapes: int = 6) -> Any:
     if int(shapes) != shapes or shapes < 1:
         raise ValueError(f"shapes must be a positive integer, got {shapes!r}")
     pyplot = require("matplotlib.pyplot", "view")
-    with pyplot.rc_context(_STYLE):
+    with style.context(theme) as colors:
         single = len(record) == 1
-        figure = pyplot.figure(figsize=(5.5, 4.6) if single else (11.0, 4.6), layout="constrained")
-        grid = figure.add_gridspec(1, 1 if single else 2, width_ratios=[1] if single else [1.1, 1.0])
-        axes = _plot_shapes(figure, grid[0], record, int(shapes))
+        figure = pyplot.figure(figsize=(5.5, 4.6) if single else (11.0, 4.6))
+        size = np.ptp(record.positions().reshape(-1, 3), axis=0)
+        share = 0.7 if size[2] > 2.0 * max(size[:2]) else 1.1  # tall shapes need less room
+        grid = figure.add_gridspec(1, 1 if single else 2, width_ratios=[1] if single else [share, 1.0])
+        axes, around = _plot_shapes(figure, grid[0], record, int(shapes), colors)
         if not single:
-            _plot_energies(figure.add_subplot(grid[1]), record)
+            _plot_energies(figure.add_subplot(grid[1]), record, colors)
         if axes.name == "3d":
-            _fit(axes)
+            style.fill_frame(axes, around)
     if "inline" in pyplot.get_backend():
         pyplot.close(figure)  # a notebook would show it twice, since it also shows the returned figure
     return figure
 
 
-_STYLE = {
-    "axes.edgecolor": "#8a9299",
-    "axes.labelcolor": "#33383d",
-    "axes.spines.right": False,
-    "axes.spines.top": False,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "grid.color": "#e3e7ea",
-    "grid.linewidth": 0.8,
-    "xtick.color": "#5c646b",
-    "ytick.color": "#5c646b",
-    "legend.frameon": False,
-    "lines.solid_capstyle": "round",
-    "font.size": 10,
-}
 _UNSEEN = 0.05  # relative to the thickness of a rod
-_OBSTACLE, _OBSTACLE_FILL = "#8a9299", "#d9dfe4"
-_ENERGY_COLOURS = {
-    "kinetic": "#e76f51",
-    "stretch": "#e9b44c",
-    "bend": "#2a9d8f",
-    "twist": "#8d6a9f",
-    "gravity": "#457b9d",
-    "loads": "#6a994e",
-    "contact": "#c8553d",
-    "spring": "#bc6c9b",
-    "total": "#33383d",
+_ENERGY_COLORS = {  # names of colours; energies of one colour differ in their dashes
+    "kinetic": "red",
+    "stretch": "orange",
+    "bend": "green",
+    "twist": "purple",
+    "gravity": "blue",
+    "loads": "sky",
+    "contact": "grey",
+    "spring": "purple",
+    "total": "ink",
 }
+_DASHED = {"spring": "-.", "total": "--"}
 
 
-def _plot_shapes(figure: Any, place: Any, record: Frames, count: int) -> Any:
-    colormaps = require("matplotlib", "view").colormaps
-    colors = require("matplotlib.colors", "view")
+def _plot_shapes(figure: Any, place: Any, record: Frames, count: int, colors: style.Colors) -> tuple[Any, FloatArray]:
+    """Return the axes, and the points that they are to contain in three dimensions."""
+    normalize = require("matplotlib.colors", "view").Normalize
     cm = require("matplotlib.cm", "view")
     positions, times = record.positions(), record.times
     frames = np.unique(np.linspace(0, len(record) - 1, count).round().astype(int))
@@ -112,9 +101,8 @@ def _plot_shapes(figure: Any, place: Any, record: Frames, count: int) -> Any:
     three = axes_shown is None
     shown = list(range(3)) if axes_shown is None else axes_shown
     axes = figure.add_subplot(place, projection="3d" if three else None)
-    late = colors.LinearSegmentedColormap.from_list("ink", colormaps["YlGnBu"](np.linspace(0.3, 1.0, 64)))
-    end = times[-1] if times[-1] > times[0] else times[0] + 1.0
-    scale = cm.ScalarMappable(colors.Normalize(times[0], end), late)
+    start = times[0] if times[-1] > times[0] else times[-1] - 1.0
+    scale = cm.ScalarMappable(normalize(start, times[-1]), style.ramp())
     tendons = [tendon_points(record, tendon) for tendon in record.tendons]
     for frame in frames:
         for rod in record.rods:
@@ -136,24 +124,19 @@ def _plot_shapes(figure: Any, place: Any, record: Frames, count: int) -> Any:
         around.append(scenery.framing(obstacle, places, nodes))
         still = bool(np.all(places == places[0]))
         for place, time in zip(places[: 1 if still else None], times[frames], strict=False):
-            ink = _OBSTACLE if still else scale.to_rgba(time)
+            ink = colors.grey if still else scale.to_rgba(time)
             if three:
-                _draw_solid(axes, obstacle, place, np.concatenate([nodes, *around]), factor, ink)
+                _draw_solid(axes, obstacle, place, np.concatenate([nodes, *around]), factor, ink, colors)
             else:
-                _draw_section(axes, obstacle, place, nodes, shown, factor, ink)
-    names = "xyz"
-    axes.set_xlabel(f"{names[shown[0]]} [{prefix}m]")
-    axes.set_ylabel(f"{names[shown[1]]} [{prefix}m]")
-    if three:
-        axes.set_zlabel(f"z [{prefix}m]")
-        _box(axes, np.concatenate([nodes, *around]) * factor)
-    else:
+                _draw_section(axes, obstacle, place, nodes, shown, factor, ink, colors)
+    style.label(axes, *(("xyz"[axis], f"{prefix}m") for axis in shown))
+    if not three:
         axes.set_aspect("equal", adjustable="datalim")
     if len(frames) > 1:
-        bar = figure.colorbar(scale, ax=axes, shrink=0.75, pad=0.12 if three else 0.03)
+        bar = figure.colorbar(scale, ax=axes, shrink=0.75, pad=0.03)
         bar.set_label("time [s]")
         bar.outline.set_visible(False)
-    return axes
+    return axes, np.concatenate([nodes, *around]) * factor
 
 
 def _draw_section(
@@ -164,13 +147,14 @@ def _draw_section(
     shown: list[int],
     factor: float,
     ink: Any,
+    colors: style.Colors,
 ) -> None:
     """An obstacle where it is seen along one coordinate: the line of a plane, the outline of a sphere or capsule."""
     if obstacle.kind == "capsule":
         first, second = (end[shown] * factor for end in scenery.ends(obstacle, place))
         outline = scenery.profile(first, second, obstacle.radius * factor)
         shape = require("matplotlib.patches", "view").Polygon(
-            outline, facecolor=_OBSTACLE_FILL, edgecolor=ink, linewidth=1.2, zorder=1.5
+            outline, facecolor=colors.pale, edgecolor=ink, linewidth=1.2, zorder=1.5
         )
         axes.add_artist(shape)
         if len(scenery.framing(obstacle, place[None], nodes)):
@@ -188,60 +172,28 @@ def _draw_section(
 
 
 def _draw_solid(
-    axes: Any, obstacle: ObstacleOutline, place: FloatArray, nodes: FloatArray, factor: float, ink: Any
+    axes: Any,
+    obstacle: ObstacleOutline,
+    place: FloatArray,
+    nodes: FloatArray,
+    factor: float,
+    ink: Any,
+    colors: style.Colors,
 ) -> None:
     """An obstacle in three dimensions, see-through: a patch of a plane, a sphere or a capsule."""
     if not len(scenery.framing(obstacle, place[None], nodes)):
         return
     if obstacle.kind == "plane":
         corners = scenery.patch(obstacle, place, nodes, 0.3)[[0, 1, 3, 2]].reshape(2, 2, 3) * factor
-        axes.plot_surface(*np.moveaxis(corners, -1, 0), color=_OBSTACLE_FILL, alpha=0.5, shade=False)
+        axes.plot_surface(*np.moveaxis(corners, -1, 0), color=colors.pale, alpha=0.5, shade=False)
         return
     grid = scenery.surface(obstacle, place) * factor
     axes.plot_surface(*np.moveaxis(grid, -1, 0), color=ink, alpha=0.35, linewidth=0.0)
 
 
-def _box(axes: Any, positions: FloatArray) -> None:
-    """Set three axes of equal scale around all positions, with few ticks if there is little space."""
-    points = positions.reshape(-1, 3)
-    size = np.ptp(points, axis=0)
-    spans = np.maximum(1.05 * size, 0.1 * size.max())
-    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    for axis, centre, span in zip((axes.xaxis, axes.yaxis, axes.zaxis), middle, spans, strict=True):
-        # matplotlib measures these distances, and its own 8 and 21 points, by the spans of the other two axes.
-        others = spans.max() / np.sqrt(0.5 * (spans @ spans - span**2))
-        axis.set_tick_params(pad=10.0 * others - 8.0)
-        axis.labelpad = 26.0 * others - 21.0
-        axis.set_view_interval(centre - 0.5 * span, centre + 0.5 * span, ignore=True)
-        axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
-        axis.set_ticks(_ticks(centre - 0.5 * span, centre + 0.5 * span, max(1, round(4.0 * span / spans.max()))))
-
-
-def _ticks(low: float, high: float, count: int) -> list[float]:
-    """Return round numbers, not near both ends, where their labels would overlap those of the next axis."""
-    ticker = require("matplotlib.ticker", "view")
-    room = 0.1 * (high - low)
-    for wanted in range(count, count + 6):
-        ticks = [float(t) for t in ticker.MaxNLocator(wanted).tick_values(low, high) if low + room <= t <= high - room]
-        if len(ticks) >= min(2, count):
-            break
-    return ticks
-
-
-def _fit(axes: Any) -> None:
-    """Make a box smaller until the page has room for its labels, of which the layout does not know."""
-    spans, page = np.ptp([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()], axis=1), axes.figure.bbox
-    for zoom in np.arange(1.0, 0.4, -0.05):
-        axes.set_box_aspect(spans, zoom=zoom)
-        axes.figure.draw_without_rendering()
-        drawn = axes.get_tightbbox()
-        if np.all(drawn.min >= page.min) and np.all(drawn.max <= page.max):
-            break
-
-
-def _plot_energies(axes: Any, record: Frames) -> None:
+def _plot_energies(axes: Any, record: Frames, colors: style.Colors) -> None:
     energy, times = record.energy(), record.times
-    curves = {name: getattr(energy, name) for name in _ENERGY_COLOURS}
+    curves = {name: getattr(energy, name) for name in _ENERGY_COLORS}
     # Heights have no zero of their own: gravity counts from the first frame.
     curves["total"] = curves["total"] - energy.gravity[0]
     curves["gravity"] = curves["gravity"] - energy.gravity[0]
@@ -249,14 +201,12 @@ def _plot_energies(axes: Any, record: Frames) -> None:
     factor, prefix = _prefix(largest, (1.0, 1e-3, 1e-6, 1e-9))
     for name, values in curves.items():
         if name == "total" or np.abs(values).max() > 2e-3 * largest:
-            width = 1.4 if name == "total" else 1.8
-            style = "--" if name == "total" else "-"
-            label = "gravity, from the start" if name == "gravity" else name
-            axes.plot(times, values * factor, style, color=_ENERGY_COLOURS[name], linewidth=width, label=label)
-    axes.set_xlabel("time [s]")
-    axes.set_ylabel(f"energy [{prefix}J]")
+            text = "gravity, from the start" if name == "gravity" else name
+            color = getattr(colors, _ENERGY_COLORS[name])
+            axes.plot(times, values * factor, _DASHED.get(name, "-"), color=color, label=text)
+    style.label(axes, x=("time", "s"), y=("energy", f"{prefix}J"))
     axes.margins(x=0.0)
-    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, columnspacing=1.2, handlelength=1.6)
+    style.legend(axes, side="top")
 
 
 def _prefix(largest: float, units: tuple[float, ...]) -> tuple[float, str]:
