@@ -13,15 +13,12 @@ import sys
 import time
 from pathlib import Path
 
-import matplotlib
-
-matplotlib.use("Agg")
-
 import matplotlib.pyplot as plt
 import numpy as np
 from scipy.integrate import solve_bvp
 
 import withe
+from withe.view import style
 
 LENGTH = 0.3  # [m]
 RADIUS = 2e-4  # [m]
@@ -68,35 +65,28 @@ def elastica() -> np.ndarray:
 
 def draw(simulation: withe.Simulation, path: Path) -> None:
     """The shape against theory, and how the error of the tip falls with the number of nodes."""
-    plt.rcParams |= {
-        "font.size": 10,
-        "axes.spines.top": False,
-        "axes.spines.right": False,
-        "axes.edgecolor": "#8a9299",
-        "axes.grid": True,
-        "axes.axisbelow": True,
-        "grid.color": "#e3e7ea",
-        "legend.frameon": False,
-    }
-    figure, (left, right) = plt.subplots(1, 2, figsize=(10.5, 4.6), layout="constrained", width_ratios=(1.25, 1))
+    colors = style.use()
+    figure, (left, right) = plt.subplots(1, 2, figsize=(10.5, 4.6), width_ratios=(1.25, 1))
     theory, nodes = elastica(), shape(simulation)
-    left.plot([0, 1], [0, 0], color="#c5ccd1", linewidth=5, solid_capstyle="round", label="without weight")
-    left.plot(*nodes.T, color="#2a9d8f", linewidth=5, solid_capstyle="round", label=f"withe, {len(nodes)} nodes")
-    left.plot(*theory.T, color="#22313a", linewidth=1.3, linestyle=(0, (5, 4)), label="elastica")
-    left.plot(*TIP, "o", markersize=11, markerfacecolor="none", color="#e76f51", label="tip by theory")
-    left.axvline(0.0, color="#5c646b", linewidth=2)
-    left.set(xlabel="x / L", ylabel="z / L", title=f"A rod under its own weight, w L³ / B = {G:g}", aspect="equal")
-    left.legend(loc="upper right", bbox_to_anchor=(1.0, 0.93))
+    left.plot([0, 1], [0, 0], color=colors.pale, linewidth=5, solid_capstyle="round", label="without weight")
+    left.plot(*nodes.T, color=colors.blue, linewidth=5, solid_capstyle="round", label=f"withe, {len(nodes)} nodes")
+    left.plot(*theory.T, color=colors.ink, linewidth=1.3, linestyle=(0, (5, 4)), label="elastica")
+    left.plot(*TIP, "o", markersize=11, markerfacecolor="none", color=colors.red, label="tip by theory")
+    left.axvline(0.0, color=colors.grey, linewidth=2)
+    left.set(title=f"A rod under its own weight, w L³ / B = {G:g}", aspect="equal")
+    style.label(left, x="x / L", y="z / L")
+    style.legend(left, side="top", ncols=4)
 
     counts = np.array([11, 21, 41, 81, 161, 321])
     errors = [np.linalg.norm(shape(sagging_rod(count)[0])[-1] - theory[-1]) for count in counts]
-    right.loglog(counts - 1, errors, "o-", color="#2a9d8f", linewidth=1.8, label="withe")
-    right.loglog(counts - 1, errors[-1] * (320.0 / (counts - 1)) ** 2, "--", color="#8a9299", label="second order")
-    right.axhline(TOLERANCE, color="#e76f51", linewidth=1.2, label="what this example demands")
-    right.set(xlabel="edges", ylabel="error of the tip / L", title="Edges half as long: a quarter of the error")
-    right.legend()
+    right.loglog(counts - 1, errors, "o-", color=colors.blue, linewidth=1.8, label="withe")
+    right.loglog(counts - 1, errors[-1] * (320.0 / (counts - 1)) ** 2, "--", color=colors.grey, label="second order")
+    right.axhline(TOLERANCE, color=colors.red, linewidth=1.2, label="what this example demands")
+    right.set(title="Edges half as long: a quarter of the error")
+    style.label(right, x="number of edges", y="error of the tip / L")
+    style.legend(right, side="top")
     path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=160)
+    figure.savefig(path)
     plt.close(figure)
 
 

@@ -19,9 +19,11 @@ import sys
 import time
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 import withe
+from withe.view import style
 
 RADIUS, PITCH, HEIGHT, NODES = 0.01, 0.05, 0.2, 68  # of a helix [m], [m], [m], [-]
 THICKNESS, SIDE, RATE = 1e-3, 0.03, 15.0  # radius of a flagellum [m], side of the polygon [m], turning [rad/s]
@@ -81,30 +83,28 @@ def distances(record: withe.Record) -> tuple[np.ndarray, np.ndarray]:
 
 def draw(records: dict[str, withe.Record], path: Path) -> None:
     """The flagella at the end under both models, and how far apart they were."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure = plt.figure(figsize=(9.6, 4.4), layout="constrained")
+    colors = style.use()
+    figure, boxes = plt.figure(figsize=(10.4, 4.4)), []
     titles = {"stokeslets": "Stokeslet segments", "resistive": "resistive-force theory"}
-    colors = {"stokeslets": "#00798c", "resistive": "#d1495b"}
+    colors = {"stokeslets": colors.blue, "resistive": colors.red}
     for place, (model, record) in enumerate(records.items()):
+        shapes = [1e2 * record.positions(rod)[-1] for rod in record.rods]
         axes = figure.add_subplot(1, 3, place + 1, projection="3d")
-        for rod, color in zip(record.rods, itertools.cycle(plt.get_cmap("tab10").colors)):
-            axes.plot(*(1e2 * record.positions(rod)[-1]).T, color=color, linewidth=2.0)
-        axes.set(xlim=(-8, 8), ylim=(-8, 8), zlim=(-22, 0), xticks=(-8, 0, 8), yticks=(-8, 0, 8), title=titles[model])
-        axes.set(xlabel="x [cm]", ylabel="y [cm]")
-        axes.set_zlabel("z [cm]", labelpad=8)
-        axes.set_box_aspect((16, 16, 22), zoom=0.88)
+        for shape in shapes:
+            axes.plot(*shape.T, linewidth=2.0)
+        axes.set_title(titles[model])
+        style.label(axes, x=("x", "cm"), y=("y", "cm"), z=("z", "cm"))
         axes.view_init(elev=8, azim=-70)
+        boxes.append((axes, shapes))
     axes = figure.add_subplot(1, 3, 3)
     for model, record in records.items():
         axes.plot(record.times, 1e2 * distances(record)[0], color=colors[model], label=titles[model])
-    axes.set(xlabel="time [s]", ylabel="mean distance of the same nodes [cm]", ylim=(0.0, None))
-    axes.grid(True, color="#e3e7ea")
-    axes.legend(frameon=False)
-    figure.savefig(path, dpi=150)
+    axes.set(title="mean distance of the same nodes", ylim=(0.0, None))
+    style.label(axes, x=("time", "s"), y=("distance", "cm"))
+    style.legend(axes, side="top", ncols=1)
+    for box, _ in boxes:
+        style.fill_frame(box, [each for _, every in boxes for each in every])
+    figure.savefig(path)
     plt.close(figure)
 
 

@@ -19,9 +19,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import flagella
+import matplotlib.pyplot as plt
 import numpy as np
 
 import withe
+from withe.view import style
 
 PREPARED, PREPARED_STEP = 9.0, 5e-3  # [s]
 STEP = 1e-3  # [s]
@@ -129,46 +131,41 @@ def apart(runs: dict[str, Run]) -> np.ndarray:
 
 def draw(results: dict[tuple[int, float], dict[str, Run]], path: Path) -> None:
     """A bundle under both models, how far apart they are, and iterations over friction."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure = plt.figure(figsize=(11.0, 4.2), layout="constrained")
+    colors = style.use()
+    figure = plt.figure(figsize=(11.0, 4.2))
     axes = figure.add_subplot(1, 3, 1, projection="3d")
     count, friction = max(results, key=lambda key: (-key[1], key[0]))
     runs = results[count, friction]
-    for model, style, width in (("imcv2", "-", 2.0), ("barrier", "k:", 1.2)):
+    for model, dash, width in (("imcv2", "-", 2.0), ("barrier", ":", 1.2)):
         x = 1e2 * runs[model].simulation.positions().reshape(count, flagella.NODES, 3)
         for k, rod in enumerate(x):
-            axes.plot(*rod.T, style, linewidth=width, label=LABELS[model] if k == 0 else None)
-    axes.set(xlim=(-4, 4), ylim=(-4, 4), zlim=(-20, 0), xticks=(-4, 0, 4), yticks=(-4, 0, 4))
+            color = colors.cycle[k] if model == "imcv2" else colors.ink
+            axes.plot(*rod.T, dash, color=color, linewidth=width, label=LABELS[model] if k == 0 else None)
     axes.set_title(f"{count} flagella after {runs['imcv2'].simulation.time:.0f} s")
-    axes.set(xlabel="x [cm]", ylabel="y [cm]")
-    axes.set_zlabel("z [cm]", labelpad=8)
-    axes.set_box_aspect((8, 8, 20))
+    style.label(axes, x=("x", "cm"), y=("y", "cm"), z=("z", "cm"))
     axes.view_init(elev=8, azim=-70)
-    axes.legend(frameon=False, fontsize=8, loc="upper left")
+    style.legend(axes)
 
     middle, right = figure.add_subplot(1, 3, 2), figure.add_subplot(1, 3, 3)
     for (count, friction), runs in results.items():
         if friction == 0.0:
             distance = apart(runs)
             middle.semilogy(STEP * np.arange(1, len(distance) + 1), distance, label=f"{count} flagella")
-    middle.axhline(MOST_APART, color="0.6", linestyle="--", linewidth=1.0)
-    middle.set(xlabel="time in contact [s]", ylabel="mean distance of the same nodes, over the radius")
+    middle.axhline(MOST_APART, color=colors.grey, linestyle="--", linewidth=1.0, label="allowed")
+    middle.set_title("mean distance of the same nodes")
+    style.label(middle, x=("time in contact", "s"), y="distance / radius of a rod")
     places = np.arange(len(results))
-    for model, side, color in (("imcv2", -0.2, "#00798c"), ("barrier", 0.2, "#edae49")):
+    for model, side, color in (("imcv2", -0.2, colors.blue), ("barrier", 0.2, colors.orange)):
         values = [runs[model].means()[1] for runs in results.values()]
         right.bar(places + side, values, 0.38, color=color, label=LABELS[model])
     names = [f"M = {count}" + (f"\nμ = {friction:g}" if friction else "") for count, friction in results]
-    right.set_xticks(places, names, fontsize=8)
-    right.set(ylabel="iterations a step")
-    for axes in (middle, right):
-        axes.grid(True, color="#e3e7ea")
-        axes.set_axisbelow(True)
-        axes.legend(frameon=False, fontsize=8)
-    figure.savefig(path, dpi=150)
+    right.set_xticks(places, names)
+    right.set_title("cost")
+    style.label(right, y="iterations a step")
+    for panel in (middle, right):
+        style.legend(panel, side="top")
+    style.fill_frame(axes, x)
+    figure.savefig(path)
     plt.close(figure)
 
 

@@ -15,17 +15,18 @@ import argparse
 import sys
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 from withe import folding
+from withe.view import style
 
 EDGES, TIME_STEP = 150, 0.01  # [s]
 SLIDE_OFF = 2e-4  # [m]
 MOMENTS = 5  # number of pictures of a film
-SHEET, JAW, GHOST = "#00798c", "#d1495b", "#c9d1d6"
 
 
-def film(axes: np.ndarray, fold: folding.Fold, jaw: folding.Jaw, title: str) -> None:
+def film(axes: np.ndarray, fold: folding.Fold, jaw: folding.Jaw, title: str, colors: style.Colors) -> None:
     """Draw the sheet from the side at some moments, in front of its shapes between these moments."""
     record = fold.record
     frames = np.linspace(0, len(record) - 1, MOMENTS).round().astype(int)
@@ -33,27 +34,22 @@ def film(axes: np.ndarray, fold: folding.Fold, jaw: folding.Jaw, title: str) -> 
     held = int(np.searchsorted(positions[0, :, 0], 1e3 * jaw.depth + 1e-6))
     length = positions[0, -1, 0]
     for i, (panel, frame) in enumerate(zip(axes, frames, strict=True)):
-        panel.axhspan(-12, 0, color="#e3e7ea")
-        panel.axvline(length, color="#8a9299", linestyle=":", linewidth=1)
+        panel.axhspan(-12, 0, color=colors.pale)
+        panel.axvline(length, color=colors.grey, linestyle=":", linewidth=1)
         before = frames[i - 1] if i else 0
         for ghost in np.linspace(before, frame, 5).round().astype(int)[:-1]:
-            panel.plot(positions[ghost, :, 0], positions[ghost, :, 2], color=GHOST, linewidth=0.8)
-        panel.plot(positions[frame, :, 0], positions[frame, :, 2], color=SHEET, linewidth=1.6)
-        panel.plot(positions[frame, :held, 0], positions[frame, :held, 2], color=JAW, linewidth=4)
+            panel.plot(positions[ghost, :, 0], positions[ghost, :, 2], color=colors.grey, alpha=0.5, linewidth=0.8)
+        panel.plot(positions[frame, :, 0], positions[frame, :, 2], color=colors.blue, linewidth=1.6)
+        panel.plot(positions[frame, :held, 0], positions[frame, :held, 2], color=colors.red, linewidth=4)
         panel.text(0.97, 0.93, f"{record.times[frame]:.1f} s", transform=panel.transAxes, ha="right", va="top")
         panel.set(xlim=(-30, 500), ylim=(-12, 190), aspect="equal")
-        panel.tick_params(labelsize=8)
-    axes[0].set_ylabel("z [mm]")
+        panel.grid(False)
+    style.label(axes[0], y=("z", "mm"))
     axes[0].text(0.0, 1.08, title, transform=axes[0].transAxes, fontsize=10).set_in_layout(False)
 
 
 def main() -> None:
     """Plan, fold, compare, draw."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--edges", type=int, default=EDGES)
     parser.add_argument("--time-step", type=float, default=TIME_STEP)
@@ -75,12 +71,13 @@ def main() -> None:
             f"{name}: it slides by {1e3 * fold.slide:.2f} mm (predicted {1e3 * plan.slide[-1]:.2f}), "
             f"and the edges miss by {2e3 * abs(fold.error):.2f} mm"
         )
-    figure, axes = plt.subplots(3, MOMENTS, figsize=(15, 4.6), sharex=True, sharey=True, layout="constrained")
+    colors = style.use()
+    figure, axes = plt.subplots(3, MOMENTS, figsize=(15, 4.6), sharex=True, sharey=True)
     for row, fold, title in zip(axes, folds, titles, strict=True):
-        film(row, fold, sheet.jaw, title)
+        film(row, fold, sheet.jaw, title, colors)
     for panel in axes[-1]:
-        panel.set_xlabel("x [mm]")
-    figure.savefig(options.out / "fold_sheet.png", dpi=120)
+        style.label(panel, x=("x", "mm"))
+    figure.savefig(options.out / "fold_sheet.png")
     plt.close(figure)
     print("\n".join(title[0].upper() + title[1:] + "." for title in titles))
     print(f"Wrote {options.out / 'fold_sheet.png'}.")

@@ -15,9 +15,11 @@ import argparse
 import sys
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 import withe
+from withe.view import style
 
 LENGTH, RADIUS, DENSITY, GRAVITY, FRICTION = 1.0, 2.5e-2, 509.2985, 9.8, 0.4
 MASS = DENSITY * np.pi * RADIUS**2 * LENGTH  # 1 kg
@@ -41,21 +43,15 @@ def resting() -> tuple[withe.Simulation, withe.Load]:
 
 def draw(forces: np.ndarray, energies: np.ndarray, path: Path) -> None:
     """Kinetic energy over force, beside the block's."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(figsize=(6.4, 4.0), layout="constrained")
+    colors = style.use()
+    figure, axes = plt.subplots(figsize=(6.4, 4.0))
     fine = np.linspace(forces[0], forces[-1], 400)
-    axes.plot(fine, block(fine), color="#8a9299", label="block with Coulomb's friction")
-    axes.plot(forces, energies, "o", color="#00798c", markersize=4, label="withe")
-    axes.axvline(LIMIT, color="#d1495b", linestyle=":", label=f"limit, {LIMIT:.2f} N")
-    axes.set_xlabel("force [N]")
-    axes.set_ylabel(f"kinetic energy after {DURATION:g} s [J]")
-    axes.grid(True, color="#e3e7ea")
-    axes.legend(frameon=False)
-    figure.savefig(path, dpi=150)
+    axes.plot(fine, block(fine), color=colors.grey, label="block with Coulomb's friction")
+    axes.plot(forces, energies, "o", color=colors.blue, markersize=4, label="withe")
+    axes.axvline(LIMIT, color=colors.red, linestyle=":", label=f"limit, {LIMIT:.2f} N")
+    style.label(axes, x=("force", "N"), y=(f"kinetic energy after {DURATION:g} s", "J"))
+    style.legend(axes, side="top")
+    figure.savefig(path)
     plt.close(figure)
 
 

@@ -23,16 +23,18 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 import withe
+from withe.view import style
 
 LENGTH, RADIUS, MODULUS, DENSITY, NODES = 1.0, 2e-3, 1.8e5, 1180.0, 301
 SPEED = 1e-2  # speed of each grip [m/s]
 FRICTIONS, MODULI = (0.1, 0.3, 0.5), (1.8e4, 1.8e5, 1.8e6, 1.8e7)
 DURATION, SHORT = 13.0, 6.4  # [s]
 DRAWING = {"reef": withe.knots.reef_knot, "granny": withe.knots.granny_knot}
-COLORS = {"reef": "#00798c", "granny": "#d1495b"}
+COLORS = {"reef": "C0", "granny": "C1"}
 
 
 def build(knot: str, friction: float, modulus: float, time_step: float) -> withe.Simulation:
@@ -155,39 +157,34 @@ def compare(
 
 def draw(pulls: dict[tuple[str, float], Pull], means: dict[str, dict[str, dict[float, float]]], path: Path) -> None:
     """Pull over time, and its means over friction and modulus."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure, (left, middle, right) = plt.subplots(1, 3, figsize=(11.0, 3.6), layout="constrained")
+    style.use()
+    figure, (left, middle, right) = plt.subplots(1, 3, figsize=(11.0, 3.6))
     for (knot, friction), one in pulls.items():
         width = len(one.force) // 100  # 0.13 s
         smooth = np.convolve(one.force, np.full(width, 1.0 / width), "valid")
         times = np.linspace(0.5, 99.5, len(smooth)) / 100.0 * DURATION
-        style = "-" if friction == min(pulls, key=lambda key: key[1])[1] else "--"
-        left.semilogy(times, smooth, style, color=COLORS[knot], label=f"{knot}, friction {friction:g}", linewidth=1.0)
-    left.set(xlabel="time [s]", ylabel="pull, F h² / B")
+        dash = "-" if friction == min(pulls, key=lambda key: key[1])[1] else "--"
+        left.semilogy(times, smooth, dash, color=COLORS[knot], label=f"{knot}, friction {friction:g}", linewidth=1.2)
+    style.label(left, x=("time", "s"), y="pull, F h² / B")
     panels = (
-        (middle, "friction", "o-", "friction"),
-        (right, "modulus", "o-", "Young's modulus [Pa]"),
-        (right, "leaning", "s:", "Young's modulus [Pa]"),
+        (middle, "friction", "o-", "coefficient of friction"),
+        (right, "modulus", "o-", ("Young's modulus", "Pa")),
+        (right, "leaning", "s:", ("Young's modulus", "Pa")),
     )
-    for axes, what, style, label in panels:
+    for axes, what, dash, label in panels:
         for knot, values in means[what].items():
             name = f"{knot}, leaning" if what == "leaning" else knot
             if values:
-                axes.plot(list(values), list(values.values()), style, color=COLORS[knot], label=name)
-        axes.set(xlabel=label, ylabel="mean pull, F h² / B")
+                axes.plot(list(values), list(values.values()), dash, color=COLORS[knot], label=name)
+        style.label(axes, x=label, y="mean pull, F h² / B")
     for axes in (left, middle, right):
-        axes.grid(True, color="#e3e7ea")
         if axes.lines:
-            axes.legend(frameon=False, fontsize=8)
+            style.legend(axes, side="top", ncols=2)
     for axes in (middle, right):
         axes.set_ylim(0.0, None)
     if right.lines:
         right.set_xscale("log")
-    figure.savefig(path, dpi=150)
+    figure.savefig(path)
     plt.close(figure)
 
 

@@ -23,9 +23,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 import withe
+from withe.view import style
 
 LENGTH, RADIUS, MODULUS = 1.0, 1.6e-3, 1.8e5  # [m], [m], [Pa]
 BENDING = MODULUS * np.pi * RADIUS**4 / 4.0  # [N m^2]
@@ -36,7 +38,7 @@ INDEPENDENT = {
     0.0: {300: 2.65e-4, 200: 6.3e-4, 150: 1.165e-3, 100: 2.87e-3, 75: 5.5e-3},
     0.1: {300: 5.4e-4, 200: 1.21e-3, 150: 2.17e-3, 100: 5.0e-3, 75: 9.1e-3},
 }
-COLORS = {0.0: "#00798c", 0.1: "#d1495b"}
+COLORS = {0.0: "C0", 0.1: "C1"}
 TOLERANCE, ENERGY_TOLERANCE = 0.06, 0.03
 
 
@@ -132,12 +134,8 @@ def energy_gap(way: Way, targets: list[int]) -> float:
 
 def draw(tightened: dict[float, Way], loosened: Way | None, path: Path) -> None:
     """Pull over shortening, in numbers without unit."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(figsize=(6.8, 4.6), layout="constrained")
+    colors = style.use()
+    figure, axes = plt.subplots(figsize=(6.8, 4.6))
     epsilon = np.sqrt(2.0 * np.pi / np.geomspace(70.0, 400.0, 100))
     ways = [(way, friction, f"friction {friction:g}, tightened") for friction, way in tightened.items()]
     if loosened is not None:
@@ -152,14 +150,14 @@ def draw(tightened: dict[float, Way], loosened: Way | None, path: Path) -> None:
         axes.loglog(2.0 * np.pi / epsilon**2, np.where(limit > 0.0, limit, np.nan), ":", color=color)
         if friction >= 0.0:
             axes.loglog(*zip(*INDEPENDENT[friction].items(), strict=True), "s", color=color, fillstyle="none")
-    axes.plot([], [], ":", color="#8a9299", label="limit of loose knots (2007)")
-    axes.plot([], [], "s", color="#8a9299", fillstyle="none", label="independent code")
-    axes.set(xlabel="shortening over radius, e / h", ylabel="pull, F h² / B", ylim=(5e-6, 2e-2))
+    axes.plot([], [], ":", color=colors.grey, label="limit of loose knots (2007)")
+    axes.plot([], [], "s", color=colors.grey, fillstyle="none", label="independent code")
+    axes.set_ylim(5e-6, 2e-2)
+    style.label(axes, x="shortening over radius, e / h", y="pull, F h² / B")
     axes.set_xticks([75, 100, 150, 200, 300, 400], labels=["75", "100", "150", "200", "300", "400"])
     axes.minorticks_off()
-    axes.grid(True, color="#e3e7ea")
-    axes.legend(frameon=False, fontsize=9)
-    figure.savefig(path, dpi=150)
+    style.legend(axes)
+    figure.savefig(path)
     plt.close(figure)
 
 

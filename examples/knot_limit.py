@@ -18,9 +18,11 @@ import sys
 from pathlib import Path
 from typing import NamedTuple
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 import withe
+from withe.view import style
 
 RADIUS, MODULUS, DENSITY = 1e-3, 1e6, 1000.0  # [m], [Pa], [kg/m^3]
 BENDING = MODULUS * np.pi * RADIUS**4 / 4.0  # [N m^2]
@@ -94,28 +96,24 @@ def pulls_between(knots: list[Knot]) -> tuple[np.ndarray, np.ndarray]:
 
 def draw(knots: list[Knot], path: Path) -> None:
     """Both over epsilon, with the parabolas down to zero."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure, (left, right) = plt.subplots(1, 2, figsize=(9.0, 3.8), layout="constrained")
+    colors = style.use()
+    figure, (left, right) = plt.subplots(1, 2, figsize=(9.0, 3.8))
     epsilon = np.array([k.epsilon for k in knots])
     fine = np.linspace(0.0, 0.135, 100)
     middle, pulls = pulls_between(knots)
-    left.plot(epsilon, [k.pull for k in knots], "x", color="#b9c2c8", label="force in the grips")
+    left.plot(epsilon, [k.pull for k in knots], "x", color=colors.grey, label="force in the grips")
     for axes, x, y in ((left, middle, pulls), (right, epsilon, np.array([k.normal_forces for k in knots]))):
-        axes.plot(fine, np.polyval(np.polyfit(x, y, 2), fine), color="#00798c", linewidth=1.0)
-        axes.plot(x, y, "o", color="#00798c", label="difference of energies" if axes is left else "sum of forces")
+        axes.plot(fine, np.polyval(np.polyfit(x, y, 2), fine), color=colors.blue, linewidth=1.0)
+        axes.plot(x, y, "o", color=colors.blue, label="difference of energies" if axes is left else "sum of forces")
     for axes, limit, label in (
-        (left, 1.0, "pull, F h² / B over ε⁴ / 2"),
-        (right, NORMAL_FORCES, "normal forces, h² / B over ε³"),
+        (left, 1.0, "pull, F h² / B / (ε⁴ / 2)"),
+        (right, NORMAL_FORCES, "normal forces, P h² / B / ε³"),
     ):
-        axes.plot(0.0, limit, "s", color="#d1495b", markersize=8, clip_on=False, label="Audoly et al. (2007)")
-        axes.set(xlabel="ε", ylabel=label, xlim=(0.0, 0.135))
-        axes.grid(True, color="#e3e7ea")
-        axes.legend(frameon=False)
-    figure.savefig(path, dpi=150)
+        axes.plot(0.0, limit, "s", color=colors.red, markersize=8, clip_on=False, label="Audoly et al. (2007)")
+        axes.set_xlim(0.0, 0.135)
+        style.label(axes, x="ε", y=label)
+        style.legend(axes, side="top", ncols=2)
+    figure.savefig(path)
     plt.close(figure)
 
 

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 import withe
+from withe.view import style
 
 DISCOUNT = 0.99
 HORIZON = 0.9  # discount of the training: effects of an action are visible within a second
@@ -75,20 +76,18 @@ class Curve:
 
 def draw_curve(folder: Path, title: str) -> None:
     """The learning curve, curve.png."""
-    import matplotlib
-
-    matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
+    colors = style.use()
     steps, _, returns = np.loadtxt(folder / "curve.csv", delimiter=",", skiprows=1, unpack=True, ndmin=2)
-    figure, axes = plt.subplots(figsize=(6.4, 4.0), layout="constrained")
-    axes.plot(steps / 1e6, returns, color="#00798c", label="learned")
-    axes.axhline(PUBLISHED, color="#8d96a3", linestyle="--", label="published after 3 million steps")
-    axes.axhline(0.8 * PUBLISHED, color="#8d96a3", linestyle=":", label="80 % of it")
-    axes.set(xlabel="control steps [million]", ylabel="discounted return", title=f"Follow: {title}, one seed")
-    axes.legend(frameon=False)
-    axes.grid(color="#dddddd", linewidth=0.5)
-    figure.savefig(folder / "curve.png", dpi=150)
+    figure, axes = plt.subplots(figsize=(6.4, 4.0))
+    axes.plot(steps / 1e6, returns, color=colors.blue, label="learned")
+    axes.axhline(PUBLISHED, color=colors.grey, linestyle="--", label="published after 3 million steps")
+    axes.axhline(0.8 * PUBLISHED, color=colors.grey, linestyle=":", label="80 % of it")
+    axes.set_title(f"Follow: {title}, one seed")
+    style.label(axes, x=("control steps", "million"), y="discounted return")
+    style.legend(axes, side="top")
+    figure.savefig(folder / "curve.png")
     plt.close(figure)
 
 

@@ -17,10 +17,13 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+import matplotlib.pyplot as plt
 import numpy as np
 from knot import BENDING, RADIUS, mean_near, pulled, shortening_of, tie
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
+
+from withe.view import style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,7 +35,7 @@ POINTS = (350, 325, 300, 275, 250, 225, 200, 175, 150, 125)
 RATIOS = {1: (0.75, 0.92, 120), 2: (0.75, 0.92, 120), 4: (0.8, 1.0, 250)}  # least, greatest, down to which e / h
 SETTLED = 0.92  # share of the drawn shortening at which friction acts against the pull
 SHOWN = {3: (160, 126), 4: (250, 225)}  # before and after a knot inverts
-COLORS = {1: "#00798c", 2: "#edae49", 3: "#5c8001", 4: "#d1495b"}
+COLORS = {1: "C0", 2: "C3", 3: "C2", 4: "C1"}
 
 
 def jawed(n: int, shortening: float) -> float:
@@ -75,6 +78,7 @@ def pull(n: int, nodes: int, speed: float) -> Pull:
 def draw_knot(axes: Axes, x: np.ndarray, color: str) -> None:
     """Draw a knot without its tails, seen across its axis. Nearer parts hide farther parts."""
     from matplotlib.collections import PolyCollection
+    from matplotlib.colors import to_hex
 
     axis = (x[-1] - x[0]) / np.linalg.norm(x[-1] - x[0])
     along = (x - x[0]) @ axis
@@ -87,7 +91,7 @@ def draw_knot(axes: Axes, x: np.ndarray, color: str) -> None:
     order = np.argsort(depth[1:] + depth[:-1])
     corners, colors = [], []
     for k in order:
-        for width, shade in ((1.0, "#22313a"), (0.75, color)):
+        for width, shade in ((1.0, colors.ink), (0.75, to_hex(color))):
             a, b = flat[k] - 0.02 * edge[k], flat[k + 1] + 0.02 * edge[k]
             corners.append([a - width * side[k], b - width * side[k], b + width * side[k], a + width * side[k]])
             colors.append(shade)
@@ -101,13 +105,9 @@ def draw_knot(axes: Axes, x: np.ndarray, color: str) -> None:
 
 def draw(pulls: dict[int, Pull], path: Path) -> None:
     """Pull over shortening, and the knots before and after they invert."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
+    colors = style.use()
     shapes = [(n, e) for n, measured in pulls.items() for e in measured.shapes]
-    figure = plt.figure(figsize=(10.4, 4.8), layout="constrained")
+    figure = plt.figure(figsize=(10.4, 4.8))
     grid = figure.add_gridspec(max(1, len(shapes)), 2)
     axes = figure.add_subplot(grid[:, 0])
     for n, measured in pulls.items():
@@ -117,17 +117,16 @@ def draw(pulls: dict[int, Pull], path: Path) -> None:
         fine = np.geomspace(e[-1] * 1.02, e[0] * 0.98, 60)
         axes.loglog(fine, [measured.near(at) for at in fine], color=COLORS[n], label=f"n = {n}")
         axes.loglog(fine, [jawed(n, at) for at in fine], color=COLORS[n], linestyle="--")
-    axes.plot([], [], color="#8a9299", linestyle="--", label="Jawed et al. (2015)")
-    axes.set(xlabel="shortening over radius, e / h", ylabel="pull, F h² / B")
+    axes.plot([], [], color=colors.grey, linestyle="--", label="Jawed et al. (2015)")
+    style.label(axes, x="shortening over radius, e / h", y="pull, F h² / B")
     axes.set_xticks([100, 200, 300, 400], labels=["100", "200", "300", "400"])
     axes.minorticks_off()
-    axes.grid(True, color="#e3e7ea")
-    axes.legend(frameon=False)
+    style.legend(axes, side="top", ncols=5)
     for row, (n, e) in enumerate(shapes):
         axes = figure.add_subplot(grid[row, 1])
         draw_knot(axes, pulls[n].shapes[e], COLORS[n])
-        axes.set_title(f"n = {n}, e / h = {e}", fontsize=9)
-    figure.savefig(path, dpi=150)
+        axes.set_title(f"n = {n}, e / h = {e}")
+    figure.savefig(path)
     plt.close(figure)
 
 

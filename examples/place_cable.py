@@ -15,9 +15,12 @@ import argparse
 import sys
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.axes import Axes
 
 from withe.deployment import Cable, Deployment, Pattern, deploy, plan, posts_along
+from withe.view import style
 
 FRICTION = 0.4
 HELD = 1.5  # coefficient of friction of a floor that holds the letters; posts replace it
@@ -26,7 +29,7 @@ LETTERS = {  # turns [rad], radii, straight pieces [m]; places of posts as share
     "U": ((np.pi,), (0.095,), (0.14, 0.14), np.linspace(0.12, 0.88, 7)),
     "S": ((1.8, -1.8), (0.105, 0.105), (0.09, 0.05, 0.08), np.linspace(0.1, 0.85, 8)),
 }
-COLOURS = {"exact": "#3465a4", "intuitive": "#b2182b"}
+COLORS = {"exact": "C0", "intuitive": "C1"}
 
 
 def laid(
@@ -61,25 +64,24 @@ def laid(
     )
 
 
-def draw(axes: object, letter: str, found: dict[str, Deployment]) -> None:
+def draw(axes: Axes, letter: str, found: dict[str, Deployment], colors: style.Colors) -> None:
     """From above: posts, and where each way of laying left the cable."""
-    import matplotlib.pyplot as plt
-
     turns, radii, straights, shares = LETTERS[letter]
     pattern, cable = Pattern.bends(turns, radii, straights, easing=EASING), Cable.dlo(5)
     for post in posts_along(pattern, cable, shares * pattern.length):
-        axes.add_patch(plt.Circle((1e3 * post.x, 1e3 * post.y), 1e3 * post.radius, color="0.55"))
-    axes.plot(*(1e3 * pattern.points.T), color="0.6", lw=0.8, ls=":", label="pattern")
+        axes.add_patch(plt.Circle((1e3 * post.x, 1e3 * post.y), 1e3 * post.radius, color=colors.grey))
+    axes.plot(*(1e3 * pattern.points.T), color=colors.ink, lw=1.0, ls=":", zorder=3, label="pattern")
     for way, result in found.items():
         missed = int((~result.passed).sum())
         axes.plot(
             *(1e3 * result.laid[:, :2].T),
-            color=COLOURS[way],
+            color=COLORS[way],
             lw=2.5 if way == "exact" else 1.5,
             label=f"{way}: {missed} of {len(result.passed)} posts missed",
         )
-    axes.set(aspect="equal", xlabel="x [mm]", ylabel="y [mm]", title=letter)
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), frameon=False)
+    axes.set(aspect="equal", title=letter)
+    style.label(axes, x=("x", "mm"), y=("y", "mm"))
+    style.legend(axes, side="top", ncols=1)
 
 
 def main() -> None:
@@ -91,23 +93,19 @@ def main() -> None:
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
 
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(1, len(arguments.letters), figsize=(10.0, 4.4), layout="constrained", squeeze=False)
+    colors = style.use()
+    figure, axes = plt.subplots(1, len(arguments.letters), figsize=(10.0, 4.4), squeeze=False)
     placed = True
     for panel, letter in zip(axes[0], arguments.letters, strict=True):
-        found = {way: laid(letter, way, arguments.nodes) for way in COLOURS}
+        found = {way: laid(letter, way, arguments.nodes) for way in COLORS}
         for way, result in found.items():
             print(
                 f"{letter}, {way}: passes {result.passed.sum()} of {len(result.passed)} posts on its side", flush=True
             )
         placed &= bool(found["exact"].passed.all()) and not found["intuitive"].passed.all()
-        draw(panel, letter, found)
+        draw(panel, letter, found, colors)
     path = arguments.out / "place_cable.png"
-    figure.savefig(path, dpi=130)
+    figure.savefig(path)
     print(f"Wrote {path}.")
     if not placed:
         sys.exit("The exact way must pass every post on its right side, the intuitive one must not.")

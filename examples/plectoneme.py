@@ -19,10 +19,12 @@ import sys
 from pathlib import Path
 from typing import NamedTuple
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 import withe
 from withe.knots import writhe
+from withe.view import style
 
 RADIUS, MODULUS, DENSITY = 1e-3, 1e6, 1000.0  # [m], [Pa], [kg/m^3]
 BENDING = MODULUS * np.pi * RADIUS**4 / 4.0  # [N m^2]
@@ -130,23 +132,23 @@ def measure(simulation: withe.Simulation, rod: withe.Rod) -> tuple[Plectoneme, f
 
 def draw(found: list[Plectoneme], path: Path) -> None:
     """Angle, moment and contact force over the pull."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
+    colors = style.use()
     curve = theory(np.linspace(0.13, 0.39, 200))
-    figure, panels = plt.subplots(1, 3, figsize=(9.6, 3.4), layout="constrained")
-    labels = {"angle": "angle of the strands [rad]", "moment": "moment, M R / B", "pressure": "contact force, p R³ / B"}
+    figure, panels = plt.subplots(1, 3, figsize=(9.6, 3.4))
+    labels = {
+        "angle": ("angle of the strands", "rad"),
+        "moment": "moment, M R / B",
+        "pressure": "contact force, p R³ / B",
+    }
     for axes, (name, label) in zip(panels, labels.items(), strict=True):
-        axes.plot(curve.force, getattr(curve, name), color="#8a9299", label="Clauvelin et al. (2009)")
-        axes.plot([p.force for p in found], [getattr(p, name) for p in found], "o", color="#00798c", label="withe")
-        axes.set(xscale="log", xlabel="pull, F R² / B", ylabel=label)
+        axes.plot(curve.force, getattr(curve, name), color=colors.grey, label="Clauvelin et al. (2009)")
+        axes.plot([p.force for p in found], [getattr(p, name) for p in found], "o", color=colors.blue, label="withe")
+        axes.set_xscale("log")
+        style.label(axes, x="pull, F R² / B", y=label)
         if name != "angle":
             axes.set_yscale("log")
-        axes.grid(True, color="#e3e7ea")
-    panels[0].legend(frameon=False)
-    figure.savefig(path, dpi=150)
+    style.legend(panels[0], side="top")
+    figure.savefig(path)
     plt.close(figure)
 
 

@@ -14,9 +14,11 @@ import argparse
 import sys
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 import withe
+from withe.view import style
 
 LENGTH, WIDTH, THICKNESS, LGB = 0.297, 0.21, 1e-4, 0.048  # [m]
 WEIGHT = 0.08 * WIDTH * 9.81  # weight of 80 g/m^2 [N/m]
@@ -74,20 +76,19 @@ def pose(t: float, middle: np.ndarray, axes: np.ndarray, off: float = 0.0) -> tu
 
 def draw(record: withe.Record, low: np.ndarray, pressing: np.ndarray, path: Path) -> None:
     """Draw the sheet while it is pressed, and the force on it."""
-    import matplotlib.pyplot as plt
-
+    colors = style.use()
     record.picture(path, camera=(0.12, -0.42, 0.1), size=(1200, 800))
-    figure, (seen, force) = plt.subplots(1, 2, figsize=(12, 4.6), width_ratios=(1.6, 1.0), layout="constrained")
+    figure, (seen, force) = plt.subplots(1, 2, figsize=(10.4, 4.2), width_ratios=(1.4, 1.0))
     seen.imshow(plt.imread(path))
     seen.axis("off")
-    force.plot(1e3 * low, pressing, ".-", label="the jaw presses with")
-    force.axline(
-        (1.0, pressing[np.argmin(np.abs(low - 1e-3))]), slope=1e-3 * STIFFNESS, color="0.7", label="its stiffness"
-    )
-    force.axhline(LIMIT, color="0.7", linestyle=":", label="its limit")
-    force.set(xlabel="too low by [mm]", ylabel="force [N]", ylim=(-0.1, 1.15 * LIMIT))
-    force.legend()
-    figure.savefig(path, dpi=110)
+    middle = pressing[np.argmin(np.abs(low - 1e-3))]
+    force.axline((1.0, middle), slope=1e-3 * STIFFNESS, color=colors.grey, label="stiffness of the jaw")
+    force.axhline(LIMIT, color=colors.red, linestyle="--", label="force limit")
+    force.plot(1e3 * low, pressing, ".-", label="force of the jaw")
+    force.set_ylim(-0.1, 1.15 * LIMIT)
+    style.label(force, x=("error of the height", "mm"), y=("force", "N"))
+    style.legend(force, side="top")
+    figure.savefig(path)
     plt.close(figure)
 
 

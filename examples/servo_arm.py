@@ -20,10 +20,12 @@ import argparse
 import sys
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 from scipy.optimize import brentq
 
 import withe
+from withe.view import style
 
 LENGTH, RADIUS, NODES = 0.6, 4e-3, 41  # [m]
 MODULUS, DENSITY = 3e9, 1140.0  # nylon [Pa], [kg/m^3]
@@ -89,27 +91,27 @@ def deflection(record: withe.Record) -> np.ndarray:
 
 def draw(records: dict[str, withe.Record], path: Path) -> None:
     """The arm on its way, the command, and how far the tip is aside."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(1, 3, figsize=(12.0, 3.8), layout="constrained", width_ratios=(1.0, 1.2, 1.2))
-    colors = dict(zip(records, ("#d1495b", "#00798c"), strict=True))
-    for name, record in records.items():
-        times, x = record.times, 100.0 * record.positions("arm")
-        if name == "shaped":
-            for k in np.searchsorted(times, np.arange(0.0, 0.65, 0.06)):
-                axes[0].plot(x[k, :, 0], x[k, :, 1], color=colors[name], alpha=0.6, linewidth=2)
-        axes[1].plot(times, np.degrees(record["command"]), color=colors[name], linestyle=":", label=f"{name}, command")
-        axes[1].plot(times, np.degrees(record["angle"]), color=colors[name], label=f"{name}, joint")
-        axes[2].plot(times, 1e3 * deflection(record), color=colors[name], label=name)
-    axes[0].set(xlabel="x [cm]", ylabel="y [cm]", aspect="equal")
-    axes[1].set(xlabel="time [s]", ylabel="angle [degrees]")
-    axes[2].set(xlabel="time [s]", ylabel="tip from where it is to stand [mm]", ylim=(-650, 650))
-    axes[1].legend(frameon=False)
-    axes[2].legend(loc="lower right")
-    figure.savefig(path, dpi=150)
+    colors = style.use()
+    figure = plt.figure(figsize=(10.4, 5.2))
+    grid = figure.add_gridspec(2, 2, width_ratios=(1.0, 1.3))
+    seen = figure.add_subplot(grid[:, 0])
+    angle, tip = (figure.add_subplot(grid[row, 1]) for row in range(2))
+    shaped = records["shaped"]
+    moments = np.searchsorted(shaped.times, np.arange(0.0, 0.67, 0.06))
+    for k, shade in zip(moments, style.ramp()(np.linspace(0.0, 1.0, len(moments))), strict=True):
+        seen.plot(*100.0 * shaped.positions("arm")[k, :, :2].T, color=shade, linewidth=3)
+    for (name, record), color in zip(records.items(), (colors.red, colors.blue), strict=True):
+        angle.plot(record.times, np.degrees(record["command"]), color=color, linestyle=":", label=f"{name}, command")
+        angle.plot(record.times, np.degrees(record["angle"]), color=color, label=f"{name}, joint")
+        tip.plot(record.times, 1e3 * deflection(record), color=color)
+    seen.set(aspect="equal", title="shaped swing: light at first, dark at last")
+    angle.set_title("servo")
+    tip.set(title="deflection of the tip from its goal", ylim=(-650, 650))
+    style.label(seen, x=("x", "cm"), y=("y", "cm"))
+    style.label(angle, x=("time", "s"), y=("angle", "degrees"))
+    style.label(tip, x=("time", "s"), y=("deflection", "mm"))
+    style.legend(angle)
+    figure.savefig(path)
     plt.close(figure)
 
 

@@ -16,10 +16,12 @@ import argparse
 import sys
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 from scipy.interpolate import BSpline
 
 import withe
+from withe.view import style
 
 LENGTH, RADIUS, DENSITY, MODULUS, GRAVITY = 0.35, 0.35 * 0.011, 1000.0, 1e6, 9.80665
 PERIOD, FROUDE = 2.0, 0.1
@@ -63,26 +65,22 @@ def crawl(
 
 def draw(shapes: np.ndarray, speeds: np.ndarray, path: Path) -> None:
     """Draw the positions of the snake from above, and its speed."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure, (above, below) = plt.subplots(2, 1, figsize=(7.2, 4.6), layout="constrained", height_ratios=(3, 2))
+    colors = style.use()
+    figure, (above, below) = plt.subplots(2, 1, figsize=(7.2, 4.6), height_ratios=(3, 2))
     chosen = shapes[:: 50 + 12]
-    for shape, shade in zip(chosen, np.linspace(0.85, 0.0, len(chosen)), strict=True):
-        above.plot(*shape[:, :2].T, color=(shade * 0.9, 0.35 + 0.6 * shade, 0.4 + 0.55 * shade), linewidth=2.5)
-        above.plot(*shape[-1, :2], "o", color="#d1495b", markersize=4)
-    above.plot(*shapes[:, :, :2].mean(axis=1).T, color="#8a9299", linestyle=":", label="middle")
-    above.set(xlabel="x [m]", ylabel="y [m]", aspect="equal", title="from above; heads are dots")
-    above.legend(frameon=False, loc="lower left")
-    below.plot(np.arange(len(speeds)) + 0.5, 1e3 * speeds, "o-", color="#00798c", label="withe")
-    below.axhline(1e3 * PEER, color="#d1495b", linestyle="--", label="PyElastica")
-    below.set(xlabel="period", ylabel="mean speed [mm/s]", ylim=(0, None))
-    below.legend(frameon=False, loc="lower right")
-    for axes in (above, below):
-        axes.grid(True, color="#e3e7ea")
-    figure.savefig(path, dpi=150)
+    for shape, shade in zip(chosen, style.ramp()(np.linspace(0.0, 1.0, len(chosen))), strict=True):
+        above.plot(*shape[:, :2].T, color=shade, linewidth=3.0)
+        above.plot(*shape[-1, :2], "o", color=colors.red, markersize=6)
+    above.plot(*shapes[:, :, :2].mean(axis=1).T, color=colors.grey, linestyle=":", label="middle")
+    above.set(aspect="equal", title="from above, light at first; heads are dots")
+    style.label(above, x=("x", "m"), y=("y", "m"))
+    style.legend(above)
+    below.plot(np.arange(len(speeds)) + 0.5, 1e3 * speeds, "o-", color=colors.blue, label="withe")
+    below.axhline(1e3 * PEER, color=colors.red, linestyle="--", label="PyElastica")
+    below.set_ylim(0, None)
+    style.label(below, x="period", y=("mean speed", "mm/s"))
+    style.legend(below)
+    figure.savefig(path)
     plt.close(figure)
 
 

@@ -13,10 +13,12 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 import withe
 from withe import real2sim
+from withe.view import style
 
 LOG = Path(__file__).resolve().parent.parent / "tests" / "data" / "soft_limb_data.csv"
 LIMB = 0.075  # length of a limb [m]
@@ -40,27 +42,29 @@ def robot() -> withe.Simulation:
 
 def draw(log: real2sim.Log, camera: real2sim.Calibration, found: real2sim.Fit, path: Path) -> None:
     """Five frames, and all curvatures."""
-    import matplotlib.pyplot as plt
-
-    figure, (seen, over_time) = plt.subplots(1, 2, figsize=(11, 4.5), layout="constrained")
+    colors = style.use()
+    figure, (seen, over_time) = plt.subplots(1, 2, figsize=(11, 4.2))
     simulation = robot()
     for frame in range(0, len(log.times), 42):
         found.apply(simulation, frame)
         simulation.equilibrium()
         line = camera.project(simulation.positions())
-        (drawn,) = seen.plot(*line.T, lw=6, alpha=0.35, solid_capstyle="round", label=f"{log.times[frame]:.0f} s")
-        seen.plot(*log.pixels[frame].T, ".", color=drawn.get_color())
+        shade = style.ramp()(log.times[frame] / log.times[-1])
+        seen.plot(*line.T, color=shade, lw=6, alpha=0.5, label=f"{log.times[frame]:.0f} s")
+        seen.plot(*log.pixels[frame].T, "o", color=shade, markersize=4)
     seen.invert_yaxis()
-    seen.set(aspect="equal", xlabel="x [px]", ylabel="y [px]", title="Tags as seen, limbs as simulated")
-    seen.legend(frameon=False)
+    seen.set(aspect="equal", title="Tags as seen (dots), limbs as simulated")
+    style.label(seen, x=("x", "px"), y=("y", "px"))
+    style.legend(seen)
     for limb in LIMBS:
         value, sigma = found.value(limb)[:, 0], found.sigma(limb)[:, 0]
         over_time.plot(log.times, value, label=f"{limb} limb")
         over_time.fill_between(log.times, value - 2 * sigma, value + 2 * sigma, alpha=0.3)
-    over_time.axvline(log.times[CALIBRATED.stop], color="0.6", lw=0.8)
-    over_time.set(xlabel="time [s]", ylabel="natural curvature [1/m]", title="What the muscles do (two sigma)")
-    over_time.legend(frameon=False)
-    figure.savefig(path, dpi=150)
+    over_time.axvline(log.times[CALIBRATED.stop], color=colors.grey, lw=0.8, ls="--", label="end of the calibration")
+    over_time.set_title("Natural curvature (band: two standard deviations)")
+    style.label(over_time, x=("time", "s"), y=("natural curvature", "1/m"))
+    style.legend(over_time)
+    figure.savefig(path)
 
 
 def main() -> None:

@@ -17,9 +17,11 @@ import argparse
 import sys
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 import withe
+from withe.view import style
 
 LIMB, RADIUS, MODULUS, DENSITY = 0.1, 5e-3, 3e6, 1180.0  # [m], [m], [Pa], [kg/m^3]
 VISCOSITY = MODULUS * 1e-3  # [Pa s]
@@ -82,28 +84,25 @@ def energies_apart(a: withe.Record, b: withe.Record) -> float:
 
 def draw(falls: dict[str, withe.Record], path: Path) -> None:
     """Height of the top, kinetic energy, and how far apart the falls are."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
+    colors = style.use()
     first = next(iter(falls.values()))
-    figure, (left, middle, right) = plt.subplots(1, 3, figsize=(11.0, 3.6), layout="constrained")
-    left.plot(first.times, first.positions("neck")[:, 0, 2], color="#00798c", label="withe")
-    left.plot(list(HEIGHTS), list(HEIGHTS.values()), "s", color="#d1495b", fillstyle="none", label="public code")
-    left.set(xlabel="time [s]", ylabel="height of the top [m]")
-    middle.semilogy(first.times[1:], first.energy().kinetic[1:], color="#00798c")
-    middle.set(xlabel="time [s]", ylabel="kinetic energy [J]")
-    for (name, record), color in zip(falls.items(), ("", "#00798c", "#edae49", "#8a9299"), strict=True):
+    figure, (left, middle, right) = plt.subplots(1, 3, figsize=(11.0, 3.6))
+    left.plot(first.times, first.positions("neck")[:, 0, 2], color=colors.blue, label="withe")
+    left.plot(list(HEIGHTS), list(HEIGHTS.values()), "s", color=colors.red, fillstyle="none", label="public code")
+    left.set_title("height of the top")
+    style.label(left, x=("time", "s"), y=("height", "m"))
+    middle.semilogy(first.times[1:], first.energy().kinetic[1:], color=colors.blue)
+    middle.set_title("kinetic energy")
+    style.label(middle, x=("time", "s"), y=("energy", "J"))
+    for (name, record), color in zip(falls.items(), ("", colors.blue, colors.orange, colors.grey), strict=True):
         if record is not first:
             right.semilogy(first.times[1:], np.maximum(apart(first, record)[1:], 1e-12), color=color, label=name)
-    right.axhline(APART, color="#d1495b", linestyle=":")
-    right.set(xlabel="time [s]", ylabel="greatest distance of a node over a limb")
-    for axes in (left, middle, right):
-        axes.grid(True, color="#e3e7ea")
-    left.legend(frameon=False)
-    right.legend(frameon=False)
-    figure.savefig(path, dpi=150)
+    right.axhline(APART, color=colors.red, linestyle=":", label="allowed")
+    right.set_title("greatest distance of a node")
+    style.label(right, x=("time", "s"), y="distance / length of a limb")
+    style.legend(left, side="top", ncols=2)
+    style.legend(right, side="top", ncols=2)
+    figure.savefig(path)
     plt.close(figure)
 
 

@@ -21,10 +21,12 @@ import sys
 from pathlib import Path
 from typing import NamedTuple
 
+import matplotlib.pyplot as plt
 import numpy as np
 from scipy.optimize import OptimizeResult, minimize
 
 import withe
+from withe.view import style
 
 LENGTH, EDGES, PLACES = 0.3, 48, 9  # [m]
 DENSITY, MODULUS = 1100.0, 2.6e7  # printed polyurethane [kg/m^3], [Pa]
@@ -175,13 +177,9 @@ def error_of_derivatives(design: Design, at: np.ndarray) -> float:
 
 def draw(shown: list[tuple[str, Design, np.ndarray]], path: Path) -> None:
     """Both arms round the object, alone and with its weight, and their radii."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(1, 3, figsize=(11.0, 4.0), layout="constrained", width_ratios=(1, 1, 1))
-    for axis, (name, design, at), color in zip(axes, shown, ("#8a9299", "#00798c"), strict=False):
+    colors = style.use()
+    figure, axes = plt.subplots(1, 3, figsize=(11.0, 3.3), width_ratios=(1.1, 1.1, 1))
+    for axis, (name, design, at), color in zip(axes, shown, (colors.grey, colors.blue), strict=False):
         radii = at_nodes(design.radii(at))
         for held, alpha in zip(design.arms(at), (1.0, 0.25), strict=True):
             x = 100.0 * held.positions[:, ::2]
@@ -190,15 +188,16 @@ def draw(shown: list[tuple[str, Design, np.ndarray]], path: Path) -> None:
             sides = x + 100.0 * radii[:, None] * normal, x - 100.0 * radii[:, None] * normal
             outline = np.concatenate([sides[0], sides[1][::-1]])
             axis.fill(*outline.T, color=color, alpha=alpha, linewidth=0)
-        axis.add_patch(plt.Circle(100.0 * OBJECT, 100.0 * ROUND, color="#edae49"))
-        axis.set(title=name, xlabel="cm", aspect="equal", xlim=(-1, 24), ylim=(-13, 5), yticks=(-10, -5, 0, 5))
-        axis.annotate(f"pale: with {WEIGHT:g} N", (0.5, -12.0), color=color)
+        axis.add_patch(plt.Circle(100.0 * OBJECT, 100.0 * ROUND, color=colors.orange))
+        title = f"{name} (pale: with {WEIGHT:g} N)"
+        axis.set(title=title, aspect="equal", xlim=(-1, 24), ylim=(-13, 5), yticks=(-10, -5, 0, 5))
+        style.label(axis, x=("x", "cm"), y=("z", "cm"))
         places = 100.0 * LENGTH * np.linspace(0, 1, len(radii))
         axes[2].plot(places, 1e3 * radii, color=color, label=name)
-    axes[2].set(xlabel="along the arm [cm]", ylabel="radius [mm]", ylim=(0, None))
-    axes[2].legend(frameon=False)
-    axes[2].grid(True, color="#e3e7ea")
-    figure.savefig(path, dpi=150)
+    axes[2].set(title="radius along the arm", ylim=(0, None))
+    style.label(axes[2], x=("arc length", "cm"), y=("radius", "mm"))
+    style.legend(axes[2], side="top")
+    figure.savefig(path)
     plt.close(figure)
 
 

@@ -20,11 +20,13 @@ import argparse
 import sys
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 from scipy.optimize import least_squares, minimize
 from scipy.spatial.transform import Rotation
 
 import withe
+from withe.view import style
 
 LENGTH, RADIUS, OFFSET, NODES = 0.242, 0.4e-3, 8e-3, 61  # [m]
 STEEL = withe.Material(youngs_modulus=210e9, poisson_ratio=0.3125, density=7850.0)
@@ -135,29 +137,27 @@ def lead(
 
 def draw(simulation: withe.Simulation, shapes: list[np.ndarray], points: np.ndarray, path: Path) -> None:
     """The wound backbone with its tendon, and the tips of the other through its points."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure = plt.figure(figsize=(10.0, 4.6), layout="constrained")
+    colors = style.use()
+    figure = plt.figure(figsize=(9.6, 5.2))
     left = figure.add_subplot(1, 2, 1, projection="3d")
     cord = 1e3 * simulation.tendon_points("winding")
-    left.plot(*(1e3 * simulation.positions("arm")).T, color="#33383d", linewidth=3, label="backbone")
-    left.plot(*cord.T, color="#d1495b", linewidth=1.5, label="tendon")
-    left.set(xlabel="x [mm]", ylabel="y [mm]", zlabel="z [mm]", title=f"wound once, {TENSION:g} N")
-    left.set(xlim=(-60, 60), ylim=(-60, 60), zlim=(-250, 0), xticks=(-50, 0, 50), yticks=(-50, 0, 50))
-    left.set_box_aspect((120, 120, 250))
-    left.legend(loc="upper left", frameon=False)
+    left.plot(*(1e3 * simulation.positions("arm")).T, color=colors.ink, linewidth=3, label="backbone")
+    left.plot(*cord.T, color=colors.red, linewidth=1.5, label="tendon")
+    left.set_title(f"wound once, {TENSION:g} N")
     right = figure.add_subplot(1, 2, 2, projection="3d")
-    for shape in shapes[::2]:
-        right.plot(*(1e3 * shape).T, color="#00798c", alpha=0.5, linewidth=1.5)
+    for shape in shapes:
+        right.plot(*(1e3 * shape).T, color=colors.ink, alpha=0.6, linewidth=1.5)
     tips = 1e3 * np.array([shape[-1] for shape in shapes])
-    right.scatter(*tips.T, color="#00798c", s=16, label="tips")
-    right.plot(*(1e3 * points).T, np.full(len(points), tips[:, 2].min()), "x", color="#d1495b", label="points")
-    right.set(xlabel="x [mm]", ylabel="y [mm]", zlabel="z [mm]", title=f"three tendons, a tool of {1e3 * TOOL:g} g")
-    right.legend(loc="upper left", frameon=False)
-    figure.savefig(path, dpi=150)
+    level = np.full(len(points), tips[:, 2].mean())
+    right.plot(*(1e3 * points).T, level, "x", color=colors.red, markersize=9, label="points")
+    right.plot(*tips.T, "o", color=colors.blue, label="tips")
+    right.set_title(f"three tendons, a tool of {1e3 * TOOL:g} g")
+    for axes in (left, right):
+        style.label(axes, x=("x", "mm"), y=("y", "mm"), z=("z", "mm"))
+        style.legend(axes)
+    style.fill_frame(left, np.concatenate([1e3 * simulation.positions("arm"), cord]))
+    style.fill_frame(right, 1e3 * np.array(shapes))
+    figure.savefig(path)
     plt.close(figure)
 
 

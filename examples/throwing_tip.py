@@ -22,10 +22,12 @@ from itertools import count
 from pathlib import Path
 from typing import NamedTuple
 
+import matplotlib.pyplot as plt
 import numpy as np
 from scipy.optimize import minimize
 
 import withe
+from withe.view import style
 
 LENGTH, RADIUS, NODES = 0.3, 1e-2, 25  # [m]
 FOOT = 0.03  # height of the clamp [m]
@@ -120,25 +122,22 @@ def error_of_derivatives(simulation: withe.Simulation, controls: np.ndarray) -> 
 
 def draw(thrown: Thrown, controls: np.ndarray, path: Path) -> None:
     """Draw the arm, the path of its tip, the points, and the controls of the muscles."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(1, 2, figsize=(10.0, 4.0), layout="constrained", width_ratios=(1.2, 1))
+    colors = style.use()
+    figure, axes = plt.subplots(1, 2, figsize=(10.0, 4.0), width_ratios=(1.2, 1))
     x = 100.0 * thrown.record.positions()
-    axes[0].axhspan(-3.0, 0.0, color="#e3e7ea")
+    axes[0].axhspan(-3.0, 0.0, color=colors.pale)
     for k in range(0, len(x), 4):
-        axes[0].plot(x[k, :, 0], x[k, :, 2], color="#00798c", alpha=0.2, linewidth=2)
+        axes[0].plot(x[k, :, 0], x[k, :, 2], color=colors.blue, alpha=0.2, linewidth=2)
     for k in REACHED:
-        axes[0].plot(x[k, :, 0], x[k, :, 2], color="#00798c", linewidth=5, solid_capstyle="round")
-    axes[0].plot(x[:, -1, 0], x[:, -1, 2], color="#edae49", linewidth=1.5)
+        axes[0].plot(x[k, :, 0], x[k, :, 2], color=colors.blue, linewidth=5, solid_capstyle="round")
+    axes[0].plot(x[:, -1, 0], x[:, -1, 2], color=colors.orange, linewidth=1.5)
     for point, time in zip(100.0 * POINTS, TIMES, strict=True):
-        axes[0].plot(*point, "o", color="#d1495b", zorder=3)
-        axes[0].annotate(f"{time:g} s", point, (7, 5), textcoords="offset points", color="#d1495b")
-    axes[0].set(xlabel="cm", aspect="equal", xlim=(-2, 36), ylim=(-3, 27))
+        axes[0].plot(*point, "o", color=colors.red, zorder=3)
+        axes[0].annotate(f"{time:g} s", point, (8, 8), textcoords="offset points", color=colors.red, weight="bold")
+    axes[0].set(aspect="equal", xlim=(-2, 36), ylim=(-3, 27))
+    style.label(axes[0], x=("x", "cm"), y=("z", "cm"))
     times = INTERVAL * np.arange(len(controls))
-    for values, name, color in zip(controls.T, ("lower half", "upper half"), ("#00798c", "#edae49"), strict=True):
+    for values, name, color in zip(controls.T, ("lower half", "upper half"), (colors.blue, colors.orange), strict=True):
         axes[1].step(times, values, where="post", color=color, label=name)
     axes[1].fill_between(
         times,
@@ -146,12 +145,12 @@ def draw(thrown: Thrown, controls: np.ndarray, path: Path) -> None:
         1,
         where=thrown.touching > 0,
         transform=axes[1].get_xaxis_transform(),
-        color="#e3e7ea",
+        color=colors.pale,
         label="on floor",
     )
-    axes[1].set(xlabel="time [s]", ylabel="natural curvature [1/m]")
-    axes[1].legend(frameon=False)
-    figure.savefig(path, dpi=150)
+    style.label(axes[1], x=("time", "s"), y=("natural curvature", "1/m"))
+    style.legend(axes[1], side="top")
+    figure.savefig(path)
     plt.close(figure)
 
 

@@ -15,10 +15,12 @@ import argparse
 import sys
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 import withe
 from withe.deployment import Cable, LayPlan, Move, Pattern, Tying, plan, tie
+from withe.view import style
 
 FRICTION = 0.8
 TAIL = 0.05  # [m]
@@ -26,7 +28,7 @@ SMOOTHING = 3e-3  # [m]
 PULLED = 0.02  # [m]
 LIFT = 0.05  # [m]
 KNOTS = {"trefoil": ([1, -1, 1], None), "reef": ([1, -2, 3, -2, 1], 0)}  # Alexander polynomial, signature
-COLOURS = ("#b5651d", "#3465a4")
+COLORS = ("C3", "C0")
 
 
 def through(*points: tuple[float, float]) -> Pattern:
@@ -115,6 +117,7 @@ def is_tied(name: str, found: Tying) -> bool:
 
 def draw(axes: object, found: Tying, name: str) -> None:
     """Draw the view from above. Higher parts hide lower parts."""
+    paper = style.colors().paper
     for panel, title, shapes in zip(axes[: len(found.names)], found.names, found.shapes, strict=True):
         pieces = [
             (points[i : i + 2, 2].mean(), 1e3 * points[i : i + 2, :2], number)
@@ -123,8 +126,8 @@ def draw(axes: object, found: Tying, name: str) -> None:
         ]
         for height, piece, number in sorted(pieces, key=lambda one: one[0]):
             wide = 4.5 if (name, number) != ("reef", 1) else 2.5
-            panel.plot(*piece.T, color="w", lw=wide + 2.5, solid_capstyle="butt", zorder=1 + height)
-            panel.plot(*piece.T, color=COLOURS[number], lw=wide, solid_capstyle="round", zorder=1 + height)
+            panel.plot(*piece.T, color=paper, lw=wide + 2.5, solid_capstyle="butt", zorder=1 + height)
+            panel.plot(*piece.T, color=COLORS[number], lw=wide, solid_capstyle="round", zorder=1 + height)
         panel.set(aspect="equal", xticks=[], yticks=[], title=title)
     for panel in axes[len(found.names) :]:
         panel.set_axis_off()
@@ -139,11 +142,7 @@ def main() -> None:
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
 
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
+    style.use()
     found = {}
     for name in arguments.knots:
         plans, steps = TYING[name]()
@@ -153,13 +152,11 @@ def main() -> None:
             flush=True,
         )
     columns = max(len(one.names) for one in found.values())
-    figure, axes = plt.subplots(
-        len(found), columns, figsize=(3.0 * columns, 3.0 * len(found)), squeeze=False, layout="constrained"
-    )
+    figure, axes = plt.subplots(len(found), columns, figsize=(3.0 * columns, 3.0 * len(found)), squeeze=False)
     for row, (name, one) in zip(axes, found.items(), strict=True):
         draw(row, one, name)
     path = arguments.out / "tie_knot.png"
-    figure.savefig(path, dpi=110)
+    figure.savefig(path)
     print(f"Wrote {path}.")
     if not all(is_tied(name, one) for name, one in found.items()):
         sys.exit("Both knots must be tied.")

@@ -16,10 +16,12 @@ import sys
 from pathlib import Path
 from typing import NamedTuple
 
+import matplotlib.pyplot as plt
 import numpy as np
 from scipy.linalg import solve_discrete_are
 
 import withe
+from withe.view import style
 
 RADIUS, MODULUS, DENSITY, GRAVITY = 6e-3, 1e6, 1100.0, 9.81  # [m], [Pa], [kg/m^3], [m/s^2]
 BENDING = MODULUS * np.pi * RADIUS**4 / 4.0  # [N m^2]
@@ -99,16 +101,15 @@ def pushed(duration: float, controlled: bool) -> Balanced:
 
 def draw(held: Balanced, fallen: Balanced, path: Path) -> None:
     """Draw both arms side by side, and the control of the muscle."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(1, 3, figsize=(10.0, 4.0), layout="constrained", width_ratios=(1, 1, 1.5))
-    for axis, way, color, title in (
-        (axes[0], fallen, "#d1495b", "without"),
-        (axes[1], held, "#00798c", "with regulator"),
+    colors = style.use()
+    figure = plt.figure(figsize=(10.4, 4.4))
+    grid = figure.add_gridspec(2, 3, width_ratios=(1, 1, 1.6))
+    tip, muscle = (figure.add_subplot(grid[row, 2]) for row in range(2))
+    for column, way, color, title in (
+        (0, fallen, colors.red, "without regulator"),
+        (1, held, colors.blue, "with regulator"),
     ):
+        axis = figure.add_subplot(grid[:, column])
         times, x = way.record.times, way.record.positions()
         shown = np.linspace(0, len(times) - 1, 12).astype(int)
         if way is held:
@@ -116,16 +117,21 @@ def draw(held: Balanced, fallen: Balanced, path: Path) -> None:
         for k in shown:
             axis.plot(100.0 * x[k, :, 0], 100.0 * x[k, :, 2], color=color, alpha=0.25, linewidth=3)
         axis.plot(100.0 * x[-1, :, 0], 100.0 * x[-1, :, 2], color=color, linewidth=5, solid_capstyle="round")
-        axis.plot((-2.0, 2.0), (0.0, 0.0), color="#8a9299", linewidth=4)  # the foot is clamped; there is no floor
-        axis.set(title=title, xlabel="cm", aspect="equal", xlim=(-16, 24), ylim=(-20, 28))
+        axis.plot((-2.0, 2.0), (0.0, 0.0), color=colors.grey, linewidth=4)  # the foot is clamped; there is no floor
+        axis.set(title=title, aspect="equal", xlim=(-16, 24), ylim=(-20, 28))
+        style.label(axis, x=("x", "cm"), y=("z", "cm"))
     times = held.record.times
-    axes[2].axvspan(*PUSHED, color="#e3e7ea", label="push")
-    axes[2].plot(times, 1e3 * held.tip, color="#00798c", label="tip, sideways [mm]")
-    axes[2].plot(TIME_STEP * np.arange(len(held.curvature)), held.curvature, color="#edae49", label="muscle [1/m]")
-    axes[2].set(xlabel="time [s]")
-    axes[2].grid(True, color="#e3e7ea")
-    axes[2].legend(frameon=False)
-    figure.savefig(path, dpi=150)
+    tip.plot(times, 1e3 * held.tip)
+    muscle.plot(TIME_STEP * np.arange(len(held.curvature)), held.curvature, color=colors.orange)
+    for axis, title, quantity in (
+        (tip, "tip", ("displacement", "mm")),
+        (muscle, "muscle", ("natural curvature", "1/m")),
+    ):
+        axis.axvspan(*PUSHED, color=colors.pale, label="push")
+        axis.set_title(title)
+        style.label(axis, x=("time", "s"), y=quantity)
+    style.legend(tip)
+    figure.savefig(path)
     plt.close(figure)
 
 

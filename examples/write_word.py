@@ -13,15 +13,17 @@ import argparse
 import sys
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 from withe.deployment import Cable, Pattern, deploy, plan
+from withe.view import style
 
 GRAVITO_BENDING_LENGTH, RADIUS = 0.0113, 8e-4  # [m], of a soft silicone thread
 LONGEST = 85.0  # [Lgb] of a word: with its tail and the way to it the thread hangs by some 90
 FRICTION = 0.8
 ROUNDED = 0.06  # [heights of an x] by which letters may be rounded
-WAYS = {"exact": "#2e8b57", "intuitive": "#b2182b"}
+WAYS = {"exact": "C0", "intuitive": "C1"}
 
 
 def as_large_as_can_be(word: str) -> Pattern:
@@ -42,16 +44,12 @@ def main() -> None:
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
 
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
+    colors = style.use()
     pattern = as_large_as_can_be(arguments.word)
     tail = 4.0 * GRAVITO_BENDING_LENGTH
     thread = Cable(pattern.length + tail + 0.01, RADIUS, GRAVITO_BENDING_LENGTH)
     print(pattern, pattern.feasibility(thread, arguments.friction), sep="\n")
-    figure, axes = plt.subplots(len(arguments.ways), 1, figsize=(7.5, 3.6 * len(arguments.ways)), layout="constrained")
+    figure, axes = plt.subplots(len(arguments.ways), 1, figsize=(7.5, 3.6 * len(arguments.ways)))
     for panel, way in zip(np.atleast_1d(axes), arguments.ways, strict=True):
         motion = plan(thread, pattern, way, crossings="over")
         static = way != "intuitive"  # a row of equilibria does not follow a thread that buckles and falls
@@ -63,12 +61,13 @@ def main() -> None:
             progress=sys.stdout.isatty(),
         )
         print(f"{way}: {1e3 * found.error:.1f} mm off on the mean, word of {1e3 * pattern.length:.0f} mm", flush=True)
-        panel.plot(*(1e3 * pattern.raw.T), color="0.6", lw=0.8, ls=":")
+        panel.plot(*(1e3 * pattern.raw.T), color=colors.ink, lw=1.0, ls=":", zorder=3)
         panel.plot(*(1e3 * found.laid[:, :2].T), color=WAYS[way], lw=3.0, solid_capstyle="round")
-        panel.set(aspect="equal", xlabel="x [mm]", ylabel="y [mm]")
+        panel.set_aspect("equal")
+        style.label(panel, x=("x", "mm"), y=("y", "mm"))
         panel.set_title(f"{way}: {1e3 * found.error:.1f} mm off on the mean; dotted: the word")
     path = arguments.out / "write_word.png"
-    figure.savefig(path, dpi=130)
+    figure.savefig(path)
     print(f"Wrote {path}.")
 
 

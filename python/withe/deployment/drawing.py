@@ -10,6 +10,7 @@ import numpy.typing as npt
 from withe.common.extras import require
 from withe.deployment.feasibility import Feasibility
 from withe.deployment.pattern import Pattern
+from withe.view import style
 
 __all__ = ["draw_plan"]
 
@@ -21,48 +22,55 @@ _MOST_DRAWN = 3.3  # by lines: a little above the greatest friction that plans a
 def draw_plan(pattern: Pattern, jaw: FloatArray, found: Feasibility, title: str) -> Any:
     """Draw `LayPlan.plot`; `jaw` are the positions of the jaw, shape (n, 3) [m]."""
     pyplot = require("matplotlib.pyplot", "view")
-    figure, (floor, needs) = pyplot.subplots(1, 2, figsize=(11.0, 5.2), layout="constrained")
-    _draw_floor(figure, floor, pattern, jaw, found)
-    _draw_needs(needs, found, title)
+    with style.context() as colors:
+        figure, (floor, needs) = pyplot.subplots(1, 2, figsize=(11.0, 5.2))
+        _draw_floor(figure, floor, pattern, jaw, found, colors)
+        _draw_needs(needs, found, title, colors)
     return figure
 
 
-def _draw_floor(figure: Any, axes: Any, pattern: Pattern, jaw: FloatArray, found: Feasibility) -> None:
+def _draw_floor(
+    figure: Any, axes: Any, pattern: Pattern, jaw: FloatArray, found: Feasibility, colors: style.Colors
+) -> None:
     collections = require("matplotlib.collections", "view")
-    axes.plot(1e3 * jaw[:, 0], 1e3 * jaw[:, 1], color="0.75", lw=1.0, label="jaw, seen from above")
-    axes.plot(1e3 * pattern.raw[:, 0], 1e3 * pattern.raw[:, 1], color="k", lw=0.8, ls=":", label="given pattern")
+    axes.plot(1e3 * jaw[:, 0], 1e3 * jaw[:, 1], color=colors.grey, lw=1.0, label="jaw, seen from above")
+    axes.plot(
+        1e3 * pattern.raw[:, 0],
+        1e3 * pattern.raw[:, 1],
+        color=colors.ink,
+        lw=1.0,
+        ls=":",
+        zorder=3,
+        label="given pattern",
+    )
     points = 1e3 * pattern.points
     lines = collections.LineCollection(
         np.stack([points[:-1], points[1:]], 1),
         array=np.minimum(found.needed[:-1], _MOST_SHOWN),
-        cmap="viridis",
+        cmap="cividis",
         lw=4.0,
         clim=(0.0, min(_MOST_SHOWN, max(found.friction, float(found.needed.max())))),
         capstyle="round",
     )
     axes.add_collection(lines)
-    axes.plot(*points[0], "o", color="k", ms=6, label="free end")
-    axes.set(xlabel="x [mm]", ylabel="y [mm]", title="pattern", aspect="equal")
+    axes.plot(*points[0], "o", color=colors.ink, ms=6, label="free end")
+    axes.set(title="pattern", aspect="equal")
+    style.label(axes, x=("x", "mm"), y=("y", "mm"))
     axes.margins(0.08)
     figure.colorbar(lines, ax=axes, label="needed coefficient of friction", location="bottom", aspect=40)
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower left", fontsize="small", ncols=3)
+    style.legend(axes, side="top")
 
 
-def _draw_needs(axes: Any, found: Feasibility, title: str) -> None:
+def _draw_needs(axes: Any, found: Feasibility, title: str, colors: style.Colors) -> None:
     s = 1e3 * found.arc_length
     for name, needed in (("floor", found.floor), ("lift-off", found.lift_off), ("free end", found.free_end)):
         axes.plot(s, needed, label=name, lw=1.5)
-    axes.axhline(found.friction, color="k", ls="--", lw=1.0, label="there is")
+    axes.axhline(found.friction, color=colors.ink, ls="--", lw=1.0, label="available")
     for slip in found.slips:
-        axes.axvspan(1e3 * slip.start, 1e3 * slip.end, color="tab:red", alpha=0.12, lw=0)
+        axes.axvspan(1e3 * slip.start, 1e3 * slip.end, color=colors.red, alpha=0.15, lw=0)
     most = float(np.max(np.maximum(found.floor, found.lift_off)))
     top = max(1.3 * found.friction, min(_MOST_DRAWN, 1.1 * most))
     cut = f", up to {top:.1f}" if most > top else ""
-    axes.set(
-        xlabel="arc length from the free end [mm]",
-        ylabel=f"needed coefficient of friction{cut}",
-        title=title,
-        ylim=(0.0, top),
-        xlim=(0.0, s[-1]),
-    )
-    axes.legend(loc="best", fontsize="small")
+    axes.set(title=title, ylim=(0.0, top), xlim=(0.0, s[-1]))
+    style.label(axes, x=("arc length from the free end", "mm"), y=f"needed coefficient of friction{cut}")
+    style.legend(axes, side="top", ncols=4)

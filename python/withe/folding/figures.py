@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.folding.widths import Width
+from withe.view import style
 
 __all__ = ["draw_fold", "side_view"]
 
@@ -46,16 +47,13 @@ def side_view(forces: FloatArray, length: float, width: Width) -> FloatArray:
 def draw_fold(
     axes: Any, sheets: list[FloatArray], outer: FloatArray, way: FloatArray, table: tuple[float, float]
 ) -> None:
-    """Draw sheets (points in m) from light to dark, the held part of each in black, and the path of the edge."""
-    from matplotlib import colormaps
-
-    colours = colormaps["viridis"](np.linspace(0.9, 0.1, len(sheets)))
-    axes.plot(table, (0, 0), color="0.75", linewidth=4, zorder=0, solid_capstyle="butt")
-    axes.plot(way[:, 0], way[:, 1], color="tab:red", linewidth=1, linestyle=":", label="way of the edge")
-    for points, edge, colour in zip(sheets, outer, colours, strict=True):
-        axes.plot(points[:, 0], points[:, 1], color=colour, linewidth=1.4)
-        axes.plot([points[-1, 0], edge[0]], [points[-1, 1], edge[1]], color="black", linewidth=2.5)
+    """Draw sheets (points in m) in the order of time, the held part of each as a bar, and the path of the edge."""
+    colors, shades = style.colors(), style.ramp()(np.linspace(0.0, 1.0, len(sheets)))
+    axes.plot(table, (0, 0), color=colors.pale, linewidth=5, zorder=0, solid_capstyle="butt")
+    axes.plot(way[:, 0], way[:, 1], color=colors.red, linewidth=1, linestyle=":", label="path of the edge")
+    for points, edge, shade in zip(sheets, outer, shades, strict=True):
+        axes.plot(points[:, 0], points[:, 1], color=shade, linewidth=1.5)
+        axes.plot([points[-1, 0], edge[0]], [points[-1, 1], edge[1]], color=colors.ink, linewidth=2.5)
     axes.set_aspect("equal")
-    axes.set(xlabel="x [m]", ylabel="z [m]")
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.legend(frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0)  # over what is drawn
+    style.label(axes, x=("x", "m"), y=("z", "m"))
+    style.legend(axes, side="top")

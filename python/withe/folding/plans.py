@@ -19,6 +19,7 @@ from withe.folding.plan_files import KIND, VERSION, parts_of, sheet_listed
 from withe.folding.sheets import Elastica, at_forces, drag, forces_of, join, of_other, take
 from withe.folding.widths import Width, free_width
 from withe.io import PlanFile, listed
+from withe.view import style
 
 __all__ = ["SHORT", "FoldPlan", "flat_forces"]
 
@@ -320,7 +321,8 @@ class FoldPlan(PlanFile):
             `poses` is not a whole number above 0.
         """
         if axes is None:
-            axes = require("matplotlib.pyplot", "view").subplots(layout="constrained")[1]
+            with style.context():
+                return self.plot(require("matplotlib.pyplot", "view").subplots(figsize=(8.0, 3.2))[1], poses)
         (sheet, slide), lgb = self._motion, self.paper.gravito_bending_length
         index = np.unique(np.linspace(0, len(self) - 1, validation.integer(poses, "poses", 1, 1000)).astype(int))
         index = index[sheet.valid[index]]

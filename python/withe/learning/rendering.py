@@ -13,6 +13,7 @@ from withe.common.extras import require
 from withe.common.outlines import ObstacleOutline
 from withe.common.user_warnings import warn
 from withe.simulation.obstacles import obstacle_outlines
+from withe.view import style
 from withe.view.scenery import patch
 
 __all__ = ["Screen"]
@@ -22,7 +23,6 @@ _TICKS = 5
 _HALF = 0.5 / 3.0**0.5  # side of a cube over twice its diagonal
 _LINES = 13
 _FLOOR = "#b98b5e"
-_COLORS = ("#00798c", "#edae49", "#66a182", "#8d96a3", "#d1495b", "#2e4057")
 
 
 class Screen:
@@ -44,8 +44,9 @@ class Screen:
 
     def picture(self) -> npt.NDArray[np.uint8]:
         """Return a picture of the present state, shape (480, 640, 3)."""
-        self._paint()
-        self._figure.canvas.draw()
+        with style.context():
+            self._paint()
+            self._figure.canvas.draw()
         return np.array(self._figure.canvas.buffer_rgba())[..., :3]
 
     def show(self) -> None:
@@ -56,7 +57,8 @@ class Screen:
                 '"rgb_array"',
                 cause="screen",
             )
-        self._paint()
+        with style.context():
+            self._paint()
         require("matplotlib.pyplot", "view").pause(1e-3)
 
     def close(self) -> None:
@@ -75,20 +77,21 @@ class Screen:
                 require("matplotlib.backends.backend_agg", "view").FigureCanvasAgg(self._figure)
             self._axes = self._figure.add_axes((0.0, 0.07, 0.92, 0.91), projection="3d")
             self._reach = self._extent()
-        axes = self._axes
+        axes, colors = self._axes, style.colors("light")
         axes.clear()
         simulation = self._robots[0]
         low, high = self._reach
         for axis, bottom, top in zip("xyz", low, high, strict=True):
-            axes.set(**{f"{axis}lim": (bottom, top), f"{axis}label": f"{axis} [m]"})
+            axes.set(**{f"{axis}lim": (bottom, top)})
             # More ticks than this run into each other along the axes that go into the picture.
             getattr(axes, f"{axis}axis").get_major_locator().set_params(nbins=_TICKS)
+        style.label(axes, x=("x", "m"), y=("y", "m"), z=("z", "m"))
         axes.set_box_aspect(high - low)
         scale = 0.55 * _SIZE[1] * 0.72 / float((high - low).max())  # points a metre, about
         for number, rod in enumerate(simulation.rods):
             x = simulation.positions(rod)
             width = float(np.clip(2.0 * np.mean(simulation.get(rod, "radius")) * scale, 1.5, 40.0))
-            axes.plot(*x.T, color=_COLORS[number % len(_COLORS)], linewidth=width, solid_capstyle="round")
+            axes.plot(*x.T, color=colors.cycle[number % len(colors.cycle)], linewidth=width, solid_capstyle="round")
         self._obstacles(simulation, scale)
         self._draw(axes, self._robots)
         axes.text2D(0.02, 0.95, f"{simulation.time:.2f} s", transform=axes.transAxes)
