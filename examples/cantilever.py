@@ -81,7 +81,7 @@ def draw(simulation: withe.Simulation, path: Path) -> None:
     errors = [np.linalg.norm(shape(sagging_rod(count)[0])[-1] - theory[-1]) for count in counts]
     right.loglog(counts - 1, errors, "o-", color=colors.blue, linewidth=1.8, label="withe")
     right.loglog(counts - 1, errors[-1] * (320.0 / (counts - 1)) ** 2, "--", color=colors.grey, label="second order")
-    right.axhline(TOLERANCE, color=colors.red, linewidth=1.2, label="what this example demands")
+    right.axhline(TOLERANCE, color=colors.red, linewidth=1.2, label="tolerance")
     right.set(title="Edges half as long: a quarter of the error")
     style.label(right, x="number of edges", y="error of the tip / L")
     style.legend(right, side="top")

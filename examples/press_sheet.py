@@ -79,7 +79,7 @@ def draw(record: withe.Record, low: np.ndarray, pressing: np.ndarray, path: Path
     colors = style.use()
     record.picture(path, camera=(0.12, -0.42, 0.1), size=(1200, 800))
     figure, (seen, force) = plt.subplots(1, 2, figsize=(10.4, 4.2), width_ratios=(1.4, 1.0))
-    seen.imshow(plt.imread(path))
+    seen.imshow(plt.imread(path)[250:680, 180:1000])
     seen.axis("off")
     middle = pressing[np.argmin(np.abs(low - 1e-3))]
     force.axline((1.0, middle), slope=1e-3 * STIFFNESS, color=colors.grey, label="stiffness of the jaw")

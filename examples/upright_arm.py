@@ -103,7 +103,7 @@ def draw(held: Balanced, fallen: Balanced, path: Path) -> None:
     """Draw both arms side by side, and the control of the muscle."""
     colors = style.use()
     figure = plt.figure(figsize=(10.4, 4.4))
-    grid = figure.add_gridspec(2, 3, width_ratios=(1, 1, 1.6))
+    grid = figure.add_gridspec(2, 3, width_ratios=(1.2, 1.2, 1.5))
     tip, muscle = (figure.add_subplot(grid[row, 2]) for row in range(2))
     for column, way, color, title in (
         (0, fallen, colors.red, "without regulator"),
@@ -130,7 +130,7 @@ def draw(held: Balanced, fallen: Balanced, path: Path) -> None:
         axis.axvspan(*PUSHED, color=colors.pale, label="push")
         axis.set_title(title)
         style.label(axis, x=("time", "s"), y=quantity)
-    style.legend(tip)
+    style.legend(tip, side="top")
     figure.savefig(path)
     plt.close(figure)
 

@@ -56,4 +56,4 @@ def draw_fold(
         axes.plot([points[-1, 0], edge[0]], [points[-1, 1], edge[1]], color=colors.ink, linewidth=2.5)
     axes.set_aspect("equal")
     style.label(axes, x=("x", "m"), y=("z", "m"))
-    style.legend(axes, side="top")
+    style.legend(axes, side="top", loc="lower right", bbox_to_anchor=(1.0, 1.0))  # beside a title
