@@ -55,6 +55,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("out"))
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
+    print("Takes about 5 s.", flush=True)
 
     scene, rope = scene_of()
     simulation = scene.build(integrator="backward_euler", time_step=arguments.step)

@@ -1,9 +1,8 @@
 """Domain randomisation in Gymnasium: no two episodes have the same arm, and only feedback reaches the goal in all.
 
 The tip of a hanging arm is to reach a point. `Reach` is a `withe.learning.Task`, whose method `begin` draws the arm of
-an episode: Young's modulus, density and the mass of a tool. `VectorEnvironment` steps all arms in one batch.
-
-Two controllers know the nominal arm only. One applies the action that brings the nominal arm to the goal. The other
+an episode: Young's modulus, density and the mass of a tool. `VectorEnvironment` steps all arms in one batch. Two
+controllers know the nominal arm only. One applies the action that brings the nominal arm to the goal. The other
 observes the tip and corrects the action. A policy from `withe.learning.train_policy` could take their place. Fails if
 feedback does not end ten times closer on the mean. Needs Gymnasium. Writes out/domain_randomisation.png.
 """
@@ -66,7 +65,7 @@ def episodes(task: Reach, count: int, choose: Callable[..., np.ndarray]) -> tupl
     """One episode of each arm by choose(errors, last actions): errors (steps + 1, n, 2) [m], last actions (n, 2)."""
     arms, actions = withe.learning.VectorEnvironment(task, count), np.zeros((count, 2))
     errors = [arms.reset(seed=7)[0]]
-    for _ in range(task.steps):
+    for _ in withe.track(range(task.steps), "episodes", unit="steps"):
         actions = np.clip(choose(errors[-1], actions), -1.0, 1.0)
         errors.append(arms.step(actions)[0])
     return np.array(errors, float), actions

@@ -106,7 +106,7 @@ def compare(
         if start is not None:
             simulation.restore(start)
         runs[model] = Run(simulation)
-    for done in range(0, steps, BLOCK):
+    for done in withe.track(range(0, steps, BLOCK), f"{count} flagella", unit="blocks"):
         for run in runs.values():
             run.advance(min(BLOCK, steps - done), keep=start is not None)
     for model, run in runs.items():
@@ -193,6 +193,7 @@ def main() -> None:
     if min(arguments.counts) < 2:
         parser.error("--counts must be 2 or more")
     arguments.out.mkdir(parents=True, exist_ok=True)
+    print("Takes about 60 s.", flush=True)
 
     print(
         "flagella  friction  model    touching  contacts  iterations  ms a step  without fluid  iterations  time  end"

@@ -56,6 +56,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("out"))
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
+    print("Takes about 7 s.", flush=True)
 
     paper = folding.Paper.a4()
     sheet = folding.SimulatedSheet(paper, edges=options.edges, time_step=options.time_step)

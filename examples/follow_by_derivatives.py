@@ -117,6 +117,7 @@ def main() -> int:
     parser.add_argument("episodes", type=int, nargs="?", default=4, help="over which returns are means; 4")
     parser.add_argument("film", type=Path, nargs="?", help="file of a film, .gif or .mp4")
     arguments = parser.parse_args()
+    print("Takes about 60 s.", flush=True)
     if arguments.film:
         check_tools()
     found = {ahead: discounted_return(Controller(ahead), arguments.episodes) for ahead in (1, 5)}

@@ -67,6 +67,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("out"))
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
+    print("Takes about 5 s.", flush=True)
 
     # The nearest one above the limit is 5 % above it.
     below = round(arguments.forces * 16 / 44)

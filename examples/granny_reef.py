@@ -115,7 +115,7 @@ def pull(
         simulation.move(grip, position=end + side * SPEED * duration * np.eye(3)[0], over=duration)
     force = np.zeros(round(duration / time_step))
     until = duration
-    for k in range(len(force)):
+    for k in withe.track(range(len(force)), f"pulling a {knot} knot", unit="steps"):
         simulation.step()
         force[k] = 0.5 * sum(side * simulation.reaction(grip).force[0] for grip, side in sides.items())
         if k % 20 == 0 and until == duration:
@@ -198,6 +198,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("out"))
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
+    print("Takes about 180 s.", flush=True)
 
     curves: dict[tuple[str, float], Pull] = {}
     means: dict[str, dict[str, dict[float, float]]] = {

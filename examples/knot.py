@@ -101,7 +101,7 @@ def pulled(knot: Tied, target: float, speed: float) -> Iterator[tuple[np.ndarray
     way = 0.5 * (LENGTH - distance - target * RADIUS)
     for grip, at, sign in zip(grips, (x[0], x[-1]), (-1.0, 1.0), strict=True):
         simulation.move(grip, position=at + sign * way * axis, over=abs(way) / speed)
-    for _ in range(round(abs(way) / speed / TIME_STEP)):
+    for _ in withe.track(range(round(abs(way) / speed / TIME_STEP)), "pulling", unit="steps"):
         simulation.step()
         difference = simulation.reaction(grips[1]).force - simulation.reaction(grips[0]).force
         yield simulation.positions(rope), 0.5 * float(difference @ axis)
@@ -172,6 +172,7 @@ def main() -> None:
     if not 2 <= arguments.points <= 5:
         parser.error("--points must be 2 to 5")
     arguments.out.mkdir(parents=True, exist_ok=True)
+    print("Takes about 60 s.", flush=True)
 
     tightened, worst, gap, locked = {}, 0.0, 0.0, None
     loosened = None

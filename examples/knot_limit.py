@@ -126,10 +126,11 @@ def main() -> None:
     if arguments.points < 4:
         parser.error("--points must be 4 or more")
     arguments.out.mkdir(parents=True, exist_ok=True)
+    print("Takes about 60 s.", flush=True)
 
     knots = []
     print("epsilon   pull of the grips   normal forces   contacts   (over those of the limit, epsilon^3 B / h^2)")
-    for epsilon in np.linspace(0.13, 0.07, arguments.points):
+    for epsilon in withe.track(np.linspace(0.13, 0.07, arguments.points), "coming to rest", unit="knots"):
         knot, simulation = rest(epsilon)
         knots.append(knot)
         contacts = len(simulation.contacts())

@@ -43,7 +43,7 @@ def discounted_return(choose: Any, episodes: int = 16, seed: int = 1000, task: A
     robots = withe.learning.VectorEnvironment(task, episodes)
     seen, _ = robots.reset(seed=seed)
     total, going = np.zeros(episodes), np.ones(episodes, bool)
-    for step in range(task.steps):
+    for step in withe.track(range(task.steps), "measuring", unit="steps"):
         seen, rewards, terminated, truncated, _ = robots.step(choose(seen, robots.robots))
         total += DISCOUNT**step * rewards * going
         going &= ~(terminated | truncated)

@@ -139,6 +139,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("out"))
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
+    print("Takes about 60 s.", flush=True)
 
     pulls, wrong = {}, []
     for n in arguments.knots:

@@ -19,6 +19,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 
+from withe import track
 from withe.deployment import Cable, Deployment, Pattern, deploy, plan, posts_along
 from withe.view import style
 
@@ -92,12 +93,13 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("out"))
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
+    print("Takes about 20 s.", flush=True)
 
     colors = style.use()
     figure, axes = plt.subplots(1, len(arguments.letters), figsize=(10.0, 4.4), squeeze=False)
     placed = True
     for panel, letter in zip(axes[0], arguments.letters, strict=True):
-        found = {way: laid(letter, way, arguments.nodes) for way in COLORS}
+        found = {way: laid(letter, way, arguments.nodes) for way in track(COLORS, f"placing {letter}", unit="cables")}
         for way, result in found.items():
             print(
                 f"{letter}, {way}: passes {result.passed.sum()} of {len(result.passed)} posts on its side", flush=True

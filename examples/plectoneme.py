@@ -161,10 +161,11 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("out"))
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
+    print("Takes about 20 s.", flush=True)
 
     found, worst = [], dict.fromkeys(TOLERANCES, 0.0)
     print("F R^2 / B   angle [rad]      M R / B          p R^3 / B         contacts")
-    for force in arguments.forces:
+    for force in withe.track(arguments.forces, "winding", unit="forces"):
         simulation, rod = wind(force, arguments.turns, arguments.edge)
         here, _ = measure(simulation, rod)
         found.append(here)

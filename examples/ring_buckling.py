@@ -70,8 +70,9 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("out"))
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
+    print("Takes about 7 s.", flush=True)
 
-    for ratio in (TWISTING / BENDING, 1.0, 2.0, 3.0):
+    for ratio in withe.track((TWISTING / BENDING, 1.0, 2.0, 3.0), "twisting", unit="rings"):
         expected, measured = michell(ratio * BENDING), critical_twist(arguments.nodes, ratio * BENDING)
         share = 100.0 * (measured / expected - 1.0)
         print(f"C/B = {ratio:3.1f}: critical twist {measured:6.3f} rad; Michell {expected:6.3f} rad ({share:+.3f} %)")

@@ -93,6 +93,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("out"))
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
+    print("Takes about 5 s.", flush=True)
 
     options = arguments.nodes, arguments.step, arguments.periods
     shapes, speeds = crawl((FRICTION, 1.5 * FRICTION, 2.0 * FRICTION), *options)

@@ -74,6 +74,7 @@ def main() -> None:
     parser.add_argument("--basis", choices=("constant", "linear"), default="constant", help="curvature along a limb")
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
+    print("Takes about 15 s.", flush=True)
 
     log = real2sim.read_log(LOG, tags=range(101, 110), skip=7)
     simulation = robot()

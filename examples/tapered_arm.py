@@ -207,6 +207,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("out"))
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
+    print("Takes about 3 s.", flush=True)
 
     cylinder, tapered = Design(np.ones((EDGES, 1))), Design(TENTS)
     tried = [np.array([1e3 * CYLINDER, moment]) for moment in np.linspace(0.0, 1000.0, 51)]

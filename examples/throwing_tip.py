@@ -131,9 +131,10 @@ def draw(thrown: Thrown, controls: np.ndarray, path: Path) -> None:
     for k in REACHED:
         axes[0].plot(x[k, :, 0], x[k, :, 2], color=colors.blue, linewidth=5, solid_capstyle="round")
     axes[0].plot(x[:, -1, 0], x[:, -1, 2], color=colors.orange, linewidth=1.5)
+    box = {"facecolor": colors.paper, "edgecolor": "none", "pad": 1.5}
     for point, time in zip(100.0 * POINTS, TIMES, strict=True):
         axes[0].plot(*point, "o", color=colors.red, zorder=3)
-        axes[0].annotate(f"{time:g} s", point, (8, 8), textcoords="offset points", color=colors.red, weight="bold")
+        axes[0].annotate(f"{time:g} s", point, (8, 8), textcoords="offset points", bbox=box)
     axes[0].set(aspect="equal", xlim=(-2, 36), ylim=(-3, 27))
     style.label(axes[0], x=("x", "cm"), y=("z", "cm"))
     times = INTERVAL * np.arange(len(controls))
@@ -161,17 +162,20 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("out"))
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
+    print("Takes about 15 s.", flush=True)
 
     simulation = resting()
-    found = minimize(
-        objective,
-        np.zeros(2 * INTERVALS),
-        args=(simulation,),
-        jac=True,
-        method="L-BFGS-B",
-        bounds=[(-STRONGEST, STRONGEST)] * (2 * INTERVALS),
-        options={"maxiter": arguments.iterations, "maxfun": 2 * arguments.iterations, "maxcor": 30},
-    )
+    with withe.progress_bar(arguments.iterations, "optimising", unit="iterations") as bar:
+        found = minimize(
+            objective,
+            np.zeros(2 * INTERVALS),
+            args=(simulation,),
+            jac=True,
+            method="L-BFGS-B",
+            bounds=[(-STRONGEST, STRONGEST)] * (2 * INTERVALS),
+            options={"maxiter": arguments.iterations, "maxfun": 2 * arguments.iterations, "maxcor": 30},
+            callback=lambda _: bar.advance(1),
+        )
     controls = found.x.reshape(-1, 2)
     thrown = throw(simulation, controls)
     greatest = np.linalg.norm(thrown.misses, axis=1).max()

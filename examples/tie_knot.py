@@ -141,10 +141,11 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("out"))
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
+    print("Takes about 120 s.", flush=True)
 
     style.use()
     found = {}
-    for name in arguments.knots:
+    for name in withe.track(arguments.knots, "tying", unit="knots"):
         plans, steps = TYING[name]()
         found[name] = tie(plans, steps, friction=FRICTION, nodes=arguments.nodes)
         print(

@@ -142,6 +142,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("out"))
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
+    print("Takes about 2 s.", flush=True)
 
     simulation = upright()
     A, B, gain = regulator(simulation, muscle(simulation))

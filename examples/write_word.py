@@ -10,7 +10,6 @@ Takes half a minute. Writes out/write_word.png.
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -43,6 +42,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("out"))
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
+    print("Takes about 30 s.", flush=True)
 
     colors = style.use()
     pattern = as_large_as_can_be(arguments.word)
@@ -58,7 +58,6 @@ def main() -> None:
             friction=arguments.friction,
             nodes=arguments.nodes,
             quasi_static=static,
-            progress=sys.stdout.isatty(),
         )
         print(f"{way}: {1e3 * found.error:.1f} mm off on the mean, word of {1e3 * pattern.length:.0f} mm", flush=True)
         panel.plot(*(1e3 * pattern.raw.T), color=colors.ink, lw=1.0, ls=":", zorder=3)

@@ -17,6 +17,7 @@ from withe.batch.records import BatchRecord, Equilibria
 from withe.common.frames import EnergyHistory
 from withe.common.outlines import ObstacleOutline, RodOutline, SpringOutline, TendonOutline
 from withe.common.progress import progress as progress_bar
+from withe.common.progress import track
 from withe.errors import (
     BranchChangedWarning,
     CoarseMeshWarning,
@@ -131,5 +132,6 @@ __all__ = [
     "real2sim",
     "run_many",
     "shapes",
+    "track",
     "view",
 ]

@@ -14,6 +14,7 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 EXAMPLES = {
     "upright_arm.py": (["--duration", "4"], r"tip at most [.\d]+ mm aside, ([.\d]+) mm in the end", 0.0, 1.0),
     "carry_rope.py": (["--step", "1e-2"], r"carries up to (\d+)% of the weight", 40.0, 110.0),
+    "domain_randomisation.py": (["--arms", "8"], r"feedback: ([.\d]+) mm off", 0.0, 2.0),
     "flagella.py": (["--step", "2e-3", "--duration", "6"], r"drawn together by (\d+)%", 20.0, 80.0),
     "flagella_contact.py": (
         ["--counts", "2", "--frictions", "0.3", "--steps", "200"],
@@ -44,10 +45,12 @@ EXAMPLES = {
     "place_cable.py": (["--nodes", "110", "--letters", "U"], r"U, exact: passes (\d+) of 14 posts", 14.0, 14.0),
     "press_sheet.py": (["--edges", "75"], r"presses with ([.\d]+) N for each mm", 1.95, 2.0),
     "pull_rope.py": (["--step", "1e-2"], r"([.\d]+) cm of the rope are through the eye", 75.0, 90.0),
+    "quadruped.py": (["--duration", "1.8"], r"walked ([.\d]+) body lengths", 1.0, 2.0),
     "robot.py": (["--steps", "2"], r"walked ([-.\d]+) cm", 4.0, 10.0),
     "servo_arm.py": ([], r"by ([.\d]+) mm where it is shaped", 0.0, 1.0),
     "snake.py": (["--periods", "3"], r"Crawls at ([.\d]+) mm/s", 27.8, 28.7),
     "soft_limb.py": ([], r"tip ([.\d]+) mm off on the mean", 0.3, 0.7),
+    "stiffness_sweep.py": (["--arms", "60"], r"tips within ([-.\de]+) L of theory", 0.0, 1e-3),
     "tapered_arm.py": ([], r"tapered: clearance off by ([.\d]+) mm", 0.0, 1.0),
     "tendon_arm.py": (["--points", "4"], r"mm, ([.\d]+) mm off theory", 0.0, 0.05),
     "throwing_tip.py": (["--iterations", "120"], r"within ([.\d]+) mm of each point", 0.0, 1.0),
@@ -64,6 +67,8 @@ SMALLER = {
 
 @pytest.mark.parametrize("name", sorted(EXAMPLES))
 def test_an_example_finds_what_it_claims_and_writes_its_pictures(name, tmp_path, renderer):
+    if name == "domain_randomisation.py":
+        pytest.importorskip("gymnasium")
     options, pattern, low, high = EXAMPLES[name]
     command = [sys.executable, ROOT / "examples" / name, *options, "--out", tmp_path]
     environment = {**os.environ, "MPLBACKEND": "Agg"}

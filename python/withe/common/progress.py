@@ -9,15 +9,16 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from typing import Any, TextIO
+from typing import Any, TextIO, TypeVar
 
 from withe.common import validation
 from withe.common.deprecation import old_word
 
-__all__ = ["Progress", "Task", "progress"]
+__all__ = ["Progress", "Task", "progress", "track"]
 
+T = TypeVar("T")
 _REDRAW_INTERVAL = 0.1  # [s]
 _drawn = threading.Lock()  # held by the one bar on the screen; a nested bar stays silent
 
@@ -215,6 +216,42 @@ def progress(
     finally:
         if alone:
             _drawn.release()
+
+
+def track(items: Iterable[T], description: str = "", enabled: bool = True, *, unit: str = "items") -> Iterator[T]:
+    """Yield the items, and show how many the body of a loop has completed.
+
+    Parameters
+    ----------
+    items : iterable
+        Items of a loop, as many as a list can hold.
+    description : str
+        Text before the bar.
+    enabled : bool
+        True draws on a terminal or in a notebook, and nothing elsewhere. False draws nothing.
+    unit : str
+        Name of the items.
+
+    Yields
+    ------
+    item
+        Each of the items. Bars of runs in the body of the loop draw nothing.
+
+    Raises
+    ------
+    ValueError
+        `enabled` is not a boolean.
+
+    Examples
+    --------
+    >>> [2 * force for force in track([1.0, 2.0], "pulling", unit="forces")]
+    [2.0, 4.0]
+    """
+    listed = list(items)
+    with progress(len(listed), description, enabled, unit=unit) as bar:
+        for item in listed:
+            yield item
+            bar.advance(1)
 
 
 def _draws_always(enabled: object) -> bool:

@@ -76,7 +76,7 @@ _COLORS: dict[str, Colors] = {
         sky="#56b4e9",
         yellow="#f0e442",
         ink="#22282d",
-        grey="#7b848b",
+        grey="#687077",
         pale="#e4e8eb",
         paper="#ffffff",
     ),
@@ -89,7 +89,7 @@ _COLORS: dict[str, Colors] = {
         sky="#9bd6f7",
         yellow="#f0e442",
         ink="#e8ecef",
-        grey="#98a2aa",
+        grey="#828b93",
         pale="#343b42",
         paper="#16191d",
     ),
@@ -401,4 +401,4 @@ def _ticks(low: float, high: float, count: int) -> list[float]:
         ticks = [float(t) for t in ticker.MaxNLocator(wanted).tick_values(low, high) if low + room <= t <= high - room]
         if len(ticks) >= min(2, count):
             break
-    return ticks
+    return ticks[len(ticks) // 2 :][:1] if count == 1 else ticks
