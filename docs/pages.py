@@ -1,5 +1,6 @@
-"""Pages that are made of other files: one for each public name, each room of the engine and each benchmark."""
+"""Pages that are made of other files: for each public name, room of the engine, benchmark and example."""
 
+import ast
 import importlib
 import inspect
 import json
@@ -20,6 +21,7 @@ MODULES = {
     "withe.knots": "Knots",
     "withe.shapes": "Shapes of centrelines",
     "withe.view": "Pictures and films",
+    "withe.view.style": "Style of plots",
     "withe.io": "Files of poses and frames",
 }
 # Names for users of a module that is also for other modules of the package.
@@ -49,6 +51,7 @@ MADE_BY = {
     "withe.real2sim.Calibration": "calibrate",
     "withe.view.LiveView": "Simulation.view",
     "withe.view.SliderView": "Simulation.view",
+    "withe.view.style.Colors": "use",
 }
 # Benchmarks by topic, the most important first: title of the page, and the question that the benchmark answers.
 BENCHMARKS = {
@@ -82,6 +85,37 @@ BENCHMARKS = {
     "deployment_refining": ("Refinement of laid cables", "How do the mesh and the speed change a laid cable?"),
     "deployment_uses": ("Posts and knots", "Does a gripper place cables between posts and tie knots?"),
 }
+EXAMPLES = {
+    "Start": ("cantilever", "helix", "robot", "quadruped", "soft_limb"),
+    "Actuation and control": ("servo_arm", "tendon_arm", "upright_arm", "throwing_tip", "tapered_arm", "snake"),
+    "Many robots and learning": (
+        "stiffness_sweep",
+        "domain_randomisation",
+        "follow_by_derivatives",
+        "follow_by_gradients",
+        "learn_follow",
+    ),
+    "Contact and friction": ("friction", "spider", "gripper", "flagella", "flagella_contact"),
+    "Hands, cables and sheets": (
+        "carry_rope",
+        "pull_rope",
+        "place_cable",
+        "write_word",
+        "tie_knot",
+        "fold_paper",
+        "fold_sheet",
+        "press_sheet",
+    ),
+    "Knots and instabilities": (
+        "ring_buckling",
+        "plectoneme",
+        "knot",
+        "knot_limit",
+        "overhand",
+        "granny_reef",
+    ),
+}
+PICTURES = {"follow_by_derivatives": "follow.gif", "follow_by_gradients": "follow.gif", "learn_follow": "follow.gif"}
 ROOT = Path(__file__).resolve().parent.parent
 GENERATED = "generated"
 
@@ -297,6 +331,36 @@ def duration(took: re.Match[str] | None) -> str:
     )
 
 
+def examples(folder: Path) -> None:
+    """Write a gallery of thumbnails, and a page for each example with its text, its picture and its code."""
+    index = [
+        "# Examples",
+        "",
+        "One script for each subject. Each checks its result, and fails if the result is wrong.",
+        "",
+    ]
+    for section, names in EXAMPLES.items():
+        index += [f"## {section}", "", "::::{grid} 1 2 3 3", ":gutter: 2", ""]
+        for name in names:
+            path = ROOT / "examples" / f"{name}.py"
+            head, _, body = (ast.get_docstring(ast.parse(path.read_text())) or "").partition("\n")
+            title = name.replace("_", " ").capitalize()
+            picture = f"../../../examples/pictures/{PICTURES.get(name, f'{name}.png')}"
+            index += [f":::{{grid-item-card}} {title}", f":link: {name}", ":link-type: doc", f":img-top: {picture}"]
+            index += ["", head, ":::", ""]
+            page = [f"# {title}", "", head, "", f"![{title}]({picture})", *body.splitlines(), ""]
+            page += [
+                "```bash",
+                f"python examples/{name}.py",
+                "```",
+                "",
+                f"```{{literalinclude}} ../../../examples/{name}.py",
+            ]
+            put(folder / f"{name}.md", [*page, ":language: python", "```"])
+        index += ["::::", "", "```{toctree}", ":hidden:", "", *names, "```", ""]
+    put(folder / "index.md", index)
+
+
 def put(path: Path, lines: list[str]) -> None:
     """Write a page unless the file has that text."""
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -310,3 +374,4 @@ def write(folder: Path) -> None:
     reference(folder / GENERATED / "reference")
     rooms(folder / GENERATED / "theory")
     benchmarks(folder / GENERATED / "benchmarks")
+    examples(folder / GENERATED / "examples")
