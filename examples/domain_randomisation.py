@@ -72,7 +72,7 @@ def episodes(task: Reach, count: int, choose: Callable[..., np.ndarray]) -> tupl
 
 
 def draw(found: dict[str, np.ndarray], path: Path) -> None:
-    """Where the tips end, and their distances to the goal over time."""
+    """Draw the ends of the tips, and their distances to the goal over time."""
     colors = style.use()
     figure, (above, over_time) = plt.subplots(1, 2, figsize=(10.0, 4.2))
     for (name, errors), color in zip(found.items(), (colors.red, colors.blue), strict=True):

@@ -22,7 +22,6 @@ _SIZE = (640, 480)  # [px]
 _TICKS = 5
 _HALF = 0.5 / 3.0**0.5  # side of a cube over twice its diagonal
 _LINES = 13
-_FLOOR = "#b98b5e"
 
 
 class Screen:
@@ -71,9 +70,9 @@ class Screen:
         if self._figure is None:
             size = (_SIZE[0] / 100.0, _SIZE[1] / 100.0)
             if self._window:
-                self._figure = require("matplotlib.pyplot", "view").figure(figsize=size, dpi=100)
+                self._figure = require("matplotlib.pyplot", "view").figure(figsize=size, dpi=100, layout="none")
             else:
-                self._figure = require("matplotlib.figure", "view").Figure(figsize=size, dpi=100)
+                self._figure = require("matplotlib.figure", "view").Figure(figsize=size, dpi=100, layout="none")
                 require("matplotlib.backends.backend_agg", "view").FigureCanvasAgg(self._figure)
             self._axes = self._figure.add_axes((0.0, 0.07, 0.92, 0.91), projection="3d")
             self._reach = self._extent()
@@ -103,7 +102,7 @@ class Screen:
                 self._plane(outline, start)
                 continue
             width = float(np.clip(2.0 * outline.radius * scale, 1.5, 80.0))
-            look: dict[str, Any] = {"color": "#9aa5b1", "alpha": 0.45}
+            look: dict[str, Any] = {"color": style.colors("light").grey, "alpha": 0.45}
             if not outline.axis.any():  # a sphere
                 self._axes.plot(*start[:, None], "o", markersize=width, markeredgewidth=0.0, **look)
             else:
@@ -123,7 +122,13 @@ class Screen:
             ):
                 for share in np.linspace(0.0, 1.0, _LINES):
                     start = corner + share * across
-                    self._axes.plot(*np.stack([start, start + along]).T, color=_FLOOR, linewidth=0.8, zorder=1)
+                    self._axes.plot(
+                        *np.stack([start, start + along]).T,
+                        color=style.colors("light").grey,
+                        alpha=0.5,
+                        linewidth=0.8,
+                        zorder=1,
+                    )
 
     def _extent(self) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
         """A box that the robot stays in, for all it is known: as far as its rods reach from where they are held."""
