@@ -115,7 +115,12 @@ EXAMPLES = {
         "granny_reef",
     ),
 }
-PICTURES = {"follow_by_derivatives": "follow.gif", "follow_by_gradients": "follow.gif", "learn_follow": "follow.gif"}
+PICTURES = {
+    "follow_by_derivatives": "follow.gif",
+    "follow_by_gradients": "follow.gif",
+    "learn_follow": "follow.gif",
+    "knot": "knot_plot.png",
+}
 ROOT = Path(__file__).resolve().parent.parent
 GENERATED = "generated"
 
@@ -339,16 +344,24 @@ def examples(folder: Path) -> None:
         "One script for each subject. Each checks its result, and fails if the result is wrong.",
         "",
     ]
-    for section, names in EXAMPLES.items():
+    listed = {name for names in EXAMPLES.values() for name in names}
+    others = [path.stem for path in sorted((ROOT / "examples").glob("*.py")) if path.stem not in listed]
+    for section, names in [*EXAMPLES.items(), *([("More", others)] if others else [])]:
         index += [f"## {section}", "", "::::{grid} 1 2 3 3", ":gutter: 2", ""]
         for name in names:
             path = ROOT / "examples" / f"{name}.py"
-            head, _, body = (ast.get_docstring(ast.parse(path.read_text())) or "").partition("\n")
+            tree = ast.parse(path.read_text())
+            head, _, body = (ast.get_docstring(tree) or "").partition("\n")
+            first = tree.body[1].lineno  # the text stands above the code
             title = name.replace("_", " ").capitalize()
-            picture = f"../../../examples/pictures/{PICTURES.get(name, f'{name}.png')}"
-            index += [f":::{{grid-item-card}} {title}", f":link: {name}", ":link-type: doc", f":img-top: {picture}"]
+            index += [f":::{{grid-item-card}} {title}", f":link: {name}", ":link-type: doc"]
+            page = [f"# {title}", "", head, ""]
+            picture = PICTURES.get(name, f"{name}.png")
+            if (ROOT / "examples" / "pictures" / picture).exists():
+                index += [f":img-top: ../../../examples/pictures/{picture}"]
+                page += [f"![{title}](../../../examples/pictures/{picture})"]
             index += ["", head, ":::", ""]
-            page = [f"# {title}", "", head, "", f"![{title}]({picture})", *body.splitlines(), ""]
+            page += [*body.splitlines(), ""]
             page += [
                 "```bash",
                 f"python examples/{name}.py",
@@ -356,7 +369,7 @@ def examples(folder: Path) -> None:
                 "",
                 f"```{{literalinclude}} ../../../examples/{name}.py",
             ]
-            put(folder / f"{name}.md", [*page, ":language: python", "```"])
+            put(folder / f"{name}.md", [*page, ":language: python", f":lines: {first}-", "```"])
         index += ["::::", "", "```{toctree}", ":hidden:", "", *names, "```", ""]
     put(folder / "index.md", index)
 

@@ -129,6 +129,7 @@ def draw(axes: object, found: Tying, name: str) -> None:
             panel.plot(*piece.T, color=paper, lw=wide + 2.5, solid_capstyle="butt", zorder=1 + height)
             panel.plot(*piece.T, color=COLORS[number], lw=wide, solid_capstyle="round", zorder=1 + height)
         panel.set(aspect="equal", xticks=[], yticks=[], title=title)
+        panel.spines[:].set_visible(False)
     for panel in axes[len(found.names) :]:
         panel.set_axis_off()
 
@@ -153,7 +154,7 @@ def main() -> None:
             flush=True,
         )
     columns = max(len(one.names) for one in found.values())
-    figure, axes = plt.subplots(len(found), columns, figsize=(3.0 * columns, 3.0 * len(found)), squeeze=False)
+    figure, axes = plt.subplots(len(found), columns, figsize=(3.0 * columns, 2.4 * len(found)), squeeze=False)
     for row, (name, one) in zip(axes, found.items(), strict=True):
         draw(row, one, name)
     path = arguments.out / "tie_knot.png"
