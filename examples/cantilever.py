@@ -92,7 +92,7 @@ def draw(simulation: withe.Simulation, path: Path) -> None:
 
 def main() -> int:
     """Compare, draw, and return whether the results agree."""
-    print("Takes about 3 s.", flush=True)
+    print("Takes about 2 s.", flush=True)
     simulation, seconds = sagging_rod(nodes=201)
     tip = shape(simulation)[-1]
     error = float(np.linalg.norm(tip - TIP))

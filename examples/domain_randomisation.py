@@ -96,7 +96,7 @@ def main() -> None:
     parser.add_argument("--arms", type=int, default=200)
     parser.add_argument("--out", type=Path, default=Path("out"))
     arguments = parser.parse_args()
-    print("Takes about 9 s.", flush=True)
+    print("Takes about 8 s.", flush=True)
 
     probed, _ = episodes(Reach(0.0), 3, lambda error, last: 0.3 * np.eye(3, 2))
     response = (probed[-1, :2] - probed[-1, 2]) / 0.3  # displacement of the nominal tip by each action [m]

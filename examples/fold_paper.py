@@ -21,7 +21,7 @@ plans = {
     "free moment at the jaw": plan(paper, method="slip", grasp="free"),
 }
 
-print("Takes about 3 s.", flush=True)
+print("Takes about 4 s.", flush=True)
 OUT.mkdir(exist_ok=True)
 colors = style.use()
 figure, axes = plt.subplots(2, 2, figsize=(11, 6.6), width_ratios=(2, 1))

@@ -13,7 +13,7 @@ F h^2 / B therefore depends on the modulus here, as in the source. Quasi-static 
 lean from the start, by a nudge while they come to rest, pull equally at 1.8e6 and 1.8e7 Pa; the example checks this to
 5 %. In that case the granny knot pulls a little harder: the order of the knots depends on more than the knot.
 
-Takes three minutes. Writes out/granny_reef.png and a picture of each knot.
+Writes out/granny_reef.png and a picture of each knot.
 """
 
 from __future__ import annotations

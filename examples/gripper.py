@@ -67,7 +67,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("out"))
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
-    print("Takes about 40 s.", flush=True)
+    print("Takes about 60 s.", flush=True)
 
     for friction in (0.0, 0.5):
         started = time.perf_counter()

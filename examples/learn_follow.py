@@ -136,6 +136,7 @@ def main() -> None:
     """Learn, draw, film."""
     steps, seed, folder = asked(__doc__, 1_300_000, Path("out/learn_follow"))
     check_tools()
+    print("Takes about 20 minutes.", flush=True)
     policy = withe.learning.train_policy(
         Aimed(),
         steps,

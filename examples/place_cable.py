@@ -93,7 +93,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("out"))
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
-    print("Takes about 20 s.", flush=True)
+    print("Takes about 25 s.", flush=True)
 
     colors = style.use()
     figure, axes = plt.subplots(1, len(arguments.letters), figsize=(10.0, 4.4), squeeze=False)

@@ -165,7 +165,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("out"))
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
-    print("Takes about 8 s.", flush=True)
+    print("Takes about 10 s.", flush=True)
 
     started = time.perf_counter()
     record = walk(arguments.steps)

@@ -168,7 +168,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("out"))
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
-    print("Takes about 5 s.", flush=True)
+    print("Takes about 6 s.", flush=True)
 
     simulation, rod = wound()
     tip, expected = simulation.positions(rod)[-1], theory()

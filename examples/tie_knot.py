@@ -6,7 +6,7 @@ over the next strand. For the reef knot the head of one cable is put over both e
 over that head. Where the grippers reach is found by a rehearsal; noisy trials reach there too. In the end both ends
 of each cable are pulled 20 mm apart, and `withe.knots` says which knot it is.
 
-Takes two minutes. Writes out/tie_knot.png.
+Writes out/tie_knot.png.
 """
 
 from __future__ import annotations
@@ -142,7 +142,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("out"))
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
-    print("Takes about 120 s.", flush=True)
+    print("Takes about 90 s.", flush=True)
 
     style.use()
     found = {}

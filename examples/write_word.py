@@ -4,7 +4,7 @@ The letters are those of `Pattern.word`, as large as the thread allows: it may h
 gravito-bending lengths. The thread lies over itself where it crosses itself. By the intuitive way, with the jaw
 straight above the place where the thread touches down, it comes to lie more than ten times as far from the word.
 
-Takes half a minute. Writes out/write_word.png.
+Writes out/write_word.png.
 """
 
 from __future__ import annotations
