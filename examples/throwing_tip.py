@@ -165,17 +165,18 @@ def main() -> None:
     print("Takes about 15 s.", flush=True)
 
     simulation = resting()
-    with withe.progress_bar(arguments.iterations, "optimising", unit="iterations") as bar:
-        found = minimize(
-            objective,
-            np.zeros(2 * INTERVALS),
-            args=(simulation,),
-            jac=True,
-            method="L-BFGS-B",
-            bounds=[(-STRONGEST, STRONGEST)] * (2 * INTERVALS),
-            options={"maxiter": arguments.iterations, "maxfun": 2 * arguments.iterations, "maxcor": 30},
-            callback=lambda _: bar.advance(1),
-        )
+    bar = withe.track(range(arguments.iterations), "optimising", unit="iterations")
+    found = minimize(
+        objective,
+        np.zeros(2 * INTERVALS),
+        args=(simulation,),
+        jac=True,
+        method="L-BFGS-B",
+        bounds=[(-STRONGEST, STRONGEST)] * (2 * INTERVALS),
+        options={"maxiter": arguments.iterations, "maxfun": 2 * arguments.iterations, "maxcor": 30},
+        callback=lambda _: next(bar, None),
+    )
+    bar.close()
     controls = found.x.reshape(-1, 2)
     thrown = throw(simulation, controls)
     greatest = np.linalg.norm(thrown.misses, axis=1).max()

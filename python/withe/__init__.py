@@ -16,7 +16,6 @@ from withe.batch import Batch
 from withe.batch.records import BatchRecord, Equilibria
 from withe.common.frames import EnergyHistory
 from withe.common.outlines import ObstacleOutline, RodOutline, SpringOutline, TendonOutline
-from withe.common.progress import progress as progress_bar
 from withe.common.progress import track
 from withe.errors import (
     BranchChangedWarning,
@@ -128,7 +127,6 @@ __all__ = [
     "knots",
     "learning",
     "perception",
-    "progress_bar",
     "real2sim",
     "run_many",
     "shapes",

@@ -20,7 +20,6 @@ from withe.parts.materials import Material
 from withe.parts.options import Solver
 from withe.scene.scene import Scene
 from withe.simulation.simulation import Simulation
-from withe.view import style
 
 __all__ = ["Follow", "Obstacles2D", "Obstacles3D", "Reach"]
 
@@ -205,7 +204,7 @@ class Arm(Task):
 
     def draw(self, axes: Any, robots: Batch) -> None:
         """Draw the target."""
-        axes.plot(*self.target[:1].T, "o", color=style.colors("light").red, markersize=9)
+        axes.plot(*self.target[:1].T, "o", color="C1", markersize=9)
 
 
 class Follow(Arm):

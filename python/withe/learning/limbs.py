@@ -13,7 +13,6 @@ from withe.learning.task import IntArray, Task
 from withe.parts.materials import Material
 from withe.scene.scene import Scene
 from withe.simulation.simulation import Simulation
-from withe.view import style
 
 __all__ = ["Crawl", "Wrap"]
 
@@ -219,4 +218,4 @@ class Wrap(_Limbs):
 
     def draw(self, axes: Any, robots: Batch) -> None:
         """Draw the ball."""
-        axes.plot(*self.balls[:1].T, "o", color=style.colors("light").red, markersize=4)
+        axes.plot(*self.balls[:1].T, "o", color="C1", markersize=4)

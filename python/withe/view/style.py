@@ -38,7 +38,7 @@ _EDGE = 3.0  # kept free around a box [pt]
 
 @dataclass(frozen=True)
 class Colors:
-    """Colours of a theme, as codes such as "#0072b2".
+    """Colours of a theme, as codes such as "#0072b2". Made by `use`, `context` and `colors`.
 
     Attributes
     ----------
@@ -111,6 +111,8 @@ def colors(theme: Theme | None = None) -> Colors:
     ------
     ValueError
         Unknown theme.
+    ImportError
+        matplotlib is not installed, and no theme is given.
     """
     if theme is None:
         theme = (
@@ -319,6 +321,11 @@ def fill_frame(axes: Any, points: npt.ArrayLike) -> None:
     axes : mpl_toolkits.mplot3d.axes3d.Axes3D
     points : array_like of shape (..., 3)
         Points that the axes must contain, in the units of the axes.
+
+    Raises
+    ------
+    ImportError
+        matplotlib is not installed.
     """
     _box(axes, np.asarray(points, float).reshape(-1, 3))
     _move_title(axes)
