@@ -119,6 +119,7 @@ PICTURES = {
     "follow_by_derivatives": "follow.gif",
     "follow_by_gradients": "follow.gif",
     "learn_follow": "follow.gif",
+    "granny_reef": "reef.png",
     "knot": "knot_plot.png",
 }
 ROOT = Path(__file__).resolve().parent.parent

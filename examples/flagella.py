@@ -120,7 +120,7 @@ def main() -> None:
     if arguments.count < 2:
         parser.error("--count must be 2 or more")
     arguments.out.mkdir(parents=True, exist_ok=True)
-    print("Takes about 30 s.", flush=True)
+    print("Takes about 40 s.", flush=True)
 
     records = {}
     for model in ("stokeslets", "resistive"):

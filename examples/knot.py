@@ -172,7 +172,7 @@ def main() -> None:
     if not 2 <= arguments.points <= 5:
         parser.error("--points must be 2 to 5")
     arguments.out.mkdir(parents=True, exist_ok=True)
-    print("Takes about 70 s.", flush=True)
+    print("Takes about 200 s.", flush=True)
 
     tightened, worst, gap, locked = {}, 0.0, 0.0, None
     loosened = None

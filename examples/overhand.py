@@ -89,13 +89,13 @@ def draw_knot(axes: Axes, x: np.ndarray, color: str) -> None:
     edge = np.diff(flat, axis=0)
     side = RADIUS * np.stack([-edge[:, 1], edge[:, 0]], axis=1) / np.linalg.norm(edge, axis=1, keepdims=True)
     order = np.argsort(depth[1:] + depth[:-1])
-    corners, colors = [], []
+    corners, shades = [], []
     for k in order:
-        for width, shade in ((1.0, colors.ink), (0.75, to_hex(color))):
+        for width, shade in ((1.0, style.colors().ink), (0.75, to_hex(color))):
             a, b = flat[k] - 0.02 * edge[k], flat[k + 1] + 0.02 * edge[k]
             corners.append([a - width * side[k], b - width * side[k], b + width * side[k], a + width * side[k]])
-            colors.append(shade)
-    axes.add_collection(PolyCollection(corners, facecolors=colors, edgecolors="none"))
+            shades.append(shade)
+    axes.add_collection(PolyCollection(corners, facecolors=shades, edgecolors="none"))
     room = 12.0 * RADIUS
     axes.set_xlim(along[knot].min() - room, along[knot].max() + room)
     axes.set_ylim(flat[knot, 1].min() - 3.0 * RADIUS, flat[knot, 1].max() + 3.0 * RADIUS)
@@ -139,7 +139,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("out"))
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
-    print("Takes about 60 s.", flush=True)
+    print("Takes about 100 s.", flush=True)
 
     pulls, wrong = {}, []
     for n in arguments.knots:

@@ -114,7 +114,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("out"))
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
-    print("Takes about 100 s.", flush=True)
+    print("Takes about 110 s.", flush=True)
 
     first = fall(arguments.duration, arguments.step)
     falls = {

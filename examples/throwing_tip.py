@@ -162,7 +162,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("out"))
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
-    print("Takes about 15 s.", flush=True)
+    print("Takes about 30 s.", flush=True)
 
     simulation = resting()
     bar = withe.track(range(arguments.iterations), "optimising", unit="iterations")
