@@ -73,7 +73,7 @@ def main() -> None:
             f"and the edges miss by {2e3 * abs(fold.error):.2f} mm"
         )
     colors = style.use()
-    figure, axes = plt.subplots(3, MOMENTS, figsize=(15, 4.6), sharex=True, sharey=True)
+    figure, axes = plt.subplots(3, MOMENTS, figsize=(11.5, 4.2), sharex=True, sharey=True)
     for row, fold, title in zip(axes, folds, titles, strict=True):
         film(row, fold, sheet.jaw, title, colors)
     for panel in axes[-1]:

@@ -114,3 +114,17 @@ def test_an_error_that_is_caught_need_not_be_documented(check):
             radius = 0.0
 
     assert list(check.faults_of(check.Subject("f", tried))) == []
+
+
+def test_every_example_has_a_page_with_its_text_and_a_small_picture(check, tmp_path):
+    pages = check.pages
+    pages.examples(tmp_path)
+    index = (tmp_path / "index.md").read_text()
+    for path in (pages.ROOT / "examples").glob("*.py"):
+        assert f":link: {path.stem}\n" in index
+        page = (tmp_path / f"{path.stem}.md").read_text()
+        text, _, _ = path.read_text().removeprefix('"""').partition("\n")
+        assert text.removesuffix('"""') in page
+    for name in (name for names in pages.EXAMPLES.values() for name in names):
+        picture = pages.ROOT / "examples" / "pictures" / pages.PICTURES.get(name, f"{name}.png")
+        assert 0 < picture.stat().st_size < 300_000
