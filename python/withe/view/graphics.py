@@ -1,7 +1,8 @@
 """Off-screen rendering on this machine.
 
 Rendering needs a graphics library that wheels do not contain. Without it VTK may end the process, so a subprocess tests
-the first render.
+the first render. The test runs while this process imports PyVista. Its result is not stored in a file: a display, a
+driver or a device may be gone when the next process starts, and a wrong answer would end that process.
 """
 
 from __future__ import annotations
@@ -11,23 +12,54 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from functools import cache
 
-__all__ = ["probe_rendering", "render_window"]
+__all__ = ["begin_probe", "probe_rendering", "render_window"]
 
+# A sphere drawn by VTK alone, which starts in a quarter of the time of PyVista.
 _PROBE = """
-import pyvista
-plotter = pyvista.Plotter(off_screen=True, window_size=(64, 64))
-plotter.add_mesh(pyvista.Sphere())
-image = plotter.screenshot(return_img=True)
-raise SystemExit(0 if image.min() < image.max() else 3)
+import vtkmodules.vtkRenderingOpenGL2
+from vtkmodules.vtkFiltersSources import vtkSphereSource
+from vtkmodules.vtkRenderingCore import (
+    vtkActor, vtkPolyDataMapper, vtkRenderer, vtkRenderWindow, vtkWindowToImageFilter
+)
+sphere, mapper, actor = vtkSphereSource(), vtkPolyDataMapper(), vtkActor()
+mapper.SetInputConnection(sphere.GetOutputPort())
+actor.SetMapper(mapper)
+renderer, window, pixels = vtkRenderer(), vtkRenderWindow(), vtkWindowToImageFilter()
+renderer.AddActor(actor)
+window.SetOffScreenRendering(1)
+window.SetSize(64, 64)
+window.AddRenderer(renderer)
+window.Render()
+pixels.SetInput(window)
+pixels.ReadFrontBufferOff()
+pixels.Update()
+darkest, brightest = pixels.GetOutput().GetScalarRange()
+raise SystemExit(0 if darkest < brightest else 3)
 """
 _WINDOW = "VTK_DEFAULT_OPENGL_WINDOW"
 
 
+def begin_probe() -> None:
+    """Begin to look for a way to render off-screen, unless one is known. `probe_rendering` waits for the result."""
+    _searched()
+
+
+@cache
+def _searched() -> Future[str]:
+    """Return the result to come of the one search, which runs in a thread."""
+    pool = ThreadPoolExecutor(1, thread_name_prefix="withe-probe")
+    try:
+        return pool.submit(_find_window)
+    finally:
+        pool.shutdown(wait=False)
+
+
 @cache
 def probe_rendering() -> str:
-    """Find a way to render off-screen, in a subprocess, once.
+    """Find a way to render off-screen, in a subprocess, once in a process.
 
     Returns
     -------
@@ -37,8 +69,17 @@ def probe_rendering() -> str:
     Raises
     ------
     RuntimeError
-        No way works; the message names the package to install.
+        No way works; the message names the package to install. The next call tries again.
     """
+    try:
+        return _searched().result()
+    except RuntimeError:
+        _searched.cache_clear()
+        raise
+
+
+def _find_window() -> str:
+    """Return the first render window that works, as in `probe_rendering`."""
     windows = ["vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow"] if sys.platform == "linux" else []
     if sys.platform != "linux" or os.environ.get("DISPLAY") or os.environ.get(_WINDOW):
         windows.insert(0, "")
