@@ -6,7 +6,7 @@ import pytest
 from curling_motion import CURVATURE_RATE, CurlingSimulation
 from withe.common.outlines import RodOutline
 from withe.recording.recorder import present
-from withe.view.surfaces import Surface
+from withe.view.surfaces import Surface, _spline
 
 
 def outline(nodes, radius=0.01, closed=False, widths=None):
@@ -72,3 +72,20 @@ def test_the_shortest_rods_have_a_surface(count):
     nodes = np.linspace([0, 0, 0], [0.1, 0, 0], count)
     points, _ = Surface(outline(count), nodes).mesh(nodes, np.tile([0, 0, 1.0], (count - 1, 1)))
     assert np.isfinite(points).all()
+
+
+@pytest.mark.parametrize(
+    ("closed", "nodes"), [(False, 2), (False, 3), (False, 4), (False, 5), (False, 40), (True, 3), (True, 4), (True, 40)]
+)
+def test_splines_are_those_of_scipy(closed, nodes):
+    from scipy.interpolate import CubicSpline
+
+    rng = np.random.default_rng(nodes)
+    values = rng.normal(size=(nodes, 3))
+    knots = np.cumsum(10.0 ** rng.uniform(-2, 1, nodes + closed))
+    samples = np.sort(np.append(rng.uniform(knots[0], knots[-1], 200), knots))
+    points, tangents = _spline(knots, samples, closed)
+    all_values = np.concatenate([values, values[:1]]) if closed else values
+    expected = CubicSpline(knots, all_values, bc_type="periodic" if closed else "not-a-knot")
+    np.testing.assert_allclose(points @ values, expected(samples), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(tangents @ values, expected(samples, 1), rtol=1e-7, atol=1e-7)

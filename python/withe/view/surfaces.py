@@ -125,15 +125,95 @@ def _subdivide(knots: FloatArray, count: int) -> FloatArray:
 
 
 def _spline(knots: FloatArray, samples: FloatArray, closed: bool) -> tuple[FloatArray, FloatArray]:
-    """Matrices that take the nodes to the points and the tangents of a cubic spline at the samples."""
-    from scipy.interpolate import CubicSpline
+    """Matrices that take the nodes to the points and the tangents of a cubic spline at the samples.
 
+    The spline is periodic, or its third derivative is continuous at the second and the last but one knot ("not a knot")
+    [de Boor 1978, chapter IV]. The import of a package for splines takes longer than a first picture may.
+    """
     nodes = len(knots) - 1 if closed else len(knots)
     values = np.eye(nodes)
     if closed:
         values = np.concatenate([values, values[:1]])
-    spline = CubicSpline(knots, values, bc_type="periodic" if closed else "not-a-knot")
-    return spline(samples), spline(samples, 1)
+    steps = np.diff(knots)
+    chords = np.diff(values, axis=0) / steps[:, None]
+    slopes = _periodic_slopes(steps, chords) if closed else _open_slopes(steps, chords)
+
+    piece = np.clip(np.searchsorted(knots, samples, side="right") - 1, 0, len(steps) - 1)
+    step = steps[piece][:, None]
+    u = (samples - knots[piece])[:, None] / step
+    left, right, start, end = values[piece], values[piece + 1], slopes[piece], slopes[piece + 1]
+    points = left + u**2 * (3.0 - 2.0 * u) * (right - left) + step * u * (1.0 - u) * ((1.0 - u) * start - u * end)
+    tangents = (
+        6.0 * u * (1.0 - u) * (right - left) / step + (1.0 - u) * (1.0 - 3.0 * u) * start + u * (3.0 * u - 2.0) * end
+    )
+    return points, tangents
+
+
+def _open_slopes(steps: FloatArray, chords: FloatArray) -> FloatArray:
+    """Slopes at the knots of a spline without an end condition but that of its second and last but one knot."""
+    if len(steps) == 1:
+        return np.repeat(chords, 2, axis=0)
+    before, after = steps[:-1, None], steps[1:, None]
+    if len(steps) == 2:  # a parabola
+        middle = (after * chords[:1] + before * chords[1:]) / (before + after)
+        return np.concatenate([2.0 * chords[:1] - middle, middle, 2.0 * chords[1:] - middle])
+    right = 3.0 * (after * chords[:-1] + before * chords[1:])
+    lower, diagonal, upper = steps[1:].copy(), 2.0 * (steps[:-1] + steps[1:]), steps[:-1].copy()
+    (a, b), (y, z) = steps[:2], steps[-2:]
+    first = ((3.0 * a + 2.0 * b) * b * chords[0] + a**2 * chords[1]) / (a + b)
+    last = (z**2 * chords[-2] + (3.0 * z + 2.0 * y) * y * chords[-1]) / (y + z)
+    # The conditions at the ends, b s0 + (a + b) s1 = first and its mirror image, taken off their neighbours.
+    right[0] -= first
+    right[-1] -= last
+    diagonal[0], diagonal[-1] = a + b, y + z
+    inner = _tridiagonal(lower, diagonal, upper, right)
+    start, end = (first - (a + b) * inner[0]) / b, (last - (y + z) * inner[-1]) / y
+    return np.concatenate([start[None], inner, end[None]])
+
+
+def _periodic_slopes(steps: FloatArray, chords: FloatArray) -> FloatArray:
+    """Slopes at the knots of a closed spline; the last knot is the first one.
+
+    The corners of its cyclic matrix are a product of two vectors [Sherman and Morrison 1950].
+    """
+    before, after = np.roll(steps, 1), steps
+    right = 3.0 * (after[:, None] * np.roll(chords, 1, axis=0) + before[:, None] * chords)
+    diagonal = 2.0 * (before + after)
+    top, bottom = after[0], before[-1]  # in the last column and in the first
+    gamma = -diagonal[0]
+    diagonal[0] -= gamma
+    diagonal[-1] -= top * bottom / gamma
+    column = np.zeros((len(steps), 1))
+    column[0], column[-1] = gamma, bottom
+    solved = _tridiagonal(after, diagonal, before, np.concatenate([right, column], axis=1))
+    slopes, way = solved[:, :-1], solved[:, -1]
+    share = (slopes[0] + top / gamma * slopes[-1]) / (1.0 + way[0] + top / gamma * way[-1])
+    slopes = slopes - np.outer(way, share)
+    return np.concatenate([slopes, slopes[:1]])
+
+
+def _tridiagonal(lower: FloatArray, diagonal: FloatArray, upper: FloatArray, right: FloatArray) -> FloatArray:
+    """Solve a diagonally dominant tridiagonal system for many right sides.
+
+    Parameters
+    ----------
+    lower, diagonal, upper : ndarray of shape (n,)
+        By rows: the first of `lower` and the last of `upper` are not used.
+    right : ndarray of shape (n, m)
+
+    Returns
+    -------
+    ndarray of shape (n, m)
+    """
+    solution, ratios, pivot = right.copy(), np.zeros(len(right)), diagonal[0]
+    solution[0] /= pivot
+    for row in range(1, len(right)):
+        ratios[row - 1] = upper[row - 1] / pivot
+        pivot = diagonal[row] - lower[row] * ratios[row - 1]
+        solution[row] = (solution[row] - lower[row] * solution[row - 1]) / pivot
+    for row in range(len(right) - 2, -1, -1):
+        solution[row] -= ratios[row] * solution[row + 1]
+    return solution
 
 
 def _hats(knots: FloatArray, samples: FloatArray, period: float | None) -> FloatArray:
