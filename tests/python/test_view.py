@@ -6,6 +6,7 @@ import os
 import pickle
 import subprocess
 import sys
+import threading
 
 import numpy as np
 import pytest
@@ -255,6 +256,14 @@ def test_a_failure_of_ffmpeg_is_told(record, renderer, tmp_path):
         record.animate(tmp_path / "missing" / "arm.mp4", size=(160, 120), progress=False)
 
 
+def test_smooth_edges_are_means_of_rendered_pixels():
+    fine = np.random.default_rng(1).integers(0, 256, (12, 18, 3), np.uint8)
+    for step in (1, 2, 3):
+        blocks = fine.reshape(12 // step, step, 18 // step, step, 3).astype(float).mean(axis=(1, 3))
+        np.testing.assert_allclose(rendering.mean_of_blocks(fine, step), blocks, atol=0.5)
+    assert [rendering.fine_supersampling(size) for size in ((640, 480), (1920, 1080), (3840, 2160))] == [3, 3, 2]
+
+
 # Refused arguments
 
 
@@ -337,13 +346,55 @@ def test_a_first_render_that_fails_or_crashes_names_the_package_to_install(recor
     def crash(command, **options):
         return subprocess.CompletedProcess(command, -11, "", output)
 
-    graphics.probe_rendering.cache_clear()
+    forget_probe()
     monkeypatch.setattr(subprocess, "run", crash)
     try:
         with pytest.raises(RuntimeError, match=f"apt install {package}"):
             graphics.probe_rendering()
     finally:
-        graphics.probe_rendering.cache_clear()
+        forget_probe()
+
+
+def forget_probe():
+    graphics.probe_rendering.cache_clear()
+    graphics._searched.cache_clear()
+
+
+def test_the_first_render_is_tested_once_and_in_the_background(monkeypatch):
+    begun, allowed = [], threading.Event()
+
+    def render(command, **options):
+        assert allowed.wait(60)
+        begun.append(options["env"].get("VTK_DEFAULT_OPENGL_WINDOW", ""))
+        return subprocess.CompletedProcess(command, 0, "", "")
+
+    forget_probe()
+    monkeypatch.setattr(subprocess, "run", render)
+    try:
+        graphics.begin_probe()  # returns although the render has not been allowed yet
+        graphics.begin_probe()
+        allowed.set()
+        assert graphics.probe_rendering() == graphics.probe_rendering() == begun[0]
+        assert len(begun) == 1
+    finally:
+        forget_probe()
+
+
+def test_a_first_render_that_failed_is_tested_again(monkeypatch):
+    code = 1
+
+    def render(command, **options):
+        return subprocess.CompletedProcess(command, code, "", "")
+
+    forget_probe()
+    monkeypatch.setattr(subprocess, "run", render)
+    try:
+        with pytest.raises(RuntimeError, match="cannot render off-screen"):
+            graphics.probe_rendering()
+        code = 0  # after the missing package was installed
+        assert isinstance(graphics.probe_rendering(), str)
+    finally:
+        forget_probe()
 
 
 def test_importing_the_views_imports_no_heavy_package():
@@ -411,6 +462,33 @@ def test_obstacles_stand_in_the_picture_and_move_with_their_record(scenes, rende
         stage.close()
         empty.close()
     assert record.picture(tmp_path / ("n" * 251 + ".png"), size=(64, 48)).stat().st_size > 500
+
+
+def test_a_floor_fades_into_the_background(scenes, renderer):
+    stage = rendering.Stage(scenes[0], size=(160, 120), camera="side")
+    try:
+        image = stage.image().astype(int)
+    finally:
+        stage.close()
+    background, beside = image[0, 0], image[:, 4]  # a column that shows the floor alone
+    assert (image[0] == background).all()
+    assert (background - beside[-1]).min() > 5
+    assert np.abs(np.diff(beside, axis=0)).max() <= 4
+
+
+def test_without_a_floor_there_is_no_shadow_and_with_a_ground_there_is(record, renderer):
+    coloured, dark = [], []
+    for ground in (None, -0.5):
+        stage = rendering.Stage(record, size=(160, 120), ground=ground)
+        try:
+            image = stage.image().astype(int)
+        finally:
+            stage.close()
+        grey = np.ptp(image, axis=2) < 15
+        coloured.append((~grey).sum())
+        dark.append((grey & (image.max(axis=2) < 215)).sum())
+    assert min(coloured) > 50
+    assert dark[0] < 5 < dark[1]
 
 
 def test_figures_show_obstacles_near_the_rods(scenes):

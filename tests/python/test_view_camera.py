@@ -32,11 +32,10 @@ def curved_record(radius):
 
 
 def silhouette(record, camera, path):
-    """Share of each pixel that the rod covers: its colour is the only one."""
+    """Share of each pixel that the rod covers: nothing else differs from the background."""
     record.picture(path, camera=camera, size=SIZE)
     pixels = imread(path)[..., :3]
-    strength = np.ptp(pixels, axis=2)
-    return np.where(strength > 0.15, strength, 0.0)
+    return np.clip(np.abs(pixels - pixels[0, 0]).max(axis=2) / 0.5, 0.0, 1.0)
 
 
 def centre_near(cover, pixel, across, reach):
@@ -45,8 +44,8 @@ def centre_near(cover, pixel, across, reach):
     x, y = pixel[0] + way * across[0], pixel[1] + way * across[1]
     i, j = np.floor(x).astype(int), np.floor(y).astype(int)
     a, b = x - i, y - j
-    on = (cover > 0).astype(float)
-    value = (1 - b) * ((1 - a) * on[j, i] + a * on[j, i + 1]) + b * ((1 - a) * on[j + 1, i] + a * on[j + 1, i + 1])
+    value = (1 - b) * ((1 - a) * cover[j, i] + a * cover[j, i + 1])
+    value += b * ((1 - a) * cover[j + 1, i] + a * cover[j + 1, i + 1])
     return float((value * way).sum() / value.sum()), float(value.sum() * (way[1] - way[0]))
 
 
@@ -81,7 +80,7 @@ def test_projected_nodes_lie_in_the_middle_of_what_is_drawn(camera, tmp_path):
 def test_a_picture_is_read_back_in_metres(tmp_path):
     camera = looking_at((0, 0, 0.05), (0.15, -0.2, 0.4), 0.5, [[900, 0, 310.0], [0, 850, 250.0], [0, 0, 1]])
     record = curved_record(2e-3)
-    tracing = trace_mask(silhouette(record, camera, tmp_path / "rope.png") > 0)
+    tracing = trace_mask(silhouette(record, camera, tmp_path / "rope.png") > 0.5)
     (line,) = tracing.centrelines
     metres = camera.to_plane(line, HEIGHT)
     nodes = record.positions("rope")[-1]

@@ -19,7 +19,7 @@ from withe.io import written_beside
 from withe.view.colors import ColorBy
 from withe.view.films import Film, film_places
 from withe.view.pinhole import Pinhole
-from withe.view.rendering import Stage
+from withe.view.rendering import Stage, fine_supersampling
 from withe.view.screens import in_notebook
 
 __all__ = ["animate", "picture", "view"]
@@ -42,8 +42,8 @@ def picture(
 ) -> Path:
     """Render one frame into a .png file: rods as tubes, and planes, spheres and capsules.
 
-    A plane is drawn as a square around the rods. Objects that are far away, or much larger than the rods, do not move
-    the camera.
+    A plane is drawn around the rods, and fades into the background. Objects that are far away, or much larger than the
+    rods, do not move the camera.
 
     Parameters
     ----------
@@ -62,7 +62,8 @@ def picture(
         motion, and oblique otherwise. Or a `withe.perception.Camera` without distortion, whose picture has the given
         `size`. Pixels then agree with its `project`, and its `to_plane` converts them to metres.
     ground : float, optional [m]
-        Height of the shadow. By default a level plane near the rods, or a little below them.
+        Height of a level floor, on which shadows fall. By default that of a level plane near the rods; without such a
+        plane there is neither a floor nor a shadow.
     label : str, optional
         Text in the lower left corner.
 
@@ -94,6 +95,7 @@ def picture(
         frame=number,
         frames=[*others, number],
         ghosts=others,
+        supersampling=fine_supersampling(size),
     )
     try:
         if label:
@@ -135,7 +137,7 @@ def animate(
     size, color_by, camera, ground
         As in `picture`. The camera stands still, with all frames in view.
     quality : {"draft", "high"}
-        "high" smooths edges as `picture` does, and takes twice as long.
+        "high" smooths edges as `picture` does, and takes about twice as long.
     progress : bool
         True to show a progress bar, as in `Simulation.run`.
 
@@ -164,8 +166,9 @@ def animate(
     if quality not in ("draft", "high"):
         raise ValueError(f"quality must be 'draft' or 'high', got {quality!r}")
     encoder = require("imageio_ffmpeg", "view").get_ffmpeg_exe()
-    fine = quality == "high"
-    stage = Stage(record, size=_even(size), color_by=color_by, camera=camera, ground=ground, multisampling=fine)
+    size = _even(size)
+    supersampling = fine_supersampling(size) if quality == "high" else 2
+    stage = Stage(record, size=size, color_by=color_by, camera=camera, ground=ground, supersampling=supersampling)
     try:
         places = film_places(stage.times, speed / fps)
         with (

@@ -5,6 +5,7 @@ This is the stage that pictures, films and the viewer share.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from typing import Any
 
@@ -13,10 +14,10 @@ import numpy.typing as npt
 
 from withe.common.extras import require
 from withe.common.frames import Frames
+from withe.common.outlines import ObstacleOutline
 from withe.view import scenery
 from withe.view.colors import (
     BARS,
-    PLANE_COLOR,
     SOLID_COLOR,
     ColorBy,
     color_limits,
@@ -24,15 +25,15 @@ from withe.view.colors import (
     nodal_values,
     rod_color,
 )
+from withe.view.floors import BACKGROUND, Floor, add_faded_patch
 from withe.view.ghosts import stands_out
-from withe.view.graphics import render_window
+from withe.view.graphics import begin_probe, render_window
 from withe.view.pinhole import Pinhole, check_pinhole, look_through, towards
-from withe.view.shadows import Shadow
 from withe.view.springs import SpringLines
 from withe.view.surfaces import Surface
 from withe.view.tendons import TendonLines, tendon_points
 
-__all__ = ["Stage"]
+__all__ = ["Stage", "fine_supersampling", "mean_of_blocks"]
 
 FloatArray = npt.NDArray[np.float64]
 _DIRECTIONS = {
@@ -44,7 +45,8 @@ _DIRECTIONS = {
 _VIEW_ANGLE = 24.0  # [degrees]
 _BAR_SHARE = 0.16
 _INK = "#33383d"
-_PLANE_EDGE = "#c3cbd2"
+_PATCH = 1.3  # half a side of the patch of a slope or wall, over the diagonal of the scene
+_MAX_FINE_PIXELS = 38_000_000  # rendered pixels of a picture with smooth edges: about 0.5 GB
 _MAX_SAMPLES = 6000  # rings of all rods together
 _SHADOW_CELLS, _LIVE_SHADOW_CELLS = 320, 96
 _FIRST_RENDERS, _SLOW = 3, 1.0 / 30.0  # renders that compile shaders; time of a render [s]
@@ -69,13 +71,14 @@ class Stage:
     ghosts : sequence of int
         Frames drawn faintly behind `frame`, the first one strongest, where they differ from it.
     ground : float, optional [m]
-        Height of the shadow. By default a level plane near the rods, or a little below them.
+        Height of a level floor, on which shadows fall. By default that of a level plane near the rods; without such a
+        plane there is neither a floor nor a shadow.
     off_screen : bool
         True to render into memory, False into a window.
     supersampling : int
         Rendered pixels per shown pixel, along each side.
     multisampling : bool
-        True to smooth edges within rendered pixels too, which takes twice as long.
+        True to smooth edges without supersampling too, by several samples a pixel.
     live : bool
         True to draw faster, for scenes that change many times a second: a coarser shadow, and no smooth edges beyond
         those of `multisampling`.
@@ -124,30 +127,32 @@ class Stage:
         if ground is not None and not np.isfinite(ground):
             raise ValueError(f"ground must be a height in metres, got {ground!r}")
 
-        pyvista = require("pyvista", "view")
+        pyvista = _pyvista(off_screen)
         self._fineness = supersampling
         window = [side * self._fineness for side in self.size]
         with render_window(off_screen):
             self.plotter: Any = pyvista.Plotter(off_screen=off_screen, window_size=window, lighting="none")
-        if not multisampling:
-            self.plotter.render_window.SetMultiSamples(0)
-        self.plotter.set_background("#f5f7f9")
-        if ground is None:
-            ground = self._floor(nodes)
-        # Under a slope there is no ground to cast a shadow on.
-        kinds = [obstacle.kind for obstacle, seen in zip(record.obstacles, around, strict=True) if len(seen)]
-        self._casts = ground is not None or "plane" not in kinds
-        nearby = np.concatenate([nodes[:0], *around])
-        self._around, self._given_ground = nearby, ground
+        if supersampling > 1 or not multisampling:
+            self.plotter.render_window.SetMultiSamples(0)  # several samples a pixel take a software renderer longer
+        self.plotter.set_background(BACKGROUND)
+        # Few surfaces are translucent. Blending them in any order takes two passes with pixels of 16 bytes.
+        self.plotter.renderer.SetUseOIT(False)
+        self._floor: Floor | None = None
+        self._floor_plane = self._level_plane(nodes) if ground is None else None
+        self._ground = float(self._places[self._floor_plane][0, 2]) if self._floor_plane is not None else ground
+        self._around = np.concatenate([nodes[:0], *around])
         self._frame_camera(direction, nodes)
         if isinstance(camera, Pinhole):
             look_through(self.plotter.camera, camera, self.size, nodes)
         self._add_lights(pyvista, direction)
-        self._add_obstacles(pyvista, np.concatenate([nodes, nearby]))
-        self._shadow = Shadow(pyvista, self.plotter, _LIVE_SHADOW_CELLS if live else _SHADOW_CELLS)
+        if self._ground is not None:
+            self._floor = Floor(pyvista, self.plotter, _LIVE_SHADOW_CELLS if live else _SHADOW_CELLS)
+            self._floor.place(np.concatenate([nodes, self._around]), float(self._ground), self._extent)
+        self._add_obstacles(pyvista, np.concatenate([nodes, self._around]))
         self._add_rods(pyvista, color_by)
-        self._springs = SpringLines(pyvista, self.plotter, record, direction)
-        self._tendons = TendonLines(pyvista, self.plotter, record)
+        line = self._fineness * max(1.5, self.size[1] / 300.0)  # [px]
+        self._springs = SpringLines(pyvista, self.plotter, record, direction, line)
+        self._tendons = TendonLines(pyvista, self.plotter, record, line)
         self._ghosts: list[tuple[FloatArray, FloatArray]] = []
         for place in range(len(ghosts)):
             self._add_ghost(pyvista, [*ghosts, frame], place)
@@ -218,7 +223,7 @@ class Stage:
             self._obstacle_points += [surface + way] if surface is not None else []
         self._springs.show(positions)
         self._tendons.show(tendons)
-        meshed = []
+        meshed, areas = [], []
         for index, rod in enumerate(self._record.rods):
             points, normals = self._surfaces[index].mesh(positions[rod.rows], directors[index])
             mesh = self._meshes[index]
@@ -227,14 +232,14 @@ class Stage:
             if values is not None:
                 mesh.point_data["value"] = self._surfaces[index].on_surface(values[index])
             meshed.append(points)
-        if self._casts:
-            ghosts, areas = [points for points, _ in self._ghosts], [area for _, area in self._ghosts]
-            self._shadow.cast(
-                np.concatenate([*meshed, *self._obstacle_points, *ghosts]),
-                np.concatenate([*self._footprints, *self._footprints_of_obstacles, *areas]),
-                (*self._shadow_bounds, self._ground),
-                self._extent,
-            )
+            if self._floor is not None:
+                areas.append(self._footprints[index] * self._surfaces[index].level_share(positions[rod.rows]))
+        if self._floor is not None:
+            if self._floor_plane is not None:
+                self._floor.lift(float(places[self._floor_plane][2]))
+            casting = [*meshed, *self._obstacle_points, *(points for points, _ in self._ghosts)]
+            areas += [*self._footprints_of_obstacles, *(area for _, area in self._ghosts)]
+            self._floor.cast(np.concatenate(casting), np.concatenate(areas))
 
     def keep_in_view(self, positions: FloatArray) -> None:
         """Move the camera back if nodes, shape (nodes, 3) [m], leave the region in view; its direction stays."""
@@ -258,29 +263,29 @@ class Stage:
         """Return the image of the camera, shape (height, width, 3)."""
         self.plotter.render()
         fine = self.plotter.screenshot(return_img=True)[..., :3]
-        step, area = self._fineness, self._fineness**2
-        sums = np.full((self.size[1], self.size[0], 3), area // 2, np.uint16)
-        for row, column in np.ndindex(step, step):  # many times faster than the mean over blocks
-            sums += fine[row::step, column::step]
-        return np.asarray(sums // area, np.uint8)
+        return mean_of_blocks(fine, self._fineness)
 
     def close(self) -> None:
         """Close the window."""
         self.plotter.close()
 
-    def _floor(self, points: FloatArray) -> float | None:
-        """Return the height of the horizontal plane near rods that receives their shadow; None without such a plane."""
-        heights = [
-            float(places[0, 2])
-            for obstacle, places in zip(self._record.obstacles, self._places, strict=True)
-            if obstacle.kind == "plane"
+    def _level_plane(self, points: FloatArray) -> int | None:
+        """Return the index of the horizontal plane near rods that receives their shadow; None without such a plane."""
+        level = [
+            (float(places[0, 2]), index)
+            for index, (obstacle, places) in enumerate(zip(self._record.obstacles, self._places, strict=True))
+            if self._is_level(obstacle, places) and len(scenery.framing(obstacle, places[:1], points))
+        ]
+        return max(level)[1] if level else None
+
+    @staticmethod
+    def _is_level(obstacle: ObstacleOutline, places: FloatArray) -> bool:
+        """True for a horizontal plane at rest, whose upper side is free."""
+        return bool(
+            obstacle.kind == "plane"
             and obstacle.axis[2] > (1.0 - 1e-9) * np.linalg.norm(obstacle.axis)
             and np.ptp(places[:, 2]) == 0.0
-            and len(scenery.framing(obstacle, places[:1], points))
-        ]
-        if not heights:
-            return None
-        return max(heights) + 1e-3 * float(np.linalg.norm(np.ptp(points, axis=0)))  # not in the plane itself
+        )
 
     def _frame_camera(self, direction: FloatArray, points: FloatArray) -> None:
         """Look from a direction at the middle of all points, from the least distance at which all are in view.
@@ -289,19 +294,19 @@ class Stage:
         scale on the right.
         """
         left, right_share = self._margins
-        around, ground = self._around, self._given_ground
+        around = self._around
         self._seen = points
-        reach = max(float(rod.radii.max()) for rod in self._record.rods)
+        rods = self._record.rods
+        reach = max(float(rod.radii.max() if rod.widths is None else 0.5 * rod.widths.max()) for rod in rods)
         everything = np.concatenate([points, around])
         low, high = everything.min(axis=0), everything.max(axis=0)
         extent = float(np.linalg.norm(high - low)) + 2.0 * reach
         self._extent = extent
-        self._ground = float(low[2]) - reach - 0.03 * extent if ground is None else float(ground)
-        middle, half = 0.5 * (low + high)[:2], 0.5 * float((high - low)[:2].max()) + 0.15 * extent
-        self._shadow_bounds = middle - half, middle + half
-        corners = [points + reach * sign * axis for axis in np.eye(3) for sign in (-1.0, 1.0)]
-        shadows = np.column_stack([points[:, :2], np.full(len(points), self._ground)])
-        seen = np.concatenate([*corners, shadows, around])
+        seen = np.concatenate([points + reach * sign * axis for axis in np.eye(3) for sign in (-1.0, 1.0)] + [around])
+        if self._ground is not None:
+            seen = np.concatenate([seen, np.column_stack([points[:, :2], np.full(len(points), self._ground)])])
+        if self._floor is not None:
+            self._floor.place(everything, float(self._ground), extent)
         up = np.array([0.0, 1.0, 0.0]) if abs(direction[2]) > 0.99 else np.array([0.0, 0.0, 1.0])
         right = np.cross(up, direction)
         right /= np.linalg.norm(right)
@@ -372,16 +377,11 @@ class Stage:
         self._obstacles: list[tuple[Any, int, FloatArray | None, FloatArray | None]] = []
         for index, (obstacle, places) in enumerate(zip(self._record.obstacles, self._places, strict=True)):
             if obstacle.kind == "plane":
-                corners = scenery.patch(obstacle, places[0], nodes)
-                mesh = pyvista.PolyData(corners, [4, 0, 1, 2, 3])
-                options: dict[str, Any] = {"color": PLANE_COLOR, "ambient": 0.75, "diffuse": 0.3, "specular": 0.0}
+                if index == self._floor_plane:
+                    continue  # the floor is there already
                 normal = obstacle.axis / np.linalg.norm(obstacle.axis)
-                self._obstacles.append(
-                    (self.plotter.add_mesh(mesh, reset_camera=False, **options), index, normal, None)
-                )
-                edge = pyvista.PolyData(corners, lines=[5, 0, 1, 2, 3, 0])
-                rim = self.plotter.add_mesh(edge, color=_PLANE_EDGE, reset_camera=False, lighting=False, line_width=2)
-                self._obstacles.append((rim, index, normal, None))
+                actor = add_faded_patch(pyvista, self.plotter, scenery.patch(obstacle, places[0], nodes, _PATCH))
+                self._obstacles.append((actor, index, normal, None))
                 continue
             start, end = scenery.ends(obstacle, places[0])
             length = float(np.linalg.norm(end - start))
@@ -430,6 +430,46 @@ class Stage:
             actor = self.plotter.add_mesh(mesh, color=pale, ambient=0.5, diffuse=0.6, reset_camera=False)
             actor.prop.interpolation = "Phong"
             self._ghosts.append((points, there * self._footprints[index]))
+
+
+def _pyvista(off_screen: bool) -> Any:
+    """Import PyVista while another process tests the first render, for which `render_window` waits."""
+    if not off_screen:
+        return require("pyvista", "view")
+    begin_probe()
+    pyvista = require("pyvista", "view")
+    with contextlib.suppress(ImportError):  # of a graphics library, which the probe names
+        require("pyvista.plotting", "view")
+    return pyvista
+
+
+def fine_supersampling(size: Sequence[int]) -> int:
+    """Return the supersampling for smooth edges: 3 by 3 samples a pixel, and 2 by 2 in pictures above 4 megapixels."""
+    width, height = _checked_size(size)
+    return 3 if 9 * width * height <= _MAX_FINE_PIXELS else 2
+
+
+def mean_of_blocks(fine: npt.NDArray[np.uint8], step: int) -> npt.NDArray[np.uint8]:
+    """Return the mean of each block of pixels.
+
+    Parameters
+    ----------
+    fine : ndarray of uint8, shape (step * height, step * width, 3)
+    step : int
+        Pixels along the sides of a block, 1 to 16.
+
+    Returns
+    -------
+    ndarray of uint8, shape (height, width, 3)
+    """
+    # Sums over whole rows first: a sum over blocks at once takes many times as long.
+    rows = np.full((fine.shape[0] // step, fine.shape[1], 3), 0, np.uint16)
+    for row in range(step):
+        rows += fine[row::step]
+    sums = np.full((rows.shape[0], rows.shape[1] // step, 3), step**2 // 2, np.uint16)
+    for column in range(step):
+        sums += rows[:, column::step]
+    return np.asarray(sums // step**2, np.uint8)
 
 
 def _empty_mesh(pyvista: Any, surface: Surface, shown: npt.NDArray[np.int64] | None = None) -> Any:

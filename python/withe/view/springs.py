@@ -25,16 +25,18 @@ class SpringLines:
     record : Frames
     direction : ndarray of shape (3,)
         Direction from which the camera looks.
+    width : float [px]
+        Width of their lines.
     """
 
-    def __init__(self, pyvista: Any, plotter: Any, record: Frames, direction: FloatArray) -> None:
+    def __init__(self, pyvista: Any, plotter: Any, record: Frames, direction: FloatArray, width: float) -> None:
         self._direction = direction
         positions = record.positions()
         self._rows = [list(spring.rows) for spring in record.springs]
         self._widths = [scenery.spring_width(positions[:, rows]) for rows in self._rows]
         self._meshes = [pyvista.lines_from_points(points) for points in self._points(positions[0])]
         for mesh in self._meshes:
-            plotter.add_mesh(mesh, color="#6b7680", line_width=4.0, reset_camera=False)
+            plotter.add_mesh(mesh, color="#6b7680", line_width=width, reset_camera=False)
 
     def show(self, positions: FloatArray) -> None:
         """Move the springs to the nodes of the scene, shape (nodes, 3) [m]."""

@@ -16,6 +16,7 @@ __all__ = ["Surface", "end_caps", "rectangle_section", "ring_faces", "round_sect
 FloatArray = npt.NDArray[np.float64]
 
 _CAP_RINGS = 6
+_LEAST_SHARE = 0.05  # of an upright rod, which is seen from above as its section
 
 
 class Surface:
@@ -105,6 +106,12 @@ class Surface:
         caps = len(self._caps)
         padded = np.concatenate([np.zeros(caps), areas, np.zeros(caps)])
         return np.repeat(padded / len(self._section), len(self._section))
+
+    def level_share(self, nodes: FloatArray) -> FloatArray:
+        """Share of the length seen from above, at each point of the surface; small where the rod is upright."""
+        tangents = _unit(self._tangent_weights @ nodes)
+        share = np.maximum(np.hypot(tangents[:, 0], tangents[:, 1]), _LEAST_SHARE)
+        return np.repeat(share[self._ring_samples], len(self._section))
 
     def on_surface(self, nodal: FloatArray) -> FloatArray:
         """Interpolate nodal values, shape (nodes,), to the points of the surface."""

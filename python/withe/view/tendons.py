@@ -10,9 +10,10 @@ import numpy.typing as npt
 from withe.common.frames import Frames
 from withe.common.outlines import TendonOutline
 
-__all__ = ["TendonLines", "tendon_points"]
+__all__ = ["TENDON_COLOR", "TendonLines", "tendon_points"]
 
 FloatArray = npt.NDArray[np.float64]
+TENDON_COLOR = "#c2255c"  # of no rod
 
 
 def tendon_points(record: Frames, tendon: TendonOutline) -> FloatArray:
@@ -30,6 +31,8 @@ class TendonLines:
     pyvista : module
     plotter : pyvista.Plotter
     record : Frames
+    width : float [px]
+        Width of their lines.
 
     Attributes
     ----------
@@ -37,11 +40,11 @@ class TendonLines:
         Positions of the guides of each tendon.
     """
 
-    def __init__(self, pyvista: Any, plotter: Any, record: Frames) -> None:
+    def __init__(self, pyvista: Any, plotter: Any, record: Frames, width: float) -> None:
         self.motions: list[FloatArray] = [tendon_points(record, tendon) for tendon in record.tendons]
         self._meshes = [pyvista.lines_from_points(points[0]) for points in self.motions]
         for mesh in self._meshes:
-            plotter.add_mesh(mesh, color="#33383d", line_width=3.0, reset_camera=False)
+            plotter.add_mesh(mesh, color=TENDON_COLOR, line_width=width, lighting=False, reset_camera=False)
 
     def show(self, guides: list[FloatArray]) -> None:
         """Move the tendons to the positions of their guides, shape (guides, 3) [m] each."""
