@@ -90,7 +90,7 @@ $(STAMPS)/dev_tools: $(STAMPS)/test_tools
 
 $(STAMPS)/bench_tools: $(STAMPS)/build_tools
 	@echo "Installing what the benchmarks compare with into .venv"
-	@$(PIP_INSTALL) $(call requirements,bench vision) rich
+	@$(PIP_INSTALL) $(call requirements,bench view vision) rich
 	@touch $@
 
 $(STAMPS)/doc_tools: $(STAMPS)/build_tools

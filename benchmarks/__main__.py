@@ -18,6 +18,7 @@ NAMES = (
     "sparse_solvers",
     "skips",
     "settings",
+    "drawing",
     "gradients",
     "parallel",
     "rl_throughput",

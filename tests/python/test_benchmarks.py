@@ -13,6 +13,7 @@ import pytest
 FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 sys.path.insert(0, str(FOLDER))
 HAVE_GYMNASIUM = importlib.util.find_spec("gymnasium") is not None
+HAVE_PYVISTA = importlib.util.find_spec("pyvista") is not None
 
 
 @pytest.fixture
@@ -56,6 +57,7 @@ def run(name, folder, *arguments):
         "folding_trials",
         "folding_spin",
         "folding_replay",
+        pytest.param("drawing", marks=pytest.mark.skipif(not HAVE_PYVISTA, reason="needs pyvista")),
         pytest.param("rl_throughput", marks=pytest.mark.skipif(not HAVE_GYMNASIUM, reason="needs gymnasium")),
     ],
 )

@@ -1,0 +1,182 @@
+"""Cost of pictures and films: a frame of a film in both qualities and two sizes, and the first picture of a process.
+
+python benchmarks/drawing.py [--quick]
+
+The scene is the gripper of README.md above a floor. A frame costs processor time of rendering and of ffmpeg; the time
+that a film takes before its first frame is left out. The first picture is timed on the wall, from the call in a new
+process to the written file, imports and the test of the graphics library included; the fastest run counts.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from reporting import OUT, Report, Timing, arguments, bar, interleaved
+
+import withe
+
+SIZES = ((640, 480), (1280, 720))  # [px]
+FRAME_GOALS = {  # [s of processor a frame]
+    ("draft", SIZES[0]): 0.06,
+    ("high", SIZES[0]): 0.12,
+    ("draft", SIZES[1]): 0.15,
+    ("high", SIZES[1]): 0.28,
+}
+FIRST_GOAL = 2.0  # [s]
+FPS, DURATION = 30.0, 0.5  # pictures per second of film; simulated time [s]
+SHORT, LONG = 1.0, 0.25  # speeds of the two films whose difference is measured
+
+
+def gripper() -> withe.Record:
+    """The gripper of README.md, which closes above a floor."""
+    scene = withe.Scene()
+    silicone = withe.Material(youngs_modulus=2e6, poisson_ratio=0.5, density=1200.0, viscosity=2e3)
+    arm = scene.add_rod(start=(0, 0, 0), end=(0, 0, -0.2), nodes=31, radius=8e-3, material=silicone, name="arm")
+    scene.clamp(arm.start)
+    for x, y in ((1, 0), (-0.5, 0.866), (-0.5, -0.866)):
+        tip = (0.06 * x, 0.06 * y, -0.3)
+        finger = scene.add_rod(start=(0, 0, -0.2), end=tip, nodes=21, radius=5e-3, material=silicone, normal=(x, y, 0))
+        scene.join(arm.end, finger.start)
+    scene.add_floor(-0.35)
+    simulation = scene.build(time_step=5e-3)
+    for finger in simulation.rods[1:]:
+        simulation.set(finger, natural_curvature=(-8.0, 0.0), over=0.5)
+    return simulation.run(duration=DURATION, record_every=0.02, progress=False)
+
+
+def processor_time() -> float:
+    """Processor time of this process and of the processes that it waited for [s]."""
+    import resource
+
+    return sum(
+        usage.ru_utime + usage.ru_stime
+        for usage in (resource.getrusage(resource.RUSAGE_SELF), resource.getrusage(resource.RUSAGE_CHILDREN))
+    )
+
+
+def frame_cost(record: withe.Record, quality: str, size: tuple[int, int], folder: Path) -> float:
+    """Processor time of a frame [s]: the difference of a long and a short film, over that of their frames."""
+    spent, frames = [], []
+    for speed in (SHORT, LONG):
+        before = processor_time()
+        film = folder / "film.mp4"
+        record.animate(film, quality=quality, size=size, speed=speed, fps=FPS, progress=False)
+        spent.append(processor_time() - before)
+        frames.append(int(np.floor(DURATION * FPS / speed + 1e-9)) + 1)
+    return (spent[1] - spent[0]) / (frames[1] - frames[0])
+
+
+def first_picture(size: tuple[int, int] = SIZES[0]) -> tuple[float, float]:
+    """Time of the first picture of a new process: on the wall and of processors [s]."""
+    done = subprocess.run(
+        [sys.executable, __file__, "--first-picture", *map(str, size)], capture_output=True, text=True, check=True
+    )
+    wall, processor = json.loads(done.stdout)
+    return wall, processor
+
+
+def draw_first(size: tuple[int, int]) -> None:
+    """Draw one picture, and print how long it took, as JSON."""
+    record = gripper()
+    with tempfile.TemporaryDirectory() as folder:
+        before, begun = processor_time(), time.perf_counter()
+        record.picture(Path(folder) / "first.png", size=size)
+        print(json.dumps([time.perf_counter() - begun, processor_time() - before]))
+
+
+def films(report: Report, rounds: int) -> list[tuple[str, float, float]]:
+    """Measure frames of films. Return name, cost and goal of each kind."""
+    record = gripper()
+    with tempfile.TemporaryDirectory() as folder, bar(rounds * len(FRAME_GOALS), "films", "films") as shown:
+        frame_cost(record, "draft", (64, 48), Path(folder))  # imports
+
+        def costs(quality: str, size: tuple[int, int]) -> Callable[[], float]:
+            return lambda: frame_cost(record, quality, size, Path(folder))
+
+        actions = {f"{quality}, {size[0]} x {size[1]}": costs(quality, size) for quality, size in FRAME_GOALS}
+        timings = interleaved(actions, rounds, lambda: shown.advance(1))
+    goals = dict(zip(actions, FRAME_GOALS.values(), strict=True))
+    report.table(
+        "Frame of a film [ms of processor]",
+        ("quality, size [px]", "a frame"),
+        [(name, f"{1e3 * one.median:.0f} +- {100 * one.spread:.0f} %") for name, one in timings.items()],
+    )
+    report.figures["frames"] = {name: one.as_json() for name, one in timings.items()}
+    for name, one in timings.items():
+        report.goal(f"frame, {name} [s of processor]", one.median, goals[name], at_least=False)
+    return [(f"frame, {name}", one.median, goals[name]) for name, one in timings.items()]
+
+
+def pictures(report: Report, rounds: int) -> list[tuple[str, float, float]]:
+    """Measure the first picture of a process. Return its name, cost and goal."""
+    with bar(rounds, "first picture", "processes") as shown:
+        walls, processors = [], []
+        for _ in range(rounds):
+            wall, processor = first_picture()
+            walls.append(wall)
+            processors.append(processor)
+            shown.advance(1)
+    report.table(
+        "First picture of a process, 640 x 480 [s]",
+        ("time", "fastest", "median"),
+        [
+            (name, f"{min(values):.2f}", f"{np.median(values):.2f}")
+            for name, values in (("on the wall", walls), ("of processors", processors))
+        ],
+    )
+    report.figures["first picture"] = {
+        "wall": Timing(tuple(walls)).as_json() | {"fastest": min(walls)},
+        "processor": Timing(tuple(processors)).as_json() | {"fastest": min(processors)},
+    }
+    report.goal("first picture, fastest [s]", min(walls), FIRST_GOAL, at_least=False)
+    return [("first picture", min(walls), FIRST_GOAL)]
+
+
+# Kinds of drawing: each takes the report and the number of rounds, writes its table and goals, and returns rows of the
+# plot. A further kind, such as the redraw of a view after a slider moved, is a function here.
+PARTS: tuple[Callable[[Report, int], list[tuple[str, float, float]]], ...] = (films, pictures)
+
+
+def draw(rows: list[tuple[str, float, float]], path: Path) -> None:
+    """Bars of each cost over its goal."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    names, costs, goals = zip(*rows, strict=True)
+    shares = np.array(costs) / np.array(goals)
+    figure, axes = plt.subplots(figsize=(7.0, 0.8 + 0.42 * len(rows)), layout="constrained")
+    axes.barh(names, shares, color=["#00798c" if share <= 1.0 else "#d1495b" for share in shares], height=0.6)
+    for row, (share, cost) in enumerate(zip(shares, costs, strict=True)):
+        axes.text(share + 0.01, row, f"{cost:.3g} s", va="center", fontsize=9)
+    axes.axvline(1.0, color="#33383d", linewidth=1.0)
+    axes.set(xlabel="cost over goal", xlim=(0.0, 1.15 * max(1.0, shares.max())))
+    axes.invert_yaxis()
+    axes.spines[["top", "right"]].set_visible(False)
+    figure.savefig(path, dpi=130)
+    plt.close(figure)
+
+
+def main() -> None:
+    """Measure all parts, report, and draw."""
+    options = arguments(__doc__, ("--first-picture", {"nargs": 2, "type": int, "help": "draw one picture, in pixels"}))
+    if options.first_picture:
+        draw_first(tuple(options.first_picture))
+        return
+    report = Report("drawing", quick=options.quick)
+    rows = [row for part in PARTS for row in part(report, 1 if options.quick else 5)]
+    path = report.write()
+    draw(rows, OUT / "drawing.png")
+    print(f"  drawn to {path.with_suffix('.png')}")
+
+
+if __name__ == "__main__":
+    main()
