@@ -30,12 +30,13 @@ PYTHON_SOURCES := $(shell find python/withe -name '*.py' -o -name '*.pyi' -o -na
 # Folders too: a deleted file is a change.
 SOURCE_FOLDERS := $(wildcard cpp/*/) $(shell find python/withe -type d -not -name __pycache__)
 
-.PHONY: help demo view learn test test-all ctest-build ctest ctest-baseline pytest asan tsan asan-python bench docs wheel wheels lint format format-check prose types stubs stub-check \
+.PHONY: help demo view gallery learn test test-all ctest-build ctest ctest-baseline pytest asan tsan asan-python bench docs wheel wheels lint format format-check prose types stubs stub-check \
     tidy tidy-changed clean distclean
 
 help:
 	@echo "make demo          install what is missing, build, simulate a cantilever, compare with theory"
 	@echo "make view          install what pictures, films and notebooks need"
+	@echo "make gallery       a dozen short films into out/gallery (about 10 minutes); NAME=reef makes one"
 	@echo "make learn         install torch, gymnasium and stable-baselines3, for withe.learning"
 	@echo "make test          tests in C++ and Python, without the slow ones (about 5 minutes on two cores)"
 	@echo "make test-all      all tests, slow ones too"
@@ -113,6 +114,10 @@ demo: $(STAMPS)/installed
 
 view: $(STAMPS)/installed $(STAMPS)/view_tools
 	@python tools/check_view.py
+
+gallery: $(STAMPS)/installed $(STAMPS)/view_tools
+	@$(PIP_INSTALL) $(call requirements,vision)
+	@python examples/gallery.py $(NAME)
 
 learn: $(STAMPS)/installed $(STAMPS)/learn_tools
 

@@ -93,16 +93,10 @@ class Pull:
         return float(self.force.mean())
 
 
-def pull(
-    knot: str,
-    start: withe.Snapshot,
-    friction: float,
-    modulus: float,
-    duration: float,
-    time_step: float,
-    picture: Path | None = None,
-) -> Pull:
-    """Clamp the bottom as it lies, and pull the ends apart."""
+def begin_pull(
+    knot: str, start: withe.Snapshot, friction: float, modulus: float, duration: float, time_step: float
+) -> tuple[withe.Simulation, dict[str, float]]:
+    """Clamp the bottom as it lies, and let the grips move apart; also the direction of each grip along x."""
     simulation = build(knot, friction, modulus, time_step)
     simulation.restore(start)
     simulation.set("drag", drag=5e-3 * pace(modulus))
@@ -113,6 +107,21 @@ def pull(
     sides = dict(zip(("first grip", "last grip"), np.sign(ends[:, 0]), strict=True))
     for (grip, side), end in zip(sides.items(), ends, strict=True):
         simulation.move(grip, position=end + side * SPEED * duration * np.eye(3)[0], over=duration)
+    return simulation, sides
+
+
+def pull(
+    knot: str,
+    start: withe.Snapshot,
+    friction: float,
+    modulus: float,
+    duration: float,
+    time_step: float,
+    picture: Path | None = None,
+) -> Pull:
+    """Pull the ends apart, and note the pull."""
+    simulation, sides = begin_pull(knot, start, friction, modulus, duration, time_step)
+    rope = simulation.rods[0]
     force = np.zeros(round(duration / time_step))
     until = duration
     for k in withe.track(range(len(force)), f"pulling a {knot} knot", unit="steps"):

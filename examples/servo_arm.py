@@ -35,15 +35,22 @@ UNTIL = 1.6  # [s]
 FREQUENCY_ERROR, REST = 2e-3, 0.05  # allowed errors
 
 
-def arm() -> tuple[withe.Simulation, withe.Joint]:
-    """The arm on its servo, whose axis is vertical, on a short stiff post."""
-    scene = withe.Scene(gravity=(0.0, 0.0, 0.0))
+def add_arm(scene: withe.Scene, x: float = 0.0, number: int = 1) -> withe.Joint:
+    """Add the arm on its servo, whose axis is vertical, on a short stiff post at x [m]."""
     nylon = withe.Material(youngs_modulus=MODULUS, poisson_ratio=0.3, density=DENSITY)
     steel = withe.Material(youngs_modulus=2e11, poisson_ratio=0.3, density=7850.0)
-    post = scene.add_rod(start=(-0.02, 0, 0), end=(0, 0, 0), nodes=3, radius=2e-2, material=steel)
-    rod = scene.add_rod(start=(0, 0, 0), end=(LENGTH, 0, 0), nodes=NODES, radius=RADIUS, material=nylon, name="arm")
-    servo = scene.join(post.end, rod.start, "revolute", axis=(0, 0, 1), stiffness=STIFFNESS, name="servo")
+    name = "arm" if number == 1 else f"arm {number}"
+    post = scene.add_rod(start=(x - 0.02, 0, 0), end=(x, 0, 0), nodes=3, radius=2e-2, material=steel)
+    rod = scene.add_rod(start=(x, 0, 0), end=(x + LENGTH, 0, 0), nodes=NODES, radius=RADIUS, material=nylon, name=name)
+    servo = scene.join(post.end, rod.start, "revolute", axis=(0, 0, 1), stiffness=STIFFNESS, name=f"servo of {name}")
     scene.clamp(post.start)
+    return servo
+
+
+def arm() -> tuple[withe.Simulation, withe.Joint]:
+    """Return the arm on its servo."""
+    scene = withe.Scene(gravity=(0.0, 0.0, 0.0))
+    servo = add_arm(scene)
     return scene.build(planar=True, integrator="energy_momentum", time_step=1e-3), servo
 
 

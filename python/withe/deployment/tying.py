@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -16,8 +17,11 @@ from withe.deployment.deploying import DRAWN, drawn_setup
 from withe.deployment.planning import LayPlan
 from withe.deployment.world import Setup, hung, jaw_path, jaw_stiffness
 from withe.parts.handles import Rod
+from withe.recording import Record
+from withe.recording.recorder import Recorder
 from withe.simulation import Simulation
 from withe.simulation.hands import RunningHand
+from withe.simulation.outlines import outlines_of
 
 __all__ = ["Move", "Tying", "tie"]
 
@@ -27,6 +31,7 @@ _HIGHER = 1.2  # [m], additional height of a hanging cable above the one that is
 _LOWERED = 3.0  # [s], time of its lowering
 _RESTS = 0.5  # [s], after grippers have opened
 _LEG = 2.0  # [s] from point to point
+_RECORD_EVERY = 0.1  # [s]
 
 
 @dataclass(frozen=True)
@@ -78,12 +83,15 @@ class Tying:
         Positions that the grippers reached for, step by step.
     missed : tuple of (int, int)
         Step and move of each gripper that found no cable.
+    record : Record
+        Record of the whole motion, about every tenth of a second, with the rods "cable 0", "cable 1", ...
     """
 
     names: tuple[str, ...]
     shapes: tuple[tuple[FloatArray, ...], ...]
     picks: tuple[tuple[FloatArray, ...], ...]
     missed: tuple[tuple[int, int], ...]
+    record: Record
 
     @property
     def centrelines(self) -> tuple[FloatArray, ...]:
@@ -158,7 +166,7 @@ def tie(
         table.lay(number)
     for number, step in enumerate(steps):
         table.carry(number, step, None if picks is None else [np.asarray(pick, float) for pick in picks[number]])
-    return Tying(tuple(table.names), tuple(table.shapes), tuple(table.picks), tuple(table.missed))
+    return Tying(tuple(table.names), tuple(table.shapes), tuple(table.picks), tuple(table.missed), table.record)
 
 
 def _check(
@@ -200,6 +208,23 @@ class _Table:
         self.shapes: list[tuple[FloatArray, ...]] = []
         self.picks: list[tuple[FloatArray, ...]] = []
         self.missed: list[tuple[int, int]] = []
+        self._recorder = Recorder(self.simulation, None, *outlines_of(self.simulation._session.directory))
+        self._recorder.capture()
+        self._next_frame = _RECORD_EVERY
+
+    @property
+    def record(self) -> Record:
+        """Frames so far."""
+        return self._recorder.record
+
+    def _run(self, duration: float) -> None:
+        """Advance, and record frames beyond the end of single runs."""
+        self.simulation.run(duration, record_every=math.inf, before_step=self._capture_when_due, progress=False)
+
+    def _capture_when_due(self, simulation: Simulation) -> None:
+        if simulation.time >= self._next_frame:
+            self._recorder.capture()
+            self._next_frame = simulation.time + _RECORD_EVERY
 
     def lay(self, number: int) -> None:
         """Lower a cable to where its motion begins, lay it, and let go."""
@@ -214,7 +239,7 @@ class _Table:
             return position + np.array([0.0, 0.0, height * left]), rotation
 
         jaw.move(path=at)
-        self.simulation.run(lowered + float(plan.times[-1]), progress=False)
+        self._run(lowered + float(plan.times[-1]))
         jaw.release()
         self._rest(f"laid {number}")
 
@@ -230,7 +255,7 @@ class _Table:
             hand.move(path=_legs(hand, self.simulation.time, np.asarray(move.by), np.asarray(move.turn)))
             hands.append(hand)
         self.picks.append(tuple(reached))
-        self.simulation.run(_LEG * max((len(np.asarray(move.by)) for move in step), default=0), progress=False)
+        self._run(_LEG * max((len(np.asarray(move.by)) for move in step), default=0))
         for hand in hands:
             hand.release()
         self._rest(f"step {number}")
@@ -251,7 +276,7 @@ class _Table:
         return pick, self.simulation.grasp(cable, at=at, length=JAW, stiffness=jaw_stiffness(setup.cable), name=name)
 
     def _rest(self, name: str) -> None:
-        self.simulation.run(_RESTS, progress=False)
+        self._run(_RESTS)
         self.names.append(name)
         self.shapes.append(tuple(self.simulation.positions(cable) for cable in self.cables))
 
