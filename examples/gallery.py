@@ -98,10 +98,10 @@ def plectoneme() -> Shot:
     """A rod under tension is twisted until it winds up about itself."""
     from plectoneme import BENDING, DENSITY, MODULUS, RADIUS, TWISTING
 
-    length, nodes, force = 0.22, 221, 0.006  # [m], [-], F h^2 / B
+    length, nodes, force = 0.26, 261, 0.0012  # [m], [-], F h^2 / B
     x = np.linspace(0.0, 1.0, nodes)
     bump = 0.004 * length * np.exp(-(((x - 0.5) / 0.1) ** 2))
-    points = np.stack([length * x, bump * np.cos(20.0 * x), 0.05 + bump * np.sin(20.0 * x)], axis=1)
+    points = np.stack([length * x, bump * np.cos(20.0 * x), bump * np.sin(20.0 * x)], axis=1)
     scene = withe.Scene(gravity=(0.0, 0.0, 0.0))
     rubber = withe.Material(youngs_modulus=MODULUS, poisson_ratio=0.5, density=DENSITY)
     rod = scene.add_rod(points=points, radius=RADIUS, material=rubber, natural="straight", name="rod")
@@ -116,9 +116,10 @@ def plectoneme() -> Shot:
     simulation = scene.build(integrator="backward_euler", time_step=wave_time / 60.0)
     # A straight rod buckles at the moment 2 sqrt(B F) [Greenhill 1883].
     critical = 2.0 * np.sqrt(BENDING * pull) / TWISTING
-    simulation.set(rod, natural_twist=1.75 * critical, over=24.0 * wave_time)
-    record = simulation.run(30.0 * wave_time, record_every=wave_time / 10.0, progress=False)
-    return Shot(record, speed=30.0 * wave_time / 9.0, camera=(0.25, -1.0, 0.35), ground=0.0)
+    simulation.set(rod, natural_twist=1.15 * critical, over=12.0 * wave_time)
+    simulation.run(14.0 * wave_time, record_every=np.inf, progress=False)  # the straight rod is twisted unseen
+    record = simulation.run(19.0 * wave_time, record_every=wave_time / 12.0, progress=False)
+    return Shot(record, speed=19.0 * wave_time / 8.0, camera=(0.25, -1.0, 0.35))
 
 
 def _knot(name: str) -> Shot:
@@ -293,9 +294,9 @@ def traced(path: Path, size: tuple[int, int], count: int | None) -> None:
     from withe.view.films import Film
 
     scale = size[1] / 360.0
-    case = make_case("six cables", 3, scale, (360, 640))
-    grey = [(96, 104, 112), (120, 128, 136), (84, 92, 100)] * 2
-    photo = render(case, np.random.default_rng(1), grey, background=(226, 232, 237), grain=3.0, shadow=0.25)
+    case = make_case("six cables", 8, scale, (360, 640))
+    dull = [(176, 92, 70), (62, 98, 140), (196, 160, 84), (84, 132, 100), (120, 92, 140), (90, 98, 106)]
+    photo = render(case, np.random.default_rng(1), dull, background=(226, 232, 237), grain=3.0)
     tracing = trace(photo)
     lengths = [len(line) for line in tracing.centrelines]
     frames = count or 210

@@ -4,8 +4,8 @@ The legs are arches that meet in one rigid joint. A leg has no motors but two mu
 be, its natural curvature can be changed, which bends it sideways or in its own plane. Three feet hold the ground
 (as suction cups would) while the other three are lifted, swung forward and set down; then they change parts.
 
-Writes out/robot.png (the picture of the README, kept in examples/pictures), out/robot_plot.png, and with --film
-out/robot.mp4.
+Writes out/robot.png, out/robot_plot.png, and with --film out/robot.mp4 and the film of the README, out/robot.gif (kept
+in examples/pictures).
 """
 
 from __future__ import annotations
@@ -161,7 +161,7 @@ def main() -> None:
     """Walk, and show it."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--steps", type=int, default=12, help="how often three feet change parts")
-    parser.add_argument("--film", action="store_true", help="also render out/robot.mp4")
+    parser.add_argument("--film", action="store_true", help="also render out/robot.mp4 and out/robot.gif")
     parser.add_argument("--out", type=Path, default=Path("out"))
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
@@ -179,6 +179,7 @@ def main() -> None:
     record.picture(arguments.out / "robot.png", size=(1120, 490), frame=last - 30, ghosts=(0, last // 2 - 10), **view)
     if arguments.film:
         record.animate(arguments.out / "robot.mp4", **view)
+        record.animate(arguments.out / "robot.gif", size=(800, 340), fps=15.0, quality="high", **view)
     print(f"wrote {', '.join(sorted(str(path) for path in arguments.out.glob('robot*')))}")
 
 
