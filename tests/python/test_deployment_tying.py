@@ -34,6 +34,17 @@ def test_a_cable_is_laid_and_its_end_put_where_it_was_asked_for(carried):
     assert after[:, 2].max() < 2 * CABLE.radius
 
 
+def test_the_record_of_a_tying_begins_hanging_and_ends_at_rest(carried):
+    record = carried.record
+    assert [rod.name for rod in record.rods] == ["cable 0"]
+    assert [obstacle.kind for obstacle in record.obstacles] == ["plane"]
+    positions = record.positions("cable 0")
+    assert np.ptp(positions[0, :, 2]) > 0.15  # it hangs at first
+    np.testing.assert_array_equal(positions[-1], carried.centrelines[0])
+    assert np.diff(record.times).max() < 0.13
+    assert np.diff(record.times).min() > 0.0
+
+
 def test_a_gripper_that_reaches_to_where_the_cable_is_not_moves_nothing(carried):
     laid = carried.shapes[0][0]
     move = Move(0, 0.0, [(0.0, 0.03, 0.03)])

@@ -166,7 +166,7 @@ def tie(
         table.lay(number)
     for number, step in enumerate(steps):
         table.carry(number, step, None if picks is None else [np.asarray(pick, float) for pick in picks[number]])
-    return Tying(tuple(table.names), tuple(table.shapes), tuple(table.picks), tuple(table.missed), table.record)
+    return Tying(tuple(table.names), tuple(table.shapes), tuple(table.picks), tuple(table.missed), table.end_record())
 
 
 def _check(
@@ -212,9 +212,9 @@ class _Table:
         self._recorder.capture()
         self._next_frame = _RECORD_EVERY
 
-    @property
-    def record(self) -> Record:
-        """Frames so far."""
+    def end_record(self) -> Record:
+        """Take the last frame, and return the record."""
+        self._recorder.capture()
         return self._recorder.record
 
     def _run(self, duration: float) -> None:
