@@ -353,7 +353,7 @@ def shrink(film: Path, target: Path) -> None:
     width, height = PAGE_SIZE
     filters = f"fps={PAGE_FPS:g},scale={width}:{height}:flags=lanczos"
     command = [imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-loglevel", "error", "-i", film, "-vf", filters]
-    command += ["-c:v", "libwebp_anim", "-quality", "55", "-compression_level", "6", "-loop", "0", "-an", target]
+    command += ["-c:v", "libwebp_anim", "-quality", "55", "-compression_level", "4", "-loop", "0", "-an", target]
     subprocess.run(command, check=True)
 
 

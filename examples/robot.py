@@ -179,7 +179,7 @@ def main() -> None:
     record.picture(arguments.out / "robot.png", size=(1120, 490), frame=last - 30, ghosts=(0, last // 2 - 10), **view)
     if arguments.film:
         record.animate(arguments.out / "robot.mp4", **view)
-        record.animate(arguments.out / "robot.gif", size=(800, 340), fps=15.0, quality="high", **view)
+        record.animate(arguments.out / "robot.gif", size=(720, 306), fps=12.5, quality="high", **view)
     print(f"wrote {', '.join(sorted(str(path) for path in arguments.out.glob('robot*')))}")
 
 

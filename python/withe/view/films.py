@@ -41,7 +41,7 @@ class Film:
     def __init__(self, encoder: str, path: Path, size: tuple[int, int], fps: float) -> None:
         source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", f"{fps:g}", "-i", "-"]
         if path.suffix.lower() == ".gif":
-            filters = "split[a][b];[a]palettegen=stats_mode=diff[p];[b][p]paletteuse=dither=none:diff_mode=rectangle"
+            filters = "split[a][b];[a]palettegen=stats_mode=full[p];[b][p]paletteuse=dither=none:diff_mode=rectangle"
             target = ["-filter_complex", filters, "-loop", "0"]
         else:
             target = [
