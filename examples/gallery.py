@@ -113,7 +113,7 @@ def plectoneme() -> Shot:
     wave_time = length * np.sqrt(line_density / pull)
     scene.add_drag(6.0 * line_density / wave_time)
     scene.enable_contact()
-    simulation = scene.build(integrator="backward_euler", time_step=wave_time / 60.0)
+    simulation = scene.build(integrator="backward_euler", time_step=wave_time / 125.0)
     # A straight rod buckles at the moment 2 sqrt(B F) [Greenhill 1883].
     critical = 2.0 * np.sqrt(BENDING * pull) / TWISTING
     simulation.set(rod, natural_twist=1.15 * critical, over=12.0 * wave_time)
@@ -153,7 +153,7 @@ def spider() -> Shot:
     """A spider of nine soft limbs falls on a floor with friction, and slides."""
     import spider
 
-    return Shot(spider.fall(1.0, 5e-4), speed=0.18, camera=(0.35, -1.0, 0.35))
+    return Shot(spider.fall(1.0, 2.5e-4), speed=0.18, camera=(0.35, -1.0, 0.35))
 
 
 def gripper() -> Shot:
