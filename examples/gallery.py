@@ -203,7 +203,7 @@ def servo_arm() -> Shot:
             now.set(servo, rest_angle=servo_arm.ANGLE * share)
 
     record = simulation.run(1.8, 5e-3, before_step=lead, progress=False)
-    view = camera_at((0.66, -1.3, 1.5), (0.7, 0.22, 0.0), 1.7)
+    view = camera_at((0.46, -1.5, 1.8), (0.5, 0.2, 0.0), 2.15)
     return Shot(record, speed=0.28, camera=view, ground=-0.03)
 
 
@@ -293,7 +293,7 @@ def traced(path: Path, size: tuple[int, int], count: int | None) -> None:
     from withe.view.colors import rod_color
     from withe.view.films import Film
 
-    scale = size[1] / 360.0
+    scale = max(size[1] / 360.0, 1.0)  # narrower cables cannot be traced
     case = make_case("six cables", 8, scale, (360, 640))
     dull = [(176, 92, 70), (62, 98, 140), (196, 160, 84), (84, 132, 100), (120, 92, 140), (90, 98, 106)]
     photo = render(case, np.random.default_rng(1), dull, background=(226, 232, 237), grain=3.0)
@@ -329,7 +329,7 @@ def traced(path: Path, size: tuple[int, int], count: int | None) -> None:
     with Film(imageio_ffmpeg.get_ffmpeg_exe(), path, size, FPS) as film:
         for frame in range(frames):
             share = np.clip((frame - rest) / max(1, frames - 3 * rest), 0.0, 1.0)
-            film.write(drawn(round(share * total)))
+            film.write(cv2.resize(drawn(round(share * total)), size, interpolation=cv2.INTER_AREA))
 
 
 # --- films ---------------------------------------------------------------------------------------------------------

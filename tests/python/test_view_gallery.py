@@ -76,9 +76,9 @@ def test_an_entry_makes_a_film(renderer, tmp_path, monkeypatch):
 @pytest.mark.skipif(importlib.util.find_spec("cv2") is None, reason="needs OpenCV")
 def test_cables_are_traced_one_after_the_other(tmp_path):
     encoder = pytest.importorskip("imageio_ffmpeg")
-    gallery.traced(tmp_path / "traced.mp4", (640, 360), 4)
+    gallery.traced(tmp_path / "traced.mp4", (320, 180), 4)
     reader = encoder.read_frames(str(tmp_path / "traced.mp4"))
-    assert next(reader)["size"] == (640, 360)
+    assert next(reader)["size"] == (320, 180)
     pictures = [np.frombuffer(picture, np.uint8).astype(int) for picture in reader]
     assert len(pictures) == 4
     changes = [np.abs(picture - pictures[0]).mean() for picture in pictures]
