@@ -476,6 +476,20 @@ def test_a_floor_fades_into_the_background(scenes, renderer):
     assert np.abs(np.diff(beside, axis=0)).max() <= 4
 
 
+def test_a_floor_reaches_as_far_as_the_camera_sees_and_moves_with_its_plane(scenes, renderer):
+    stage = rendering.Stage(scenes[0], size=(64, 48))
+    try:
+        floor = stage._floor
+        side, meshes = floor._side, (floor._rest, floor._square)
+        stage.keep_in_view(3.0 * scenes[0].positions()[0])
+        assert floor._side > 1.3 * side
+        assert all((mesh.points[:, 2] == np.float32(-0.03)).all() for mesh in meshes)
+        floor.lift(-0.05)
+        assert all((mesh.points[:, 2] == np.float32(-0.05)).all() for mesh in meshes)
+    finally:
+        stage.close()
+
+
 def test_without_a_floor_there_is_no_shadow_and_with_a_ground_there_is(record, renderer):
     coloured, dark = [], []
     for ground in (None, -0.32):

@@ -139,7 +139,9 @@ class Stage:
         self.plotter.renderer.SetUseOIT(False)
         self._floor: Floor | None = None
         self._floor_plane = self._level_plane(nodes) if ground is None else None
-        self._ground = float(self._places[self._floor_plane][0, 2]) if self._floor_plane is not None else ground
+        if self._floor_plane is not None:
+            ground = float(self._places[self._floor_plane][0, 2])
+        self._ground: float | None = ground
         self._around = np.concatenate([nodes[:0], *around])
         self._frame_camera(direction, nodes)
         if isinstance(camera, Pinhole):
@@ -147,7 +149,7 @@ class Stage:
         self._add_lights(pyvista, direction)
         if self._ground is not None:
             self._floor = Floor(pyvista, self.plotter, _LIVE_SHADOW_CELLS if live else _SHADOW_CELLS)
-            self._floor.place(np.concatenate([nodes, self._around]), float(self._ground), self._extent)
+            self._floor.place(np.concatenate([nodes, self._around]), self._ground, self._extent)
         self._add_obstacles(pyvista, np.concatenate([nodes, self._around]))
         self._add_rods(pyvista, color_by)
         line = self._fineness * max(1.5, self.size[1] / 300.0)  # [px]
@@ -305,8 +307,8 @@ class Stage:
         seen = np.concatenate([points + reach * sign * axis for axis in np.eye(3) for sign in (-1.0, 1.0)] + [around])
         if self._ground is not None:
             seen = np.concatenate([seen, np.column_stack([points[:, :2], np.full(len(points), self._ground)])])
-        if self._floor is not None:
-            self._floor.place(everything, float(self._ground), extent)
+            if self._floor is not None:
+                self._floor.place(everything, self._ground, extent)
         up = np.array([0.0, 1.0, 0.0]) if abs(direction[2]) > 0.99 else np.array([0.0, 0.0, 1.0])
         right = np.cross(up, direction)
         right /= np.linalg.norm(right)

@@ -109,7 +109,7 @@ class Surface:
 
     def level_share(self, nodes: FloatArray) -> FloatArray:
         """Share of the length seen from above, at each point of the surface; small where the rod is upright."""
-        tangents = _unit(self._tangent_weights @ nodes)
+        tangents = unit(self._tangent_weights @ nodes)
         share = np.maximum(np.hypot(tangents[:, 0], tangents[:, 1]), _LEAST_SHARE)
         return np.repeat(share[self._ring_samples], len(self._section))
 
