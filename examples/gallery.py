@@ -288,7 +288,7 @@ def traced(path: Path, size: tuple[int, int], count: int | None) -> None:
     import cv2
     import imageio_ffmpeg
 
-    from withe.perception import trace
+    from withe.perception import border_filter, trace
     from withe.perception.synthetic import make_case, render
     from withe.view.colors import rod_color
     from withe.view.films import Film
@@ -297,7 +297,7 @@ def traced(path: Path, size: tuple[int, int], count: int | None) -> None:
     case = make_case("six cables", 8, scale, (360, 640))
     dull = [(176, 92, 70), (62, 98, 140), (196, 160, 84), (84, 132, 100), (120, 92, 140), (90, 98, 106)]
     photo = render(case, np.random.default_rng(1), dull, background=(226, 232, 237), grain=3.0)
-    tracing = trace(photo)
+    tracing = trace(photo, border_filter)
     lengths = [len(line) for line in tracing.centrelines]
     frames = count or 210
     rest, total = frames // 7, sum(lengths)

@@ -483,9 +483,9 @@ def test_a_floor_reaches_as_far_as_the_camera_sees_and_moves_with_its_plane(scen
         side, meshes = floor._side, (floor._rest, floor._square)
         stage.keep_in_view(3.0 * scenes[0].positions()[0])
         assert floor._side > 1.3 * side
-        assert all((mesh.points[:, 2] == np.float32(-0.03)).all() for mesh in meshes)
+        assert all(np.allclose(mesh.points[:, 2], -0.03) for mesh in meshes)
         floor.lift(-0.05)
-        assert all((mesh.points[:, 2] == np.float32(-0.05)).all() for mesh in meshes)
+        assert all(np.allclose(mesh.points[:, 2], -0.05) for mesh in meshes)
     finally:
         stage.close()
 
