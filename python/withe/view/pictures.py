@@ -137,7 +137,7 @@ def animate(
     size, color_by, camera, ground
         As in `picture`. The camera stands still, with all frames in view.
     quality : {"draft", "high"}
-        "high" smooths edges as `picture` does, and takes about twice as long.
+        "high" smooths edges as `picture` does, and takes about 1.5 times as long.
     progress : bool
         True to show a progress bar, as in `Simulation.run`.
 
