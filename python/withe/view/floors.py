@@ -94,15 +94,19 @@ class Floor:
         count = self._cells
         places = ((points[:, :2] - self._low) / self._side * count).astype(int)
         inside = ((places >= 0) & (places < count)).all(axis=1)
-        cells = (places[:, 1] * count + places[:, 0])[inside]
+        columns, rows = places[inside].T
         levels = (points[inside, 2] - self._height) / self._extent * len(_BLURS)
         levels = np.clip(levels, 0.0, len(_BLURS) - 1.0)
         shade = np.zeros((count, count), np.float32)
+        if inside.any():  # products of the covered part alone, which is a small part of the grid
+            left, right, low, high = columns.min(), columns.max() + 1, rows.min(), rows.max() + 1
+            shape = high - low, right - left
+            cells = (rows - low) * shape[1] + columns - left
         for level, blur in enumerate(self._blurs):
             shares = np.maximum(1.0 - np.abs(levels - level), 0.0)  # between two levels, a part of both
             if shares.any():
-                cover = np.bincount(cells, shares * areas[inside], count**2).reshape(count, count)
-                shade += blur @ cover.astype(np.float32) @ blur
+                cover = np.bincount(cells, shares * areas[inside], shape[0] * shape[1]).reshape(shape)
+                shade += blur[:, low:high] @ (cover.astype(np.float32) @ blur[left:right])
         shade *= (count / self._side) ** 2
         dark = -_DARKEST * np.expm1(-1.4 * shade[::-1, :, None])
         self._actor.texture = _texture(self._pyvista, self._bare + dark * (np.array(_SHADOW, np.float32) - self._bare))
