@@ -70,6 +70,7 @@ BENCHMARKS = {
     "parallel": ("Many simulations", "How do many simulations scale with threads?"),
     "gradients": ("Gradients", "How much does a gradient cost, over the run or the equilibrium?"),
     "settings": ("Settings", "How long does it take to set a parameter?"),
+    "drawing": ("Pictures and films", "How long do a frame of a film and the first picture take?"),
     "skips": ("Shortcuts of the plan", "How much run time does each shortcut of `plan` save?"),
     "ablation": ("Parts of Newton's method", "How much does each part of Newton's method save?"),
     "newton_iteration": ("One Newton iteration", "How long does an iteration take, over LAPACK's band solver?"),
