@@ -48,7 +48,7 @@ help:
 	@echo "make wheel         dist/*.whl for machines without compiler"
 	@echo "make wheels        the same for each of Python 3.11 to 3.14 that is installed"
 	@echo "make bench         all benchmarks (about an hour); NAME=work_precision runs one"
-	@echo "make docs          the documentation, into out/docs"
+	@echo "make docs          the documentation, into out/docs; NOTEBOOKS=off does not execute the notebooks"
 	@echo "make lint          ruff; make format applies formatters, make format-check only looks"
 	@echo "make prose         house style of the prose on lines that changed since BASE="
 	@echo "make types         mypy --strict"
@@ -97,6 +97,11 @@ $(STAMPS)/bench_tools: $(STAMPS)/build_tools
 $(STAMPS)/doc_tools: $(STAMPS)/build_tools
 	@echo "Installing what the documentation needs into .venv"
 	@$(PIP_INSTALL) $(call requirements,docs)
+	@touch $@
+
+$(STAMPS)/notebook_tools: $(STAMPS)/build_tools
+	@echo "Installing what the notebooks need into .venv"
+	@$(PIP_INSTALL) $(call requirements,notebooks)
 	@touch $@
 
 # One build folder serves the installed module and the C++ tests, so the engine is compiled once.
@@ -172,7 +177,8 @@ asan-python: $(STAMPS)/build_tools
 bench: $(STAMPS)/installed $(STAMPS)/bench_tools
 	@python benchmarks $(NAME)
 
-docs: $(STAMPS)/installed $(STAMPS)/doc_tools
+# The environment variable NOTEBOOKS tells docs/conf.py whether to execute the notebooks.
+docs: $(STAMPS)/installed $(STAMPS)/doc_tools $(if $(filter off,$(NOTEBOOKS)),,$(STAMPS)/notebook_tools)
 	@python -m sphinx --jobs $(JOBS) --quiet --fail-on-warning --keep-going docs out/docs
 	@echo "Open out/docs/index.html"
 

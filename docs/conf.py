@@ -1,5 +1,10 @@
-"""Configuration of the documentation: `make docs` builds it into out/docs."""
+"""Configuration of the documentation: `make docs` builds it into out/docs.
 
+The build executes the notebooks and keeps their outputs in build/notebooks. With the environment variable NOTEBOOKS=off
+it shows their code only.
+"""
+
+import os
 import sys
 from pathlib import Path
 
@@ -13,7 +18,7 @@ project, author, copyright = "withe", "The withe authors", "2026, the withe auth
 release = version = withe.__version__
 
 extensions = [
-    "myst_parser",
+    "myst_nb",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
     "sphinx.ext.napoleon",
@@ -22,10 +27,20 @@ extensions = [
     "sphinx_design",
 ]
 exclude_patterns = ["README.md"]
-source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
+source_suffix = {".md": "myst-nb", ".ipynb": "myst-nb", ".rst": "restructuredtext"}
 
 myst_enable_extensions = ["colon_fence", "deflist"]
 myst_heading_anchors = 3
+
+nb_execution_mode = "off" if os.environ.get("NOTEBOOKS") == "off" else "cache"
+# Outputs of another version of the package must not be shown, so each version has a cache of its own.
+nb_execution_cache_path = str(pages.ROOT / "build" / "notebooks" / pages.digest_of_package())
+nb_execution_timeout = 180  # [s], of a cell
+nb_execution_in_temp = True
+nb_execution_raise_on_error = True
+nb_merge_streams = True
+# Kernels inherit the environment. Another backend than that of notebooks would show no figures.
+os.environ.pop("MPLBACKEND", None)
 
 autodoc_member_order = "groupwise"
 autodoc_typehints = "none"  # docstrings have types with shapes and units

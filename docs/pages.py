@@ -1,6 +1,7 @@
-"""Pages that are made of other files: for each public name, room of the engine, benchmark and example."""
+"""Pages made of other files: for each public name, room of the engine, benchmark, example and notebook."""
 
 import ast
+import hashlib
 import importlib
 import inspect
 import json
@@ -10,6 +11,8 @@ from collections.abc import Iterator
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
+
+import withe
 
 MODULES = {
     "withe": "Scenes, simulations and records",
@@ -376,6 +379,22 @@ def examples(folder: Path) -> None:
     put(folder / "index.md", index)
 
 
+def notebooks(folder: Path) -> None:
+    """Copy the notebooks and their list. Links from notebooks/ to docs/ become links within docs."""
+    for path in [ROOT / "notebooks/README.md", *sorted((ROOT / "notebooks").glob("*.ipynb"))]:
+        text = path.read_text().replace("](../docs/", "](../../")
+        put(folder / path.name.replace("README", "index"), text.splitlines())
+
+
+def digest_of_package() -> str:
+    """Return a digest of all files of the installed package."""
+    digest = hashlib.sha256()
+    folder = Path(withe.__file__).parent
+    for path in sorted(path for path in folder.rglob("*") if path.suffix in {".py", ".so", ".pt"}):
+        digest.update(str(path.relative_to(folder)).encode() + path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
 def put(path: Path, lines: list[str]) -> None:
     """Write a page unless the file has that text."""
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -390,3 +409,4 @@ def write(folder: Path) -> None:
     rooms(folder / GENERATED / "theory")
     benchmarks(folder / GENERATED / "benchmarks")
     examples(folder / GENERATED / "examples")
+    notebooks(folder / GENERATED / "notebooks")

@@ -58,6 +58,9 @@ def plot(record: Frames, *, shapes: int = 6, theme: style.Theme = "light") -> An
     if int(shapes) != shapes or shapes < 1:
         raise ValueError(f"shapes must be a positive integer, got {shapes!r}")
     pyplot = require("matplotlib.pyplot", "view")
+    # The backend of notebooks sets rcParams["interactive"] when it is loaded. Loaded inside rc_context, it would lose the
+    # setting again, and the notebook would show no later figure.
+    pyplot.draw_if_interactive()
     with style.context(theme) as colors:
         single = len(record) == 1
         figure = pyplot.figure(figsize=(5.5, 4.6) if single else (11.0, 4.6))
