@@ -13,7 +13,7 @@ MAX_LINES = 20  # of a cell of code: it fits on a screen with its output
 SMALLER = {
     "fold_a_sheet": ("for seed in range(40, 44)", "for seed in range(40, 41)"),
     "lay_a_cable": ("nodes=120", "nodes=60"),
-    "learning_a_controller": ("TRAINING, history = 10_000", "TRAINING, history = 3_000"),
+    "learning_a_controller": ("TRAINING, history = 12_000", "TRAINING, history = 3_000"),
     "run_time_against_error": ("(6, 9, 13, 21, 31, 45)", "(6, 13, 21)"),
 }
 # A number that the notebook prints, and between what that number must lie.
