@@ -11,6 +11,7 @@ NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 MAX_LINES = 20  # of a cell of code: it fits on a screen with its output
 # Parts of notebooks that the test makes smaller, and their replacements.
 SMALLER = {
+    "contact_and_knots": ("np.linspace(0.1, 0.6, 6)", "np.linspace(0.1, 0.6, 2)"),
     "fold_a_sheet": ("for seed in range(40, 44)", "for seed in range(40, 41)"),
     "lay_a_cable": ("nodes=120", "nodes=60"),
     "learning_a_controller": ("TRAINING, history = 12_000", "TRAINING, history = 3_000"),
@@ -114,7 +115,8 @@ def test_figures_appear_in_a_notebook_after_the_plot_of_a_record(tmp_path, monke
 import matplotlib.pyplot as plt
 import withe
 scene = withe.Scene()
-rod = scene.add_rod(start=(0, 0, 0), end=(1, 0, 0), nodes=3, radius=0.01, material=withe.Material(1e6, density=1e3))
+rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+rod = scene.add_rod(start=(0, 0, 0), end=(1, 0, 0), nodes=3, radius=0.01, material=rubber)
 scene.clamp(rod.start)
 scene.build().run(0.01, progress=False).plot()
 """
