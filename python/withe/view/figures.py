@@ -58,8 +58,8 @@ def plot(record: Frames, *, shapes: int = 6, theme: style.Theme = "light") -> An
     if int(shapes) != shapes or shapes < 1:
         raise ValueError(f"shapes must be a positive integer, got {shapes!r}")
     pyplot = require("matplotlib.pyplot", "view")
-    # The backend of notebooks sets rcParams["interactive"] when it is loaded. Loaded inside rc_context, it would lose the
-    # setting again, and the notebook would show no later figure.
+    # Load the backend before rc_context: that of notebooks sets rcParams["interactive"], which rc_context would reset.
+    # The notebook would then show no later figure.
     pyplot.draw_if_interactive()
     with style.context(theme) as colors:
         single = len(record) == 1
