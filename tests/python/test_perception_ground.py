@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import withe
 from scoring import score
 from withe.perception import border_filter, ground_filter, trace, trace_mask
 from withe.perception.backgrounds import cast_shadow, plain, wood
@@ -104,3 +105,49 @@ def test_ends_that_do_not_face_each_other_stay_apart():
     mask[60:70] = False
     mask[42:48, 165:280] = True  # 0.6 times as wide
     assert len(trace_mask(mask)) == 2
+
+
+# Masks that are none
+
+
+def planks_of(lines, shape=SHAPE):
+    """Return a mask of rows and columns of lines, as the grout of tiles."""
+    y, x = np.mgrid[: shape[0], : shape[1]]
+    return ((y % lines) < 7) | ((x % lines) < 7)
+
+
+@pytest.mark.parametrize(
+    ("mask", "reason"),
+    [
+        (planks_of(18), "covers 63 % of the picture"),
+        (np.random.default_rng(0).random(SHAPE) < 0.05, "100 % of it belongs to no cable"),
+        (np.kron(np.random.default_rng(1).random((48, 64)) < 0.04, np.ones((10, 10))) > 0, "belongs to no cable"),
+    ],
+    ids=["grid", "noise", "blocks"],
+)
+def test_a_mask_that_is_none_warns(mask, reason):
+    with pytest.warns(withe.PoorMaskWarning, match=reason):
+        tracing = trace_mask(mask)
+    assert not tracing.mask_quality.is_good
+
+
+def test_a_page_of_print_warns():
+    cv2 = pytest.importorskip("cv2")
+    image, rng = np.full((*SHAPE, 3), 235, np.uint8), np.random.default_rng(3)
+    for row in range(15, SHAPE[0], 22):
+        words = "".join(chr(97 + rng.integers(26)) for _ in range(60))
+        cv2.putText(image, words, (5, row), cv2.FONT_HERSHEY_SIMPLEX, 0.5, (40, 40, 40), 1)
+    with pytest.warns(withe.PoorMaskWarning, match="the mask does not look like cables"):
+        trace(image)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("case", ["six cables", "specks", "loop", "gap", "ragged 30", "three at a point"])
+def test_masks_of_cables_do_not_warn(case):
+    for seed in range(3):
+        assert trace_mask(make_case(case, seed).mask).mask_quality.is_good
+
+
+@pytest.mark.filterwarnings("error")
+def test_an_empty_mask_does_not_warn():
+    assert trace_mask(np.zeros((50, 60), bool)).mask_quality.is_good
