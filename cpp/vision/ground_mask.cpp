@@ -101,12 +101,23 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
+/// Median grey level of sampled pixels.
+double median_level(const ColorImage& image) {
+  std::vector<double> levels;
+  for (int y = std::min(kStep / 2, image.height - 1); y < image.height; y += kStep) {
+    for (int x = std::min(kStep / 2, image.width - 1); x < image.width; x += kStep) {
+      const std::uint8_t* color = image.at(x, y);
+      levels.push_back((color[0] + color[1] + color[2]) / 3.0);
+    }
+  }
+  return median(std::move(levels));
+}
+
 /// Logarithms at sampled pixels, and the surface of the ground through them.
 struct Ground {
   Surface surface = Surface::Zero();
   double chromaticity = 0.0;  ///< standard deviation of the ground
   double brightness = 0.0;    ///< standard deviation of the ground
-  double level = 0.0;         ///< mean grey level of the ground
 
   Ground(const Smoothed& image, const std::array<float, 256>& table) {
     std::vector<Basis> places;
@@ -127,13 +138,11 @@ struct Ground {
 
     std::vector<double> tones(samples.size());
     std::vector<double> hues(samples.size());
-    level = 0.0;
     for (std::size_t i = 0; i < samples.size(); ++i) {
       const Eigen::Vector3d ground = surface.transpose() * places[i];
       const Eigen::Vector3d apart = samples[i] - ground;
       tones[i] = apart.mean();
       hues[i] = std::sqrt(1.5) * (apart.array() - tones[i]).matrix().norm();
-      level += (ground.array().exp().mean() - kDarkLevel) / static_cast<double>(samples.size());
     }
     // Medians of a Rayleigh distribution and of absolute normal deviations.
     chromaticity = median(hues) / 1.18;
@@ -342,13 +351,13 @@ BitImage without_thin_lines(BitImage mask) {
 
 void ground_mask(const ColorImage& image, int contrast, std::uint8_t* mask) {
   if (image.height <= 0 || image.width <= 0) return;
-  const Smoothed smoothed(image);
-  const std::array<float, 256> table = logarithms();
-  const Ground ground(smoothed, table);
-  if ((1.0 - kDarkestShadow) * ground.level < contrast) {
+  if ((1.0 - kDarkestShadow) * median_level(image) < contrast) {
     foreground_mask(image, contrast, mask);
     return;
   }
+  const Smoothed smoothed(image);
+  const std::array<float, 256> table = logarithms();
+  const Ground ground(smoothed, table);
   const Evidence found = evidence(smoothed, ground, table, contrast);
   BitImage cables(image.height, image.width);
   add_regions(found.certain, cables, [](const std::vector<Pixel>&) { return true; });
