@@ -130,7 +130,10 @@ def descriptions(function: Any) -> dict[str, str]:
     found = {}
     for names, kind, text in entry.findall(section[1] + "\n" if section else ""):
         unit = re.search(r"\[([^\]]+)\]\s*$", kind)
-        words = " ".join(text.split()).replace("`", "") + (f" [{unit[1]}]" if unit else "")
+        words = " ".join(text.split())
+        words = re.sub(r":\w+:`(?:~?withe\.)?(\w+)`", r"`\1`", words)
+        words = re.sub(r"(^|\s)\* ", r"\1", words)  # items of a list
+        words = words + (f" [{unit[1]}]" if unit else "")
         for name in names.split(", "):
             found[name.strip("*")] = words.strip()
     return found

@@ -53,7 +53,7 @@ TendonForces::TendonForces(const Model& model) : segments_(tendon_segments(model
 }
 
 std::string TendonForces::note() const {
-  return std::to_string(table_.count()) + " piece(s) of tendons: the matrix couples what carries the guides of each";
+  return std::to_string(table_.count()) + " pieces of tendons between guides";
 }
 
 void TendonForces::evaluate(const StepProblem& problem, const StepData& data, int segment, double tension,

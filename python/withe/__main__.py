@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from typing import Any
 
 from withe.deployment import command as deploy
-from withe.errors import ConvergenceError
 from withe.folding import command as fold
 from withe.perception import command as perceive
 from withe.scene import command as scene
@@ -31,7 +30,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             warnings.simplefilter("always", UserWarning)
             warnings.showwarning = _said
             return int(parsed.run(parsed))
-    except (ValueError, OSError, ImportError, ConvergenceError) as error:
+    except (ValueError, OSError, ImportError, RuntimeError) as error:
         sys.stderr.write(f"withe: {error}\n")
         return 2
 

@@ -54,7 +54,7 @@ WRONG = [
     (lambda s, m: m.run(t=1), "run() has no keyword 't'; did you mean duration=?"),
     (lambda s, m: m.step(n=10), "step() has no keyword 'n'; did you mean count=?"),
     (lambda s, m: m.move("wall", pos=(0, 0, 0)), "move() has no keyword 'pos'; did you mean position=?"),
-    (lambda s, m: m.plot(foo=3), "plot() has no keyword 'foo'; it has record=, shapes="),
+    (lambda s, m: m.plot(foo=3), "plot() has no keyword 'foo'; it has record=, shapes=, theme="),
 ]
 
 

@@ -190,9 +190,16 @@ def test_points_come_from_csv_files_and_shapes(tmp_path):
         (ROD + "[[contact]]\nfriction = 0.3\n", 12, r"must be written as tables \[contact\]"),
         (ROD + "[rods.arm]\n", 12, r"\[\[rods\]\] has no key 'arm'"),
         (ROD + "[rods\n", None, "is not TOML: .*line 12"),
-        (ROD + "[build]\ntime_stp = 0.3\n", 12, "did you mean 'time_step'"),
+        (ROD + "[build]\ntime_stp = 0.3\n", 13, "did you mean 'time_step'"),
         (ROD + "[build]\ntime_step = -1\n", 13, "time_step must be positive"),
         (ROD + '[[actuation]]\ntarget = "leg"\ntension = 1.0\n', 13, "'leg' is not in the scene"),
+        (
+            ROD + '[[actuation]]\ntarget = "arm"\nnatural_twst = 1.0\n',
+            14,
+            "rod 'arm' has no 'natural_twst' to set; did you",
+        ),
+        (ROD + '[[actuation]]\ntarget = "arm"\nover = 1.0\nviscosity = 1.0\n', 14, "over must be 0 for viscosity"),
+        (ROD.replace("[0, 0, 0]", "(0, 0, 0)"), None, "Lists are written with brackets"),
         (ROD + '[[rods]]\npoints = { shape = "helx" }\n', 13, "did you mean 'helix'"),
         (ROD + '[[rods]]\npoints = [[0, 0, 0], # [\n [1, 0, 0]]\nmaterial = "x"\n', 15, "material 'x'"),
         ("rods = 3\n", 1, r"must be written as tables \[\[rods\]\]"),
@@ -249,6 +256,8 @@ def test_the_command_line_runs_plans_and_draws(tmp_path, capsys, monkeypatch):
     assert Path("arm.png").stat().st_size > 1000
     assert main(["plan", "arm.toml"]) == 0
     assert "0.3 m of rod" in capsys.readouterr().out
+    assert main(["run", "arm.toml", "--film", "films/arm.mp4"]) == 2
+    assert "folder of --film does not exist: films" in capsys.readouterr().err
     assert main(["run", "leg.toml"]) == 2
     Path("leg.toml").write_text(ROD.replace("radius", "raduis"))
     assert main(["view", "leg.toml"]) == 2
@@ -298,14 +307,16 @@ def test_a_copy_and_a_snapshot_go_on_with_the_actuation(tmp_path):
         assert each.get(arm, "natural_twist")[0] == 2.0
 
 
-def test_wrong_actuation_is_refused_at_the_build():
+def test_wrong_actuation_is_refused():
     scene, arm = arm_scene()
     with pytest.raises(ValueError, match="actuate needs at least one parameter"):
         scene.actuate(arm)
     with pytest.raises(ValueError, match="at must not be negative"):
         scene.actuate(arm, at=-1.0, natural_twist=1.0)
-    scene.actuate(arm, at=0.5, natural_twst=1.0)
-    with pytest.raises(ValueError, match=r"actuation at 0\.5 s: .*natural_twst"):
+    with pytest.raises(ValueError, match=r"rod 'arm' has no 'natural_twst' to set; did you mean 'natural_twist'"):
+        scene.actuate(arm, at=0.5, natural_twst=1.0)
+    scene.actuate(arm, at=0.5, natural_twist=[1.0, 2.0])
+    with pytest.raises(ValueError, match=r"actuation at 0\.5 s: natural_twist of rod 'arm' must have shape"):
         scene.build()
     with pytest.raises(ValueError, match="build_batch does not support actuate"):
         scene.build_batch(2)

@@ -113,7 +113,7 @@ def test_a_closed_rod_has_a_tendon_all_round_that_draws_it_together():
 def test_plans_say_what_tendons_cost_and_which_plane_they_leave():
     simulation, _, _ = arm()
     assert simulation.plan.planar
-    assert "11 piece(s) of tendons" in str(simulation.plan)
+    assert "11 pieces of tendons" in str(simulation.plan)
     scene, rod, _ = arm(build=False)
     scene.add_tendon(rod, offset=(0, 6e-3))
     simulation = scene.build()

@@ -15,6 +15,7 @@ from typing import Any, TextIO, TypeVar
 
 from withe.common import validation
 from withe.common.deprecation import old_word
+from withe.common.keywords import keyword_hints
 
 __all__ = ["Progress", "Task", "progress", "track"]
 
@@ -218,6 +219,7 @@ def progress(
             _drawn.release()
 
 
+@keyword_hints
 def track(items: Iterable[T], description: str = "", enabled: bool = True, *, unit: str = "items") -> Iterator[T]:
     """Yield the items, and show how many the body of a loop has completed.
 

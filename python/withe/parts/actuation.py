@@ -7,7 +7,8 @@ from typing import Any
 
 from withe.common import validation
 from withe.parts.directory import Directory
-from withe.parts.kinds import Actuation
+from withe.parts.kinds import Actuation, Part
+from withe.parts.table import kind_of
 
 __all__ = ["add_actuation"]
 
@@ -24,5 +25,24 @@ def add_actuation(directory: Directory, target: Any, at: float, over: float, val
         name = first, second
     elif target is not None:
         name = directory.find_any(target, "target of the actuation").name
+    if isinstance(name, str):
+        for word, value in values.items():
+            _check_word(directory.parts[name], word, value, over)
     new = Actuation(name, validation.non_negative(at, "at"), validation.non_negative(over, "over"), dict(values))
     directory.actuations = tuple(sorted((*directory.actuations, new), key=lambda each: each.at))
+
+
+def _check_word(part: Part, word: str, value: Any, over: float) -> None:
+    """Refuse a parameter that the part does not have, or one that `over` does not ramp; see `Scene.actuate`."""
+    kind = kind_of(part)
+    found = kind.find(part, word)
+    owner = f"{kind.noun} {part.name!r}"
+    if found is None or not found.is_set:
+        known = [each.name for each in kind.words_of(part) if each.is_set]
+        near = validation.near_word(word, known)
+        meant = f"it has {', '.join(known) or 'none'}" if near is None else f"did you mean {near!r}?"
+        raise ValueError(f"{owner} has no {word!r} to set; {meant}")
+    if over > 0.0 and not found.is_ramped:
+        raise ValueError(f"over must be 0 for {word} of {owner}, which has no ramp")
+    if found.check is not None and not callable(value):
+        found.check(value, f"{word} of {owner}")

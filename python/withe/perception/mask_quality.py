@@ -29,14 +29,14 @@ class MaskQuality:
 
     Attributes
     ----------
-    cover : float
+    cover : float [-]
         Share of the picture that is in the mask, from 0 to 1.
-    unexplained : float
+    unexplained : float [-]
         Share of the mask that belongs to no cable, from 0 to 1. Specks of single pixels do not count.
-    short : float
+    short : float [-]
         Share of the cables that are shorter than ten widths, from 0 to 1.
-    width_spread : float
-        Difference of the 90 % and 10 % quantiles of the widths over their median [-].
+    width_spread : float [-]
+        Difference of the 90 % and 10 % quantiles of the widths over their median.
     reasons : tuple of str
         Reasons why the mask is poor; empty for a good mask.
     """

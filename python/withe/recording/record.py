@@ -715,6 +715,13 @@ class Record:
         object
             The widget in a notebook, else the window, as `withe.view.view` returns it.
 
+        Raises
+        ------
+        RuntimeError
+            There is no display, or no graphics library.
+        ImportError
+            PyVista is not installed.
+
         See Also
         --------
         withe.view.view : All options, and what they raise.

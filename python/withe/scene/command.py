@@ -30,7 +30,9 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "view", help="look at a scene file", description="Show a scene file in a window, or write a picture of it."
     )
     view.add_argument("scene", type=Path, help="the scene, a TOML file")
-    view.add_argument("--equilibrium", action="store_true", help="show the equilibrium instead of the drawn scene")
+    view.add_argument(
+        "--equilibrium", action="store_true", help="show the equilibrium, without actuation, instead of the drawn scene"
+    )
     view.add_argument("--picture", type=Path, metavar="FILE", help="write a picture (.png) instead of opening a window")
     view.set_defaults(run=_view)
 
@@ -42,6 +44,10 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 
 def _run(arguments: argparse.Namespace) -> int:
+    for option in ("record", "plot", "film"):  # before the run, which may take long
+        path = getattr(arguments, option)
+        if path is not None and not path.parent.is_dir():
+            raise ValueError(f"folder of --{option} does not exist: {path.parent}")
     simulation = Scene.load(arguments.scene).build()
     record = simulation.run(arguments.duration, record_every=arguments.record_every)
     if arguments.record is not None:
@@ -67,7 +73,10 @@ def _view(arguments: argparse.Namespace) -> int:
         simulation.picture(arguments.picture)
         _say(arguments.picture)
     else:
-        simulation.view()
+        try:
+            simulation.view()
+        except RuntimeError:
+            raise ValueError(f"no window can be opened: use withe view {arguments.scene} --picture NAME.png") from None
     return 0
 
 

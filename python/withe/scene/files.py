@@ -110,7 +110,8 @@ def fill(scene: Any, path: str | os.PathLike[str]) -> None:
     try:
         content = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise ValueError(f"{path} is not TOML: {error}") from None
+        advice = ". Lists are written with brackets: [0, 0, 1]" if re.search(r"=\s*\(", text) else ""
+        raise ValueError(f"{path} is not TOML: {error}{advice}") from None
     reader.read(content)
 
 
@@ -232,16 +233,19 @@ class _Located:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: object) -> None:
         if isinstance(error, ValueError | TypeError):
-            named = next((key for key, value in self._values.items() if _is_meant(key, value, str(error))), None)
-            raise self._error(str(error), *self._place, named) from None
+            raise self._error(str(error), *self._place, _meant_key(self._values, str(error))) from None
 
 
-def _is_meant(key: str, value: Any, message: str) -> bool:
-    """Return True if an error is about a key: the message begins with the key, or quotes its value."""
-    quoted = value if isinstance(value, list) else [value]
-    return re.match(rf"{re.escape(key)}\b", message) is not None or (
-        key != "name" and any(isinstance(text, str) and repr(text) in message for text in quoted)
-    )
+def _meant_key(values: Mapping[str, Any], message: str) -> str | None:
+    """Return the key that an error is about: one that the message names, or else one whose text it quotes."""
+    for key in values:
+        if re.match(rf"{re.escape(key)}\b", message) or repr(key) in message:
+            return key
+    for key, value in values.items():
+        texts = value if isinstance(value, list) else [value]
+        if key != "name" and any(isinstance(text, str) and repr(text) in message for text in texts):
+            return key
+    return None
 
 
 def arguments_of(method: Callable[..., Any]) -> dict[str, str]:

@@ -388,8 +388,8 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         Raises
         ------
         ValueError
-            A target that the scene does not have, or a negative time. `build` raises it for a parameter that the
-            target does not have, and for a value out of range.
+            A target that the scene does not have, a parameter that the target does not have or that `over` does not
+            ramp, or a negative time. `build` also raises it for a value out of range.
 
         Examples
         --------

@@ -20,7 +20,7 @@ from withe.view.colors import ColorBy
 from withe.view.films import Film, film_places
 from withe.view.pinhole import Pinhole
 from withe.view.rendering import Stage, fine_supersampling
-from withe.view.screens import in_notebook
+from withe.view.screens import check_display, in_notebook
 
 __all__ = ["animate", "picture", "view"]
 
@@ -217,6 +217,8 @@ def view(
         As in `picture`.
     """
     notebook = in_notebook()
+    if len(record) and not notebook:  # an empty record has an error of its own
+        check_display()
     stage = Stage(
         record, size=size, color_by=color_by, camera=camera, ground=ground, off_screen=notebook, supersampling=1
     )

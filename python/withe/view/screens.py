@@ -14,7 +14,7 @@ import numpy.typing as npt
 from withe.common.extras import require
 from withe.common.user_warnings import warn
 
-__all__ = ["LiveScreen", "Place", "has_trame", "in_notebook", "live_screen", "place_to_show"]
+__all__ = ["LiveScreen", "Place", "check_display", "has_trame", "in_notebook", "live_screen", "place_to_show"]
 
 Place = Literal["window", "notebook", "memory"]
 _NO_DISPLAY = (
@@ -71,6 +71,18 @@ def has_trame() -> bool:
 
 def _has_display() -> bool:
     return sys.platform != "linux" or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+def check_display() -> None:
+    """Refuse to open a window where none can be opened.
+
+    Raises
+    ------
+    RuntimeError
+        No display was found, and PyVista was not asked to draw off screen.
+    """
+    if not require("pyvista", "view").OFF_SCREEN and not _has_display():
+        raise RuntimeError('no display was found: use picture("a.png") for a picture, or animate("a.mp4") for a film')
 
 
 class LiveScreen(Protocol):
