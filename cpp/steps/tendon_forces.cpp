@@ -52,9 +52,7 @@ TendonForces::TendonForces(const Model& model) : segments_(tendon_segments(model
   table_ = ElementTable(kTendonUnknowns, std::move(dofs));
 }
 
-std::string TendonForces::note() const {
-  return std::to_string(table_.count()) + " pieces of tendons between guides";
-}
+std::string TendonForces::note() const { return std::to_string(table_.count()) + " pieces of tendons between guides"; }
 
 void TendonForces::evaluate(const StepProblem& problem, const StepData& data, int segment, double tension,
                             bool with_matrix, TendonLocal& out) const {

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "vision/bending_fit.hpp"
+#include "vision/ground_mask.hpp"
 #include "vision/labels.hpp"
 #include "vision/thinning.hpp"
 #include "vision/tracing.hpp"
@@ -206,12 +207,66 @@ TEST(Tracing, ACableThatEndsOnAnotherIsAJointHalfAWidthFromItsCentreline) {
   EXPECT_NEAR(tracing.cables[static_cast<std::size_t>(through.cable)].centreline(through.row, 0), 200, 2);
 }
 
-TEST(Tracing, GapsUpToSixteenPixelsAreBridgedAndWiderOnesAreNot) {
-  for (const auto& [gap, cables] : {std::pair{10, 1U}, {24, 2U}}) {
+TEST(Tracing, GapsUpToFourWidthsAreBridgedAndWiderOnesAreNot) {
+  for (const auto& [gap, cables] : {std::pair{10, 1U}, {24, 1U}, {36, 1U}, {56, 2U}}) {
     BitImage mask(100, 400);
     draw(mask, {30, 50}, {200, 50}, 10);
     draw(mask, {200.0 + gap, 50}, {370, 50}, 10);
     EXPECT_EQ(trace_lines(mask, {}).cables.size(), cables) << gap;
+  }
+}
+
+TEST(Tracing, GapsAboveSixteenPixelsNeedEndsThatFaceEachOther) {
+  for (const auto& [aside, cables] : {std::pair{0, 1U}, {4, 1U}, {14, 2U}}) {
+    BitImage mask(120, 400);
+    draw(mask, {30, 50}, {200, 50}, 10);
+    draw(mask, {224, 50.0 + aside}, {370, 50.0 + aside}, 10);
+    EXPECT_EQ(trace_lines(mask, {}).cables.size(), cables) << aside;
+  }
+}
+
+TEST(BitImage, SpecksAreRegionsOfFewPixelsAlsoThroughCorners) {
+  BitImage mask(20, 150);
+  for (int i = 0; i < 12; ++i) mask.set(60 + i, 3 + i);  // touch at corners only, and lie in two words
+  for (int i = 0; i < 11; ++i) mask.set(100 + i, 2);
+  const BitImage left = without_specks(mask, 12);
+  EXPECT_EQ(left.count(), 12U);
+  EXPECT_TRUE(left.at(60, 3));
+}
+
+TEST(Labels, TheLabelledShareIgnoresSpecksUnlessThereIsNothingElse) {
+  BitImage mask(100, 200);
+  std::vector<std::int32_t> labels(100 * 200, 0);
+  EXPECT_EQ(labelled_share(mask, labels.data()), 1.0);
+  mask.set(5, 5);
+  EXPECT_EQ(labelled_share(mask, labels.data()), 0.0);
+  for (int y = 40; y < 50; ++y) {
+    for (int x = 20; x < 120; ++x) {
+      mask.set(x, y);
+      labels[static_cast<std::size_t>(200 * y + x)] = x < 70 ? 1 : 0;
+    }
+  }
+  EXPECT_DOUBLE_EQ(labelled_share(mask, labels.data()), 0.5);
+}
+
+TEST(GroundMask, ALineOfAnotherColourIsFoundAndItsShadowIsNot) {
+  constexpr int height = 120;
+  constexpr int width = 200;
+  std::vector<std::uint8_t> pixels(3 * height * width);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const double light = (y >= 60 && y < 70 ? 0.5 : 1.0) * (0.8 + 0.2 * x / width);  // a shadow below the line
+      const bool line = y >= 50 && y < 60;
+      for (int c = 0; c < 3; ++c) {
+        const double level = line ? (c == 0 ? 180.0 : 50.0) : 190.0 * light;
+        pixels[static_cast<std::size_t>(3 * (width * y + x) + c)] = static_cast<std::uint8_t>(level);
+      }
+    }
+  }
+  std::vector<std::uint8_t> mask(height * width);
+  ground_mask({pixels.data(), height, width, 3 * width}, 25, mask.data());
+  for (const auto& [y, found] : {std::pair{30, 0}, {55, 1}, {65, 0}, {90, 0}}) {
+    EXPECT_EQ(static_cast<int>(mask[static_cast<std::size_t>(width * y + 100)]), found) << y;
   }
 }
 
