@@ -233,8 +233,8 @@ class Stage:
             mesh.point_data["Normals"] = normals
             if values is not None:
                 mesh.point_data["value"] = self._surfaces[index].on_surface(values[index])
-            meshed.append(points)
             if self._floor is not None:
+                meshed.append(self._surfaces[index].spread(points))
                 areas.append(self._footprints[index] * self._surfaces[index].level_share(positions[rod.rows]))
         if self._floor is not None:
             if self._floor_plane is not None:
@@ -431,7 +431,7 @@ class Stage:
             pale = strength * paint + (1.0 - strength) * np.array([0.93, 0.94, 0.95])
             actor = self.plotter.add_mesh(mesh, color=pale, ambient=0.5, diffuse=0.6, reset_camera=False)
             actor.prop.interpolation = "Phong"
-            self._ghosts.append((points, there * self._footprints[index]))
+            self._ghosts.append((surface.spread(points), there * self._footprints[index]))
 
 
 def _pyvista(off_screen: bool) -> Any:

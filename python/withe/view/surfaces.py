@@ -98,6 +98,18 @@ class Surface:
         normals = flat * (self._section_normals @ unit_axes) + (lean * tangents[rings])[:, None]
         return points.reshape(-1, 3), normals.reshape(-1, 3)
 
+    def spread(self, points: FloatArray) -> FloatArray:
+        """Return points of the surface, pulled towards the centreline so that they fill the sections, for shadows.
+
+        The shadow of an upright rod is otherwise a ring.
+        """
+        rings = points.reshape(len(self._ring_samples), -1, 3)
+        middle = rings.mean(axis=1, keepdims=True)
+        places = (
+            np.arange(rings.shape[1]) * 0.618034 % 1.0
+        )  # of equal areas of a disc, in the order of the golden ratio
+        return np.asarray((middle + np.sqrt(places)[:, None] * (rings - middle)).reshape(-1, 3))
+
     def footprint(self, nodes: FloatArray) -> FloatArray:
         """Area of the rod, seen from the side, that belongs to each point of the surface [m^2]."""
         centres = self._position_weights @ nodes
