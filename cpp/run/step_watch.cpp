@@ -189,10 +189,12 @@ std::vector<std::string> step_notes(const Model& model, const Options& options, 
       angle > 1.0 ? 0 : std::max(1, static_cast<int>(std::lround(std::sqrt(1.0 / (slowest * dt)) / std::numbers::pi)));
   const double per_period = 1.0 - std::pow(1.0 + angle * angle, -std::numbers::pi / std::atan(angle));
   std::vector<std::string> notes;
+  const std::string modes = resolved == 0   ? "no bending mode"
+                            : resolved == 1 ? "one bending mode"
+                                            : std::to_string(resolved) + " bending modes";
   notes.push_back("time_step of " + text(dt) + " s resolves vibrations below " + text(0.5 / (std::numbers::pi * dt)) +
-                  " Hz; rod '" + model.description.rods[which].name + "', clamped and alone, has " +
-                  std::to_string(resolved) + " bending mode" + (resolved == 1 ? "" : "s") + " there, the first at " +
-                  text(first / (2.0 * std::numbers::pi)) + " Hz");
+                  " Hz; rod '" + model.description.rods[which].name + "', clamped and alone, has " + modes +
+                  " there; the first is at " + text(first / (2.0 * std::numbers::pi)) + " Hz");
   if (euler)
     notes.push_back("backward Euler damps the first of these modes by " + text(100.0 * per_period, 2) + " % a period");
   return notes;

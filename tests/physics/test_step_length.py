@@ -116,7 +116,7 @@ def test_a_plan_says_which_vibrations_steps_resolve(step):
     simulation = scene.build(time_step=step, integrator="backward_euler")
     first = simulation.linearise().frequencies(1)[0]
     (note,) = [note for note in simulation.plan.notes if "resolve" in note]
-    assert float(note.split("from ")[1].split(" Hz")[0]) == pytest.approx(first, rel=5e-3)
+    assert float(note.split("first is at ")[1].split(" Hz")[0]) == pytest.approx(first, rel=5e-3)
     (note,) = [note for note in simulation.plan.notes if "damps" in note]
     # Loss per period of this mode, by stepping through one period.
     angle = 2.0 * np.pi * first * step
