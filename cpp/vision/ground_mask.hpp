@@ -16,7 +16,7 @@ namespace withe {
 /// Thresholds follow the spread of the ground. Pixels of weak evidence count where they touch strong ones, and edges
 /// lie where the evidence is half of the evidence nearby. Lines that are much thinner than the cables are removed.
 ///
-/// Where the ground is so dark that a shadow on it is not seen, the mask is that of `foreground_mask`.
+/// On ground so dark that shadows are below `contrast`, `foreground_mask` gives the mask.
 ///
 /// `contrast` is the least difference of a cable from the ground [grey levels].
 void ground_mask(const ColorImage& image, int contrast, std::uint8_t* mask);

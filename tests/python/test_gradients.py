@@ -284,7 +284,7 @@ def tapered(radii, run, *, planar, joint, material=True):
     return scene.build(planar=planar or None, **({"integrator": "static"} | options), **TIGHT)
 
 
-@pytest.mark.case("inverse", "Gradients by radii", source="scenes that are built anew")
+@pytest.mark.case("inverse", "Gradients by radii", source="differences of rebuilt scenes")
 @pytest.mark.parametrize("material", [True, False])
 @pytest.mark.parametrize("joint", [False, True])
 @pytest.mark.parametrize("planar", [True, False])

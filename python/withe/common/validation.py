@@ -22,6 +22,7 @@ __all__ = [
     "has_masked",
     "integer",
     "is_scalar",
+    "meant",
     "near_word",
     "non_negative",
     "number",
@@ -126,6 +127,12 @@ def near_word(value: str, options: Iterable[str]) -> str | None:
     plain = value.strip().lower().replace("-", "_").replace(" ", "_")
     near = get_close_matches(plain, known, 1) or [word for word in known if len(plain) > 2 and plain in word]
     return near[0] if near else None
+
+
+def meant(value: str, options: Iterable[str], otherwise: str) -> str:
+    """Return the end of an error about an unknown word: the near word that may be meant, or else `otherwise`."""
+    near = near_word(value, options)
+    return otherwise if near is None else f"did you mean {near!r}?"
 
 
 def file_path(value: str | os.PathLike[str], *suffixes: str, instead: str = "") -> Path:

@@ -39,9 +39,8 @@ def _check_word(part: Part, word: str, value: Any, over: float) -> None:
     owner = f"{kind.noun} {part.name!r}"
     if found is None or not found.is_set:
         known = [each.name for each in kind.words_of(part) if each.is_set]
-        near = validation.near_word(word, known)
-        meant = f"it has {', '.join(known) or 'none'}" if near is None else f"did you mean {near!r}?"
-        raise ValueError(f"{owner} has no {word!r} to set; {meant}")
+        hint = validation.meant(word, known, f"it has {', '.join(known) or 'none'}")
+        raise ValueError(f"{owner} has no {word!r} to set; {hint}")
     if over > 0.0 and not found.is_ramped:
         raise ValueError(f"over must be 0 for {word} of {owner}, which has no ramp")
     if found.check is not None and not callable(value):

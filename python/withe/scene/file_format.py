@@ -23,16 +23,14 @@ class Section:
     name : str
         Name of the array.
     methods : mapping of str to str
-        Method of `Scene` for each value of the key "kind". The key "" stands for sections without "kind".
-    default : str
-        Value of "kind" if the key is missing.
+        Method of `Scene` for each value of the key "kind", which may be left out where the table has a
+        key of that name. The key "" stands for sections without "kind".
     is_single : bool
         True for a table that may occur once, such as [contact].
     """
 
     name: str
     methods: Mapping[str, str] = field(default_factory=dict)
-    default: str = ""
     is_single: bool = False
 
 

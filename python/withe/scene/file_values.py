@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from withe import shapes
-from withe.common.validation import near_word
+from withe.common.validation import meant
 from withe.parts.friction_fields import FrictionMap
 from withe.parts.materials import Material, Stiffness
 from withe.parts.options import Solver
@@ -118,9 +118,8 @@ def _material(value: Any, materials: Mapping[str, Material]) -> Material:
         return made(Material, value, "material")  # type: ignore[no-any-return]
     if value not in materials:
         known = ", ".join(map(repr, materials)) or "none"
-        near = near_word(str(value), materials)
-        meant = f"the file has {known}" if near is None else f"did you mean {near!r}?"
-        raise ValueError(f"material {value!r:.80} is not in the tables [materials.NAME]; {meant}")
+        hint = meant(str(value), materials, f"the file has {known}")
+        raise ValueError(f"material {value!r:.80} is not in the tables [materials.NAME]; {hint}")
     return materials[value]
 
 
@@ -129,9 +128,8 @@ def _chosen(value: Any, what: str, key: str, kinds: Mapping[str, Callable[..., A
     if not isinstance(value, Mapping) or key not in value:
         raise ValueError(f"{what} must be a table with {key}, one of {', '.join(kinds)}, got {value!r:.80}")
     if value[key] not in kinds:
-        near = near_word(str(value[key]), kinds)
-        meant = f"it is one of {', '.join(kinds)}" if near is None else f"did you mean {near!r}?"
-        raise ValueError(f"{key} of {what} is unknown, got {value[key]!r:.80}; {meant}")
+        hint = meant(str(value[key]), kinds, f"it is one of {', '.join(kinds)}")
+        raise ValueError(f"{key} of {what} is unknown, got {value[key]!r:.80}; {hint}")
     return made(kinds[value[key]], {name: item for name, item in value.items() if name != key}, what)
 
 

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from withe.common import validation
-from withe.common.validation import near_word
 from withe.io import written_beside
 from withe.parts.materials import Material
 from withe.scene.declarations import Declaration
@@ -64,21 +63,19 @@ def _rows(scene: Any, section: Section, call: Declaration) -> Iterator[dict[str,
         if others[-1] in ("rigid", "pinned", "revolute"):
             given["kind"] = others.pop()
         pairs = [scene._directory.parts[name].node_names for name in call.names]
+    # Keys in the order of the documentation; those of `actuate` that are not in its signature come last.
+    order = [*arguments_of(getattr(scene, call.method)), *given]
     for i, name in enumerate(call.names or [None]):
         row: dict[str, Any] = {"kind": kind} if kind and kind not in given else {}
         if name is not None:
             row["name"] = name
         if call.method == "join":
             given["nodes"] = list(pairs[i])
-        # Keys in the order of the documentation; those of `actuate` that are not in its signature come last.
-        order = [*arguments_of(getattr(scene, call.method)), *given]
         for word, value in sorted(given.items(), key=lambda item: order.index(item[0])):
             if value is None or word == "name":
                 continue
             what = f"{word} of {name or section.name!r}"
             row[word] = _friction(value) if word == "friction" else encoded(value, what)
-            if callable(value) and not isinstance(row[word], Mapping):
-                raise ValueError(f"{what} is a Python function, which a scene file cannot have")
         yield row
 
 
@@ -177,9 +174,9 @@ class _Reader:
                 raise self._error(
                     f"{key} must be a number in {known[key]} without its unit, got {value!r}", *place, key
                 )
-        required = [key for key, unit in known.items() if key in required_of(method) and key not in values]
-        if required:
-            raise self._error(f"{brackets} needs the key {required[0]!r}", *place)
+        missing = next((key for key in required_of(method) if key not in values), None)
+        if missing is not None:
+            raise self._error(f"{brackets} needs the key {missing!r}", *place)
         arguments = {}
         for key, value in values.items():
             with self._located(*place, key):
@@ -286,5 +283,4 @@ def required_of(method: Callable[..., Any]) -> tuple[str, ...]:
 
 def _meant(word: str, known: Any) -> str:
     words = [each for each in known if each != "**"]
-    near = near_word(word, words)
-    return f"it has {', '.join(words)}" if near is None else f"did you mean {near!r}?"
+    return validation.meant(word, words, f"it has {', '.join(words)}")

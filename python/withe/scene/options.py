@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from functools import wraps
 from typing import Any, TypeVar
 
-from withe.common.validation import near_word
+from withe.common.validation import meant
 from withe.parts.options import BuildOptions
 
 __all__ = ["checked_options", "with_build_options"]
@@ -23,9 +23,8 @@ def checked_options(options: Mapping[str, Any], build: Callable[..., Any]) -> di
     defaults = {each.name: each.default for each in parameters}
     for name in options:
         if name not in defaults:
-            near = near_word(str(name), defaults)
-            meant = f"it has {', '.join(defaults)}" if near is None else f"did you mean {near!r}?"
-            raise ValueError(f"build has no option {name!r}; {meant}")
+            hint = meant(str(name), defaults, f"it has {', '.join(defaults)}")
+            raise ValueError(f"build has no option {name!r}; {hint}")
     BuildOptions(**{**defaults, **options}).checked()
     return dict(options)
 
