@@ -200,12 +200,10 @@ BitImage majority(const BitImage& image) {
   return result;
 }
 
-BitImage without_specks(const BitImage& image, std::size_t least) {
-  BitImage left = image;
-  BitImage result = image;
+void for_each_region(BitImage left, const std::function<void(const std::vector<Pixel>&)>& visit) {
   std::vector<Pixel> region;
-  for (int y = 0; y < image.height(); ++y) {
-    for (int w = 0; w < image.words(); ++w) {
+  for (int y = 0; y < left.height(); ++y) {
+    for (int w = 0; w < left.words(); ++w) {
       while (const std::uint64_t bits = left.row(y)[w]) {
         region.assign(1, {64 * w + std::countr_zero(bits), y});
         left.clear(region.front().x, y);
@@ -220,11 +218,18 @@ BitImage without_specks(const BitImage& image, std::size_t least) {
             }
           }
         }
-        if (region.size() >= least) continue;
-        for (const Pixel pixel : region) result.clear(pixel.x, pixel.y);
+        visit(region);
       }
     }
   }
+}
+
+BitImage without_specks(const BitImage& image, std::size_t least) {
+  BitImage result = image;
+  for_each_region(image, [&result, least](const std::vector<Pixel>& region) {
+    if (region.size() >= least) return;
+    for (const Pixel pixel : region) result.clear(pixel.x, pixel.y);
+  });
   return result;
 }
 

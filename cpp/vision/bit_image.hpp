@@ -4,6 +4,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 namespace withe {
@@ -73,7 +74,10 @@ BitImage erode(const BitImage& image);
 /// Beyond the border the image continues as it ends.
 BitImage majority(const BitImage& image);
 
-/// The image without its regions of fewer pixels than `least`; pixels that touch at a corner are in one region.
+/// Calls `visit` with the pixels of each region; pixels that touch at a corner are in one region.
+void for_each_region(BitImage image, const std::function<void(const std::vector<Pixel>&)>& visit);
+
+/// The image without its regions of fewer pixels than `least`.
 BitImage without_specks(const BitImage& image, std::size_t least);
 
 /// Distance from a pixel that is set to the nearest one that is not, Euclidean and exact [px]. Pixels outside the

@@ -269,39 +269,22 @@ std::vector<std::uint8_t> greatest_nearby(const std::vector<std::uint8_t>& score
 /// Adds the regions of weak pixels with enough strong pixels in them, except where `is_wanted` refuses a region.
 template <class IsWanted>
 void add_regions(const std::vector<std::uint8_t>& score, BitImage& mask, const IsWanted& is_wanted) {
-  const int height = mask.height();
-  const int width = mask.width();
-  const std::vector<std::uint8_t> nearby = greatest_nearby(score, height, width);
+  const std::vector<std::uint8_t> nearby = greatest_nearby(score, mask.height(), mask.width());
   std::vector<std::uint8_t> weak(score.size());
   for (std::size_t i = 0; i < score.size(); ++i) {
     const int most = std::min<int>(nearby[i], kGreatest * kStrong);
     weak[i] = score[i] > kWeak && score[i] > kEdge * most;
   }
-  const auto place = [width](Pixel pixel) {
-    return static_cast<std::size_t>(pixel.y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(pixel.x);
+  const auto is_strong = [&](Pixel pixel) {
+    return score[static_cast<std::size_t>(pixel.y) * static_cast<std::size_t>(mask.width()) +
+                 static_cast<std::size_t>(pixel.x)] > kStrong;
   };
-  std::vector<Pixel> region;
-  for (int top = 0; top < height; ++top) {
-    for (int left = 0; left < width; ++left) {
-      if (!weak[place({left, top})]) continue;
-      region.assign(1, {left, top});
-      weak[place({left, top})] = 0;
-      int strong = 0;
-      for (std::size_t next = 0; next < region.size(); ++next) {
-        const Pixel pixel = region[next];
-        strong += score[place(pixel)] > kStrong;
-        for (int y = std::max(pixel.y - 1, 0); y <= std::min(pixel.y + 1, height - 1); ++y) {
-          for (int x = std::max(pixel.x - 1, 0); x <= std::min(pixel.x + 1, width - 1); ++x) {
-            if (!weak[place({x, y})]) continue;
-            weak[place({x, y})] = 0;
-            region.push_back({x, y});
-          }
-        }
-      }
-      if (strong < kStrongPixels || region.size() < kPixels || !is_wanted(region)) continue;
-      for (const Pixel pixel : region) mask.set(pixel.x, pixel.y);
-    }
-  }
+  const BitImage regions = pack(weak.data(), mask.height(), mask.width(), mask.width());
+  for_each_region(regions, [&](const std::vector<Pixel>& region) {
+    const auto strong = std::count_if(region.begin(), region.end(), is_strong);
+    if (strong < kStrongPixels || region.size() < kPixels || !is_wanted(region)) return;
+    for (const Pixel pixel : region) mask.set(pixel.x, pixel.y);
+  });
 }
 
 /// Adds dark lines that are no shadows: a shadow lies beside what casts it.
