@@ -152,6 +152,10 @@ Assembler::Assembler(const Model& model, std::vector<ElementTable*> declared, Sy
   add_cliques(half);
   for (const ElementTable* table : declared_) add_cliques(*table);
   for (int i = 0; i < model.dof_count; ++i) cliques_.push_back({i});
+  for (int frame : model.body_frame) {
+    cliques_.emplace_back();
+    append(cliques_.back(), model.frame_dof[at(frame)], model.frame_size());
+  }
   for (const Constraint& c : model.constraints) {
     std::vector<int> own;
     for (int i = 0; i < c.size; ++i) own.push_back(c.first + i);
@@ -200,6 +204,7 @@ void Assembler::analyse() {
   std::vector<std::vector<int>> cliques = cliques_;
   cliques.insert(cliques.end(), groups_.begin(), groups_.end());
   for (int e = 0; e < contact.count(); ++e) cliques.emplace_back(contact.dofs(e), contact.dofs(e) + contact.width());
+  add_bodies_to(cliques);
   pattern_ = SparsityPattern::from_cliques(model_.dof_count, cliques);
   solver_ = make_linear_solver(pattern_, symmetry_, kind_);
   ++generation_;
@@ -210,6 +215,7 @@ void Assembler::analyse() {
   for (int i = 0; i < model_.dof_count; ++i) diagonal_.push_back(solver_->offset(i, i));
   regular = regular_stencils(model_, bend);
   find_blocks();
+  find_folds();
   entries_.clear();
   for (int column = 0; exact_ && column < pattern_.size; ++column)
     for (int k = pattern_.column_starts[at(column)]; k < pattern_.column_starts[at(column) + 1]; ++k) {
@@ -286,6 +292,90 @@ void Assembler::find_blocks() {
   }
 }
 
+/// Forces on a carried part act on its body.
+void Assembler::add_bodies_to(std::vector<std::vector<int>>& cliques) const {
+  if (model_.carried.empty()) return;
+  std::vector<int> carried(at(model_.dof_count), -1);
+  for (std::size_t i = 0; i < model_.carried.size(); ++i)
+    std::fill_n(carried.begin() + model_.carried[i].own_dof, model_.carried[i].own_size, static_cast<int>(i));
+  for (std::vector<int>& clique : cliques)
+    for (std::size_t k = 0; k < clique.size(); ++k) {  // also of those that are added: bodies carry bodies
+      if (clique[k] < 0 || carried[at(clique[k])] < 0) continue;
+      const CarriedPart& part = model_.carried[at(carried[at(clique[k])])];
+      const auto add = [&](int dof) {
+        if (std::find(clique.begin(), clique.end(), dof) == clique.end()) clique.push_back(dof);
+      };
+      for (int i = 0; i < part.own_size; ++i) add(part.own_dof + i);
+      for (int dof : part.body_dofs) add(dof);
+    }
+}
+
+void Assembler::find_folds() {
+  folds_.clear();
+  for (const CarriedPart& part : model_.carried) {
+    Fold fold;
+    append(fold.own, part.own_dof, part.own_size);
+    fold.body = part.body_dofs;
+    for (int dof : fold.own)
+      for (int k = pattern_.column_starts[at(dof)]; k < pattern_.column_starts[at(dof) + 1]; ++k)
+        fold.others.push_back(pattern_.row_indices[at(k)]);
+    std::sort(fold.others.begin(), fold.others.end());
+    fold.others.erase(std::unique(fold.others.begin(), fold.others.end()), fold.others.end());
+    const auto is_its = [&](int dof) {
+      return std::find(fold.own.begin(), fold.own.end(), dof) != fold.own.end() ||
+             std::find(fold.body.begin(), fold.body.end(), dof) != fold.body.end();
+    };
+    fold.others.erase(std::remove_if(fold.others.begin(), fold.others.end(), is_its), fold.others.end());
+    folds_.push_back(std::move(fold));
+  }
+}
+
+/// With d its unknowns, u those of its body, dd = G du, and rows r_u += H r_d: K_uj += H K_dj, K_ju += K_jd G.
+void Assembler::fold_carried(const std::vector<Carrying>& carrying) {
+  const std::span<double> values = solver_->values();
+  const bool symmetric = symmetry_ == Symmetry::symmetric;
+  const auto entry_at = [&](int r, int c) -> double& { return values[static_cast<std::size_t>(solver_->place(r, c))]; };
+  using Small = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 6, 6>;
+  for (std::size_t i = folds_.size(); i-- > 0;) {  // parts of parts first
+    const auto& [own, body, others] = folds_[i];
+    const int d = static_cast<int>(own.size()), u = static_cast<int>(body.size());
+    const Small G = carrying[i].follow.topLeftCorner(d, u), H = carrying[i].act.topLeftCorner(u, d);
+    double row[3], column[3];
+    for (int j : others) {
+      for (int a = 0; a < d; ++a) {
+        const bool known = pattern_.contains(own[at(a)], j);
+        row[a] = known ? std::exchange(entry_at(own[at(a)], j), 0.0) : 0.0;
+        column[a] = known && !symmetric ? std::exchange(entry_at(j, own[at(a)]), 0.0) : 0.0;
+      }
+      for (int b = 0; b < u; ++b) {
+        double down = 0.0, right = 0.0;
+        for (int a = 0; a < d; ++a) {
+          down += H(b, a) * row[a];
+          right += column[a] * G(a, b);
+        }
+        if (down != 0.0) entry_at(body[at(b)], j) += down;
+        if (right != 0.0) entry_at(j, body[at(b)]) += right;
+      }
+    }
+    Small dd(d, d), du(d, u), ud(u, d);
+    for (int a = 0; a < d; ++a) {
+      for (int b = 0; b < d; ++b) dd(a, b) = entry_at(own[at(a)], own[at(b)]);
+      for (int b = 0; b < u; ++b) {
+        du(a, b) = entry_at(own[at(a)], body[at(b)]);
+        ud(b, a) = entry_at(body[at(b)], own[at(a)]);
+      }
+    }
+    const double size = dd.norm() / std::sqrt(d);
+    for (int a = 0; a < d; ++a) {
+      for (int b = 0; b < d; ++b) entry_at(own[at(a)], own[at(b)]) = a != b ? 0.0 : size > 0.0 ? size : 1.0;
+      for (int b = 0; b < u; ++b) entry_at(own[at(a)], body[at(b)]) = entry_at(body[at(b)], own[at(a)]) = 0.0;
+    }
+    const Small uu = H * du + ud * G + H * dd * G + carrying[i].slope.topLeftCorner(u, u);
+    for (int a = 0; a < u; ++a)
+      for (int b = 0; b < (symmetric ? a + 1 : u); ++b) entry_at(body[at(a)], body[at(b)]) += uu(a, b);
+  }
+}
+
 void Assembler::project_matrix() {
   project_matrix([](std::size_t) {});
 }
@@ -351,6 +441,11 @@ void Assembler::turn_rows(int first, const Matrix3& by, std::span<double> values
 }
 
 void Assembler::add_block(int first, const Matrix3& block, std::span<double> values) const {
+  if (symmetry_ == Symmetry::symmetric) {
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j <= i; ++j) *entry(first + i, first + j, values) += 0.5 * (block(i, j) + block(j, i));
+    return;
+  }
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) *entry(first + i, first + j, values) += block(i, j);
 }
@@ -364,6 +459,7 @@ double Assembler::greatest_diagonal() const {
 double Assembler::greatest_stiffness(const VectorX& weight) const {
   double greatest = 0.0;
   const auto consider = [&](int first, int size) {
+    if (weight.segment(first, size).maxCoeff() < 1e-290) return;  // a hinge between bodies has no inertia of its own
     double sum = 0.0;
     for (int i = first; i < first + size; ++i) sum += diagonal(i);
     greatest = std::max(greatest, sum / std::max(weight.segment(first, size).sum(), 1e-300));

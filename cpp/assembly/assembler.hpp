@@ -66,6 +66,14 @@ class ElementTable {
   std::vector<std::ptrdiff_t> starts_;
 };
 
+/// A part that a body carries, at one configuration: derivatives of its own unknowns, up to three, by those of the
+/// body, and of the rows of the body.
+struct Carrying {
+  Eigen::Matrix<double, 3, 6> follow;  ///< of its unknowns by those of the body
+  Eigen::Matrix<double, 6, 3> act;     ///< of the rows of the body by the forces on the part
+  Eigen::Matrix<double, 6, 6> slope;   ///< of these rows by the unknowns of the body, with these forces constant
+};
+
 /// Ordinary stencils for the kernels of stencil_kernels.hpp, and the other stencils.
 struct RegularStencils {
   std::vector<int> stencil, first_unknown, edges;
@@ -94,8 +102,9 @@ class Assembler {
 
   /// The entry of row i and column j in the solver's values, or null.
   double* entry(int row, int column, std::span<double> values) const;
-  /// Three rows, from `first` on, times a matrix; and a block on the diagonal added there. Unsymmetric matrices only.
+  /// Three rows, from `first` on, times a matrix. Unsymmetric matrices only.
   void turn_rows(int first, const Matrix3& by, std::span<double> values) const;
+  /// Adds a block on the diagonal; of a symmetric matrix its symmetric part.
   void add_block(int first, const Matrix3& block, std::span<double> values) const;
 
   /// out = A x or A^T x with the solver's values; exact matrices only. `multiply_held` uses held unknowns only.
@@ -120,6 +129,10 @@ class Assembler {
   const std::vector<std::vector<int>>& groups() const { return groups_; }
   /// Another number whenever the solver is.
   int generation() const { return generation_; }
+
+  /// Adds the rows and columns of parts that bodies carry to those of their bodies. Their own rows keep a positive
+  /// diagonal alone.
+  void fold_carried(const std::vector<Carrying>& carrying);
 
   /// Removes held unknowns: rows and columns are projected onto the free directions. Held directions get a positive
   /// diagonal, so that the pattern stays and held increments vanish.
@@ -155,11 +168,17 @@ class Assembler {
     std::ptrdiff_t own[3][3];
   };
   void analyse();
+  /// Rows and columns of a carried part: its own unknowns, those of its body, and all others that are coupled with it.
+  struct Fold {
+    std::vector<int> own, body, others;
+  };
   /// `before(place)`: called before an entry is changed.
   template <class Before>
   void project_matrix(const Before& before);
   double transposed_row(int column, const VectorX& x) const;
   void find_blocks();
+  void find_folds();
+  void add_bodies_to(std::vector<std::vector<int>>& cliques) const;
   void find_edge_couplings();
 
   const Model& model_;
@@ -175,6 +194,7 @@ class Assembler {
   std::vector<std::ptrdiff_t> diagonal_;
   std::vector<std::ptrdiff_t> entries_;  ///< entries of the pattern, one after the other; exact matrices only
   std::vector<Block> blocks_;
+  std::vector<Fold> folds_;
   std::vector<std::pair<std::size_t, double>> replaced_;  ///< entries that a projection has changed
 };
 

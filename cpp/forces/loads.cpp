@@ -214,6 +214,15 @@ Loads resolve_loads(const Model& model) {
     const LoadDescription& load = scene.loads[k];
     const auto index = static_cast<int>(first_load_row(scene, k));
     const int stride = load.values.rows() > 1 ? 1 : 0;  // rows from one edge to the next
+    if (load.pass.on_body()) {
+      LoadPiece piece{.shape = LoadShape::dead_node, .load = index, .weight = 1.0, .node = load.pass.node};
+      if (load.kind == LoadKind::moment) {
+        piece.shape = LoadShape::frame_moment;
+        piece.frame = model.body_frame[at(load.pass.body())];
+      }
+      loads.pieces.push_back(piece);
+      continue;
+    }
     const RodDescription& rod = scene.rods[at(load.pass.rod)];
     const int first = model.rod_first_edge[at(load.pass.rod)], last = model.rod_first_edge[at(load.pass.rod) + 1] - 1;
     if (load.kind == LoadKind::pressure) {

@@ -1,5 +1,6 @@
 #include "gradients/state_vector.hpp"
 
+#include <algorithm>
 #include <vector>
 
 #include <Eigen/Eigenvalues>
@@ -13,6 +14,8 @@ SparseMatrix free_basis(const Model& model) {
   std::vector<bool> held(at(model.dof_count), false);
   std::vector<Eigen::Triplet<double>> entries;
   int count = 0;
+  for (const CarriedPart& part : model.carried)  // they follow their bodies
+    std::fill_n(held.begin() + part.own_dof, part.own_size, true);
   for (const Constraint& c : model.constraints) {
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(c.free.topLeftCorner(c.size, c.size));
     for (int i = 0; i < c.size; ++i) {

@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "common/check.hpp"
 #include "geometry/rotation.hpp"
 #include "model/edge_vectors.hpp"
 #include "steps/inertia.hpp"
@@ -38,7 +39,9 @@ void add_axial_forces(const Model& model, const Parameters& parameters, const Co
   }
 }
 
-StepGradient::StepGradient(const Model& model, EquationOptions options) : equations_(model, exact(options)) {}
+StepGradient::StepGradient(const Model& model, EquationOptions options) : equations_(model, exact(options)) {
+  require(!model.has_bodies(), "gradients of scenes with rigid bodies are not available yet");
+}
 
 void StepGradient::begin(const StepTaken& step) {
   step_.emplace(step);

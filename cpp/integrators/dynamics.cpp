@@ -208,6 +208,7 @@ void find_end_velocity(const Equations& equations, const StepPlan& plan, const S
     v1 = 2.0 * work.mean - state.v;
   if (plan.rule == StepRule::energy_momentum)
     set_turning_velocities(equations.model(), state.v, work.change, plan.dt, v1);
+  if (plan.rule != StepRule::backward_euler) set_body_velocities(equations.model(), state.v, work.change, plan.dt, v1);
   equations.assembler().set_held_part(work.held_velocity, v1);
 }
 

@@ -88,6 +88,7 @@ class Newton::Solve {
   }
 
   NewtonResult run() {
+    system_.equations.place(z_);
     for (;; ++result_.iterations) {
       work_.poll();
       const Verdict verdict = look();
@@ -170,6 +171,7 @@ class Newton::Solve {
       z_.swap(work_.trial);
     else
       z_ += work_.step;
+    system_.equations.place(z_);
     const double length = newton_.norms_.displacement(work_.step);
     if (shorten == 1.0) ++whole_steps_;
     // A shortened step does not locate the solution, unless the whole step is within the tolerance.

@@ -42,6 +42,7 @@ void NewtonSystem::solve_for(VectorX& step) const {
   const Timer timer(work.counters.solve_time);
   step = -work.data.residual;
   equations.assembler().solver().solve({step.data(), static_cast<std::size_t>(step.size())});
+  equations.expand(work.data, step);
 }
 
 }  // namespace withe

@@ -20,7 +20,7 @@ double greatest_square(const std::vector<int>& firsts, const VectorX& step) {
 
 }  // namespace
 
-StepNorms::StepNorms(const Model& model) : model_(model), shortest_edge_(model.edge_length.minCoeff()) {
+StepNorms::StepNorms(const Model& model) : model_(model), shortest_edge_(model.shortest_length) {
   coordinates_.setZero(model.dof_count);
   for (int dof : model.node_dof) coordinates_.segment(dof, model.dimension).setOnes();
   angles_ = 1.0 - coordinates_.array();

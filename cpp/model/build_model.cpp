@@ -27,6 +27,7 @@ struct Cluster {
   JointForm form = JointForm::frame;
   int frame = -1;
   int hinge = -1;
+  int body = -1;
   int merged_into = -1;  ///< of a planar hinge that cannot turn: the cluster that has its rods now
 };
 
@@ -49,6 +50,8 @@ class Builder {
   void build() {
     add_edges();
     find_clusters();
+    add_bodies();
+    model_.shortest_length = model_.edge_count > 0 ? model_.edge_length.minCoeff() : model_.length_scale;
     add_frames();
     add_stencils();
     resolve_supports();
@@ -64,7 +67,10 @@ class Builder {
   const RodDescription& rod(int r) const { return scene_.rods[static_cast<std::size_t>(r)]; }
   int edges_of(int r) const { return static_cast<int>(rod(r).nodes.size()) - (rod(r).closed ? 0 : 1); }
   int first_edge(int r) const { return model_.rod_first_edge[static_cast<std::size_t>(r)]; }
-  int global_node(RodPass pass) const { return rod(pass.rod).nodes[static_cast<std::size_t>(pass.node)]; }
+  int global_node(RodPass pass) const { return node_row(scene_, pass); }
+  int node_of(const Cluster& cluster) const {
+    return cluster.passes.empty() ? scene_.bodies[at(cluster.body)].node : global_node(cluster.passes.front());
+  }
   EdgesAtNode edges_at(RodPass pass) const { return edges_at_node(rod(pass.rod), first_edge(pass.rod), pass.node); }
   EdgeFrame<double> strain_frame(int edge, int sign) const {
     const Matrix3 f = drawn_edge_frame(model_, edge);
@@ -128,8 +134,10 @@ class Builder {
     for (std::size_t j = 0; j < scene_.joints.size(); ++j) {
       const JointDescription& joint = scene_.joints[j];
       const int base = static_cast<int>(clusters_.size());
-      for (const auto& passes : joint.clusters) {
+      for (std::size_t c = 0; c < joint.clusters.size(); ++c) {
+        const std::vector<RodPass>& passes = joint.clusters[c];
         clusters_.push_back({passes, static_cast<int>(j), joint.form});
+        clusters_.back().body = joint.body_of(c);
         for (const RodPass& pass : passes) cluster_of_[{pass.rod, pass.node}] = static_cast<int>(clusters_.size()) - 1;
       }
       add_links(joint, base);
@@ -144,10 +152,12 @@ class Builder {
       const bool swapped = base + link.child == root;
       const int turning = base + (swapped ? link.parent : link.child);
       Cluster& cluster = clusters_[at(turning)];
-      cluster.hinge = static_cast<int>(model_.hinges.size());
+      const int hinge = static_cast<int>(model_.hinges.size());
+      if (cluster.body < 0) cluster.hinge = hinge;  // a body on a hinge keeps its own frame
+      hinged_body_.push_back(cluster.body);
       model_.hinges.push_back({-1, link.axis.normalized(), -1});
       hinge_parent_.push_back(root);
-      links_.push_back({root, turning, swapped ? -1.0 : 1.0, cluster.hinge});
+      links_.push_back({root, turning, swapped ? -1.0 : 1.0, hinge});
     }
   }
 
@@ -175,6 +185,11 @@ class Builder {
                          [&](const RevoluteLink& link) { return link.parent == cluster || link.child == cluster; });
     };
     const RevoluteLink& first = joint.links.front();
+    for (std::size_t c = 0; c < joint.clusters.size(); ++c)
+      if (joint.body_of(c) >= 0 && !is_carried(joint, joint.body_of(c))) {
+        require(in_all(static_cast<int>(c)), "rods at a point of a body must be joined to the body");
+        return base + static_cast<int>(c);
+      }
     if (joint.links.size() == 1 && is_clamped(base + first.child) && !is_clamped(base + first.parent))
       return base + first.child;
     for (int cluster : {first.parent, first.child})
@@ -187,22 +202,77 @@ class Builder {
                                 " are joined, join each of the rods to one of them");
   }
 
+  /// True if a body is on a hinge of another body of the joint.
+  bool is_carried(const JointDescription& joint, int body) const {
+    const int carrier = scene_.bodies[at(body)].carrier;
+    return carrier >= 0 && std::find(joint.bodies.begin(), joint.bodies.end(), carrier) != joint.bodies.end();
+  }
+
   /// Cluster that a cluster on a hinge turns against.
   int root_of(const Cluster& turning) const { return hinge_parent_[at(turning.hinge)]; }
 
   bool is_clamped(int cluster) const {
     const auto in_cluster = [&](const RodPass& pass) {
       const auto found = cluster_of_.find({pass.rod, pass.node});
-      return found != cluster_of_.end() && found->second == cluster;
+      return pass.on_body() ? clusters_[at(cluster)].body == pass.body()
+                            : found != cluster_of_.end() && found->second == cluster;
     };
     return std::any_of(scene_.supports.begin(), scene_.supports.end(), [&](const SupportDescription& support) {
       return holds_frame(support.kind) && in_cluster(support.pass);
     });
   }
 
+  /// A frame for each body, and what it carries: parts follow those that carry them.
+  void add_bodies() {
+    for (const BodyDescription& body : scene_.bodies) {
+      model_.body_frame.push_back(model_.frame_count++);
+      frame_node_.push_back(body.node);
+    }
+    std::vector<bool> follows(at(model_.node_count), false), is_placed(scene_.bodies.size(), false);
+    for (const BodyDescription& body : scene_.bodies)
+      for (int node : body.carried) follows[at(node)] = true;
+    for (std::size_t pass = 0; pass <= scene_.bodies.size(); ++pass)
+      for (std::size_t b = 0; b < scene_.bodies.size(); ++b) {
+        const BodyDescription& body = scene_.bodies[b];
+        const bool waits = body.carrier >= 0 && !is_placed[at(body.carrier)];
+        if (is_placed[b] || waits || follows[at(body.node)]) continue;
+        is_placed[b] = true;
+        carry_parts(body, model_.body_frame[b]);
+        for (int node : body.carried) follows[at(node)] = false;
+      }
+    require(std::all_of(is_placed.begin(), is_placed.end(), [](bool is) { return is; }),
+            "bodies carry each other in a closed loop");
+    for (Cluster& cluster : clusters_)
+      if (cluster.body >= 0) cluster.frame = model_.body_frame[at(cluster.body)];
+  }
+
+  void carry_parts(const BodyDescription& body, int frame) {
+    for (std::size_t h = 0; h < model_.hinges.size(); ++h)
+      if (hinged_body_[h] >= 0 && model_.body_frame[at(hinged_body_[h])] == frame) {
+        CarriedPart part;
+        part.frame = model_.body_frame[at(body.carrier)];
+        part.own_frame = frame;
+        part.hinge = static_cast<int>(h);
+        model_.carried.push_back(part);
+      }
+    double mass = scene_.added_mass(body.node);
+    for (int node : body.carried) {
+      CarriedPart part;
+      part.frame = frame;
+      part.node = node;
+      part.base = body.node;
+      part.arm = scene_.positions.row(node) - scene_.positions.row(body.node);
+      model_.carried.push_back(part);
+      model_.length_scale = std::max(model_.length_scale, part.arm.norm());
+      mass += scene_.added_mass(node);
+    }
+    if (mass > 0.0) model_.length_scale = std::max(model_.length_scale, std::sqrt(body.inertia.trace() / mass));
+  }
+
   /// Makes two clusters one.
   void merge(int to, int from) {
     if (to == from) return;
+    if (clusters_[at(from)].body >= 0) clusters_[at(to)].body = clusters_[at(from)].body;
     for (const RodPass& pass : clusters_[at(from)].passes) {
       clusters_[at(to)].passes.push_back(pass);
       cluster_of_[{pass.rod, pass.node}] = to;
@@ -215,7 +285,7 @@ class Builder {
     for (const auto& [parent, child, sign, hinge, turns] : links_) {
       JointAngle joint;
       joint.sign = sign;
-      joint.node = global_node(clusters_[at(parent)].passes.front());
+      joint.node = node_of(clusters_[at(clusters_[at(parent)].passes.empty() ? child : parent)]);
       if (hinge >= 0) {
         joint.turning = model_.hinges[at(hinge)].dof;
       } else if (turns) {
@@ -237,14 +307,14 @@ class Builder {
   int frame_of(Cluster& cluster) {
     if (cluster.frame < 0) {
       cluster.frame = model_.frame_count++;
-      frame_node_.push_back(global_node(cluster.passes.front()));
+      frame_node_.push_back(node_of(cluster));
     }
     return cluster.frame;
   }
 
   /// Two ends that continue each other smoothly, with aligned directors, are one rod.
   bool continues(const Cluster& c) const {
-    if (c.passes.size() != 2 || c.form != JointForm::frame) return false;
+    if (c.body >= 0 || c.passes.size() != 2 || c.form != JointForm::frame) return false;
     const auto [a, b] = ordered(c);
     const int in = edges_at(a).in, out = edges_at(b).out;
     if (in < 0 || out < 0 || edges_at(a).out >= 0 || edges_at(b).in >= 0) return false;
@@ -259,7 +329,7 @@ class Builder {
 
   void add_frames() {
     for (const SupportDescription& support : scene_.supports)
-      if (holds_frame(support.kind)) {
+      if (holds_frame(support.kind) && !support.pass.on_body()) {
         Cluster& cluster = cluster_at(support.pass);
         if (cluster.hinge >= 0)
           throw std::invalid_argument("a clamp at a hinge must hold the rod that the hinge turns against, not rod '" +
@@ -377,6 +447,11 @@ class Builder {
       s.active = true;
       s.description = description;
       s.node = global_node(description.pass);
+      if (description.pass.on_body()) {
+        if (holds_frame(description.kind)) s.frame = model_.body_frame[at(description.pass.body())];
+        model_.supports.push_back(s);
+        continue;
+      }
       const auto [in, out] = edges_at(description.pass);
       const auto e = static_cast<std::size_t>(out >= 0 ? out : in);
       s.tangent = to_eigen(model_.initial_tangent[e]);
@@ -467,6 +542,8 @@ class Builder {
                 scene_.rods[static_cast<std::size_t>(guide.rod)].nodes[0]);
     for (const Cluster& cluster : clusters_)
       for (const RodPass& pass : cluster.passes) connect(global_node(cluster.passes.front()), global_node(pass));
+    for (const CarriedPart& carried : model_.carried)
+      if (carried.is_node()) connect(carried.base, carried.node);
     std::vector<int> number(parent.size(), -1);
     const auto component_of = [&](int node) {
       int& found = number[static_cast<std::size_t>(root(node))];
@@ -527,7 +604,7 @@ class Builder {
   std::map<Key, int> cluster_of_;
   std::set<int> gripped_frames_;
   std::vector<LinkPlace> links_;
-  std::vector<int> hinge_parent_, frame_node_;
+  std::vector<int> hinge_parent_, hinged_body_, frame_node_;
   std::vector<double> bend_voronoi_, half_voronoi_;
   std::vector<bool> offsets_keep_drawn_;
 };
@@ -582,7 +659,7 @@ void check_torsion(const SceneDescription& scene, const TorsionDescription& tors
 }  // namespace
 
 Model build_model(const SceneDescription& description, std::optional<bool> planar) {
-  require(!description.rods.empty(), "the scene has no rods: add one with add_rod");
+  require(!description.rods.empty() || !description.bodies.empty(), "the scene has no rods: add one with add_rod");
   for (const SpringDescription& spring : description.springs) {
     for (int node : spring.nodes)
       require(node >= 0 && node < description.positions.rows(), "spring at a node that is not there");

@@ -34,10 +34,14 @@ struct RodDescription {
   VectorX fluid_radius;        ///< radius in the fluid [m]
 };
 
-/// One rod passing through, starting or ending at a shared node: rod index and node index within the rod.
+/// One rod passing through, starting or ending at a shared node: rod index and node index within the rod. A point of a
+/// rigid body has the rod -1 - body, and the row of its node.
 struct RodPass {
   int rod = 0;
   int node = 0;
+
+  bool on_body() const { return rod < 0; }
+  int body() const { return -1 - rod; }
 };
 
 /// A revolute link inside a joint: the second cluster turns about `axis` relative to the first.
@@ -61,8 +65,21 @@ enum class JointForm {
 /// revolute links, or (pinned) only by the shared node.
 struct JointDescription {
   std::vector<std::vector<RodPass>> clusters;
+  std::vector<int> bodies;  ///< per cluster: the rigid body in it, or -1; empty: no body
   std::vector<RevoluteLink> links;
   JointForm form = JointForm::frame;
+
+  int body_of(std::size_t cluster) const { return cluster < bodies.size() ? bodies[cluster] : -1; }
+};
+
+/// A rigid body: a frame at a node, and further nodes that it carries. Its mass is an added mass at the node that is
+/// its centre of mass.
+struct BodyDescription {
+  std::string name;
+  int node = 0;                       ///< row of SceneDescription::positions; its unknowns are the body's
+  std::vector<int> carried;           ///< rows of further points of the body
+  Matrix3 inertia = Matrix3::Zero();  ///< about the centre of mass, axes as drawn [kg m^2]
+  int carrier = -1;                   ///< body on whose hinge it is; -1: none
 };
 
 enum class SupportKind {
@@ -286,6 +303,7 @@ struct SceneDescription {
   Vector3 gravity = Vector3(0.0, 0.0, -9.81);
   Bending bending = Bending::angle;
   std::vector<RodDescription> rods;
+  std::vector<BodyDescription> bodies;
   std::vector<JointDescription> joints;
   std::vector<SupportDescription> supports;
   std::vector<UncorrectedEnd> uncorrected_ends;  ///< found by `build_model`; once one, always one
@@ -299,6 +317,14 @@ struct SceneDescription {
   ContactDescription contact;
   FluidDescription fluid;
 };
+
+/// Row of the node of a pass.
+inline int node_row(const SceneDescription& scene, RodPass pass) {
+  return pass.on_body() ? pass.node
+                        : scene.rods[static_cast<std::size_t>(pass.rod)].nodes[static_cast<std::size_t>(pass.node)];
+}
+/// False if a pass is at a node that is not there.
+bool is_there(const SceneDescription& scene, RodPass pass);
 
 /// Numbers that each part of a kind owns one of, or derivatives of a scalar by these numbers. parameter_index.hpp names
 /// them.

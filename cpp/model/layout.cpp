@@ -1,5 +1,8 @@
 #include "model/layout.hpp"
 
+#include <algorithm>
+#include <functional>
+
 #include "common/check.hpp"
 
 namespace withe {
@@ -18,6 +21,27 @@ void note_places(Model& model) {
   model.reversed_bend.clear();
   for (std::size_t b = 0; b < model.bend.size(); ++b)
     if (model.bend[b].sign[0] < 0 || model.bend[b].sign[1] < 0) model.reversed_bend.push_back(static_cast<int>(b));
+}
+
+/// Unknowns of parts that bodies carry.
+void note_carried(Model& model) {
+  for (CarriedPart& part : model.carried) {
+    const auto add = [&](int first, int size) {
+      for (int i = 0; i < size; ++i) part.body_dofs.push_back(first + i);
+    };
+    part.body_dofs.clear();
+    if (part.is_node()) {
+      part.own_dof = model.node_dof[static_cast<std::size_t>(part.node)];
+      part.own_size = model.dimension;
+      add(model.node_dof[static_cast<std::size_t>(part.base)], model.dimension);
+      add(model.frame_dof[static_cast<std::size_t>(part.frame)], model.frame_size());
+    } else {
+      part.own_dof = model.frame_dof[static_cast<std::size_t>(part.own_frame)];
+      part.own_size = model.frame_size();
+      add(model.frame_dof[static_cast<std::size_t>(part.frame)], model.frame_size());
+      add(model.hinges[static_cast<std::size_t>(part.hinge)].dof, 1);
+    }
+  }
 }
 
 }  // namespace
@@ -40,14 +64,32 @@ void lay_out_unknowns(Model& model) {
         if (hinge.frame == f) hinge.dof = next++;
     }
   };
+  // Points of bodies that no rod has, such as centres of mass, lie beside the base of their body.
+  std::vector<bool> on_rod(at(model.node_count), false);
+  for (const RodDescription& rod : rods)
+    for (int node : rod.nodes) on_rod[at(node)] = true;
+  std::function<void(int)> place_node_of_body;
+  const auto place_carried = [&](int base) {
+    for (const CarriedPart& carried : model.carried) {
+      if (carried.base != base || on_rod[at(carried.node)] || model.node_dof[at(carried.node)] >= 0) continue;
+      place_node_of_body(carried.node);
+    }
+  };
   // A frame at the far end of a rod is outside of the stencil of the node before, so that the band stays narrow.
   const auto place_node = [&](int node, bool far_end) {
     if (model.node_dof[at(node)] >= 0) return;
-    if (!far_end) place_frames(node);
+    if (!far_end) {
+      place_carried(node);
+      place_frames(node);
+    }
     model.node_dof[at(node)] = next;
     next += model.dimension;
-    if (far_end) place_frames(node);
+    if (far_end) {
+      place_frames(node);
+      place_carried(node);
+    }
   };
+  place_node_of_body = [&](int node) { place_node(node, false); };
   const auto place_rod = [&](std::size_t r) {
     const RodDescription& rod = rods[r];
     for (std::size_t i = 0; i < rod.nodes.size(); ++i) {
@@ -77,6 +119,7 @@ void lay_out_unknowns(Model& model) {
   for (int node = 0; node < model.node_count; ++node) place_node(node, false);
   model.dof_count = next;
   note_places(model);
+  note_carried(model);
 }
 
 namespace {
@@ -117,6 +160,9 @@ class Holder {
 
   void hold_node(Support& support, int node) {
     require(!is(node_, node), "node is already held: release the support that is there first");
+    require(std::none_of(model_.carried.begin(), model_.carried.end(),
+                         [&](const CarriedPart& carried) { return carried.node == node; }),
+            "a support holds a second point of a rigid body: hold only one of its points");
     node_[at(node)] = true;
     by_edge_[at(node)] = support.is_hand() || support.other_node >= 0;
     support.nodes.push_back(node);
@@ -141,6 +187,9 @@ class Holder {
 
   void hold_frame(const Support& support, bool spinning) {
     require(!is(frame_, support.frame), "joint is already clamped: release the clamp that is there first");
+    require(std::none_of(model_.carried.begin(), model_.carried.end(),
+                         [&](const CarriedPart& carried) { return carried.own_frame == support.frame; }),
+            "a clamp holds a body on a hinge of another body, which closes a loop: clamp the other body");
     frame_[at(support.frame)] = true;
     const bool turns = spinning && !model_.planar();
     const Vector3& gripped = support.description.axis;

@@ -17,12 +17,15 @@
 /// within half of its stencil. The edge carries the rest and turns in its middle. About the axis of the edge, the sum
 /// is the inertia of the edge. A hinge has an equal inertia relative to its frame, because no mass may vanish.
 ///
+/// A rigid body turns with its frame: the moment of inertia of the frame is a matrix, R J R^T, which changes as the
+/// body turns. `rows` contains its mean, and `bodies` the rest, at the frames given last.
+///
 /// Rods whose edges are chords of arcs, of more than a radian in all, have lumped masses. A chord that spins about the
 /// centre of its arc is nearer to the centre than the arc. By this the consistent matrix loses kappa^2 l^2 / 6 of the
 /// energy, and the lumped matrix nothing. An explicit scheme divides by masses, and uses the row sums alone
 /// (`Parameters::lumped`).
 
-#include "model/model.hpp"
+#include "model/state.hpp"
 
 namespace withe {
 
@@ -30,12 +33,18 @@ namespace withe {
 inline constexpr double kFrameShare = 0.25;
 
 struct MassMatrix {
-  VectorX rows;      ///< per unknown, row sums [kg], [kg m^2]
-  VectorX inverse;   ///< of `rows`
-  VectorX coupling;  ///< per edge: m / 6 off the diagonal between its nodes, less on it [kg]
+  VectorX rows;                 ///< per unknown, row sums [kg], [kg m^2]
+  VectorX inverse;              ///< of `rows`
+  VectorX coupling;             ///< per edge: m / 6 off the diagonal between its nodes, less on it [kg]
+  std::vector<Matrix3> bodies;  ///< per body in space: its inertia without the mean of its principal moments [kg m^2]
 };
 
+/// Bodies are as drawn; `turn_bodies` must follow where there are any, and the scene has moved.
 void set_mass(const Model& model, const Parameters& parameters, MassMatrix& mass);
+/// Turns the inertia of bodies to the frames of a state.
+void turn_bodies(const Model& model, const Parameters& parameters, const State& state, MassMatrix& mass);
+/// Moment of inertia of a body about its centre of mass at a state, in the axes of space [kg m^2].
+Matrix3 inertia_in_space(const Model& model, const Parameters& parameters, const State& state, int body);
 /// Drag with the same interpolation of velocities, in N s/m. It therefore damps every mode of a uniform rod at the same
 /// rate, drag over mass, for any wavelength.
 void set_drag(const Model& model, const Parameters& parameters, MassMatrix& drag);

@@ -48,6 +48,24 @@ struct Hinge {
   int dof;
 };
 
+/// A part that a rigid body carries: a node, x = x_base + R arm, where R turns the frame of the body; or the frame of a
+/// second body, on a hinge of the first. It has unknowns like any other part, but they follow those of the body: forces
+/// on it are added to the rows of the body; see steps/carried_parts.hpp.
+struct CarriedPart {
+  int frame = -1;  ///< of the body
+  // A node:
+  int node = -1, base = -1;       ///< the node, and that of the body
+  Vector3 arm = Vector3::Zero();  ///< from the base, in the axes of the drawn scene [m]
+  // A frame:
+  int own_frame = -1, hinge = -1;
+
+  // Unknowns: its own, and those of the body (base and frame, or frame and hinge).
+  int own_dof = -1, own_size = 0;
+  std::vector<int> body_dofs;
+
+  bool is_node() const { return node >= 0; }
+};
+
 /// The angle of a revolute joint by the unknowns, 0 as drawn: sign (q[turning] - q[against]). In space a hinge has its
 /// own unknown, and `against` is unused. In a plane the hinge lies between two frames. In a plane nothing turns about
 /// an axis that lies in it.
@@ -145,6 +163,7 @@ struct Parameters : PartNumbers {
   VectorX edge_density, edge_rotary, edge_viscous_time, edge_drag;
   VectorX edge_natural_stretch;  ///< natural length over drawn length [-]
   VectorX added_mass;
+  std::vector<Matrix3> body_inertia;  ///< per body, about its centre of mass, axes as drawn [kg m^2]
   Vector3 gravity;
   double fluid_viscosity = 0;               ///< [Pa s]
   double fluid_regularization = 0;          ///< regularization of Stokeslets [m]
@@ -194,6 +213,8 @@ struct Model {
   MatrixX2 bend_share;                   ///< per stencil: the part of each of its edges whose bending it carries; 1/2,
   VectorX half_share;                    ///< but 5/12 at a frame and 7/12 at the edge's other end; see build_model.cpp
   std::vector<Hinge> hinges;             ///< in space
+  std::vector<int> body_frame;           ///< per body
+  std::vector<CarriedPart> carried;      ///< parts that bodies carry, each after those that carry it
   std::vector<JointAngle> joint_angles;  ///< per revolute joint, in the order of the scene's joints and their links
   std::vector<std::vector<StencilPlace>> place;  ///< [rod][stencil]
   std::vector<Vector2> planar_components;        ///< per rod: kappa = p . (kappa1, kappa2)
@@ -221,13 +242,15 @@ struct Model {
   VectorX initial_q;
   std::vector<Vec3d> initial_tangent, initial_director;
   VectorX initial_bend_tau, initial_half_tau;
-  double length_scale = 1.0;  ///< [m]
+  double length_scale = 1.0;     ///< [m]
+  double shortest_length = 1.0;  ///< of an edge; of bodies alone the length scale [m]
 
   bool planar() const { return plane.has_value(); }
   int frame_size() const { return planar() ? 1 : 3; }
   int component_of_node(int node) const {
     return dof_component[static_cast<std::size_t>(node_dof[static_cast<std::size_t>(node)])];
   }
+  bool has_bodies() const { return !body_frame.empty(); }
   int component_of_edge(int edge) const { return component_of_node(edge_tail[static_cast<std::size_t>(edge)]); }
 };
 

@@ -144,12 +144,20 @@ bool SurfaceParameters::operator==(const SurfaceParameters& other) const {
          std::equal(pair_shares.begin(), pair_shares.end(), other.pair_shares.begin(), other.pair_shares.end(), same);
 }
 
+bool is_there(const SceneDescription& scene, RodPass pass) {
+  if (!pass.on_body())
+    return pass.rod < static_cast<int>(scene.rods.size()) && pass.node >= 0 &&
+           pass.node < static_cast<int>(scene.rods[at(pass.rod)].nodes.size());
+  if (pass.body() >= static_cast<int>(scene.bodies.size())) return false;
+  const BodyDescription& body = scene.bodies[at(pass.body())];
+  return pass.node == body.node || std::find(body.carried.begin(), body.carried.end(), pass.node) != body.carried.end();
+}
+
 void check_load(const SceneDescription& scene, const LoadDescription& load) {
-  const int rods = static_cast<int>(scene.rods.size());
-  require(load.pass.rod >= 0 && load.pass.rod < rods && load.pass.node >= 0 &&
-              load.pass.node < static_cast<int>(scene.rods[at(load.pass.rod)].nodes.size()),
-          "load at a node that is not there");
+  require(is_there(scene, load.pass), "load at a node that is not there");
   const bool along = load.kind == LoadKind::distributed || load.kind == LoadKind::pressure;
+  require(!load.pass.on_body() || (!along && !load.follower),
+          "loads on bodies must be forces or moments that do not follow");
   require(load.values.rows() == 1 || (along && load.values.rows() == scene.rods[at(load.pass.rod)].rest_lengths.size()),
           "load must have one row, or, along a rod, one an edge");
   require(load.values.allFinite(), "load must be finite");
@@ -172,6 +180,7 @@ Parameters initial_parameters(const Model& model) {
     p.natural_twist.push_back(rod.natural_twist);
   }
   p.added_mass = scene.added_mass;
+  for (const BodyDescription& body : scene.bodies) p.body_inertia.push_back(body.inertia);
   p.gravity = scene.gravity;
   p.loads.resize(first_load_row(scene, scene.loads.size()), 3);
   for (std::size_t k = 0; k < scene.loads.size(); ++k)

@@ -1,5 +1,6 @@
 #include <Eigen/Geometry>
 #include <Eigen/SVD>
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -28,6 +29,13 @@ Vector3 guide_arm(const SceneDescription& scene, const TendonDescription& tendon
   return offset.x() * d1 + offset.y() * t.cross(d1);
 }
 
+/// Length of the longest rod [m].
+double size_of(const SceneDescription& scene) {
+  double size = 0.0;
+  for (const RodDescription& rod : scene.rods) size = std::max(size, rod.rest_lengths.sum());
+  return size;
+}
+
 /// Collects unit directions that must lie in the plane.
 void collect_directions(const SceneDescription& scene, std::vector<Vector3>& directions) {
   const auto add = [&](const Vector3& v, double scale) {
@@ -38,6 +46,12 @@ void collect_directions(const SceneDescription& scene, std::vector<Vector3>& dir
     const double size = rod.rest_lengths.sum();
     for (int node : rod.nodes) add(Vector3(scene.positions.row(node).transpose()) - start, 1e3 * size);
     add(start - Vector3(scene.positions.row(scene.rods.front().nodes.front()).transpose()), 1e3 * size);
+  }
+  for (const BodyDescription& body : scene.bodies) {
+    const Vector3 corner = scene.positions.row(scene.rods.front().nodes.front());
+    std::vector<int> points = body.carried;
+    points.push_back(body.node);
+    for (int node : points) add(Vector3(scene.positions.row(node).transpose()) - corner, 1e3 * size_of(scene));
   }
   for (const TendonDescription& tendon : scene.tendons)
     for (std::size_t g = 0; g < tendon.guides.size(); ++g) add(guide_arm(scene, tendon, g), 0.0);
@@ -149,6 +163,12 @@ bool turns_out(const RevoluteLink& link, const Vector3& normal) {
   return (link.moment != 0.0 || link.rest_angle != 0.0) && std::abs(link.axis.dot(normal)) < 0.5;
 }
 
+/// True if a link turns bodies against each other.
+bool turns_body(const JointDescription& joint, const RevoluteLink& link) {
+  return joint.body_of(static_cast<std::size_t>(link.parent)) >= 0 &&
+         joint.body_of(static_cast<std::size_t>(link.child)) >= 0;
+}
+
 /// Axes of a hand that yields, as columns, before it moves. A rod in a plane keeps the angles of its directors to it.
 Matrix3 hand_axes(const SceneDescription& scene, const SupportDescription& support) {
   if (support.hand.posed) return support.hand.rotation;
@@ -179,6 +199,8 @@ std::string why_off_plane(const SceneDescription& scene, const Vector3& normal) 
         return "the axis of a revolute joint lies at an angle to the plane";
       else if (turns_out(link, normal))
         return "a revolute joint is driven out of the plane";
+      else if (turns_body(joint, link) && std::abs(link.axis.dot(normal)) < 0.5)
+        return "a body turns about an axis in the plane";
   for (const TorsionDescription& torsion : scene.torsions)
     if (across(torsion.axis)) return "the axis of a torsion spring lies at an angle to the plane";
   for (const LoadDescription& load : scene.loads)
@@ -187,6 +209,11 @@ std::string why_off_plane(const SceneDescription& scene, const Vector3& normal) 
         return "a moment turns, or a pressure pushes, out of the plane";
   for (const RodDescription& rod : scene.rods)
     if (std::string reason = why_off_plane(scene, rod, normal); !reason.empty()) return reason;
+  for (const BodyDescription& body : scene.bodies) {
+    const Vector3 moment = body.inertia * normal;
+    if (moment.cross(normal).norm() > 1e-9 * body.inertia.norm())
+      return "no principal axis of body '" + body.name + "' is normal to the plane";
+  }
   for (const SupportDescription& support : scene.supports) {
     const Vector3 image = support.free * normal;
     if ((image - normal * normal.dot(image)).norm() > 1e-9) return "a support may slide out of the plane";
@@ -201,6 +228,10 @@ std::string why_off_plane(const SceneDescription& scene, const Vector3& normal) 
 }  // namespace
 
 std::optional<Plane> find_plane(const SceneDescription& scene, std::optional<bool> asked, std::string& reason) {
+  if (scene.rods.empty()) {
+    reason = "bodies without rods move in space";
+    return std::nullopt;
+  }
   // A user who requests a plane must keep such forces in it.
   const bool sure = asked.value_or(false);
   if (scene.has_custom_force && !sure) {

@@ -148,13 +148,29 @@ State initial_state(const Model& model) {
 namespace {
 
 void allocate(const Model& model, Configuration& out) {
-  if (out.edge.size() != static_cast<std::size_t>(model.edge_count)) {
+  if (out.edge.size() != static_cast<std::size_t>(model.edge_count) ||
+      out.frame.size() != static_cast<std::size_t>(model.frame_count)) {
     out.edge.assign(static_cast<std::size_t>(model.edge_count), EdgeFrame<double>{});
     out.length.resize(model.edge_count);
     out.frame.assign(static_cast<std::size_t>(model.frame_count), Matrix3::Identity());
     out.attached.assign(model.half.size(), EdgeFrame<double>{});
     out.bend_strain = Columns3::Zero(static_cast<Eigen::Index>(model.bend.size()), 3);
     out.half_strain = Columns3::Zero(static_cast<Eigen::Index>(model.half.size()), 3);
+  }
+}
+
+/// Parts that bodies carry are in their places up to rounding, which must not add up over steps. `frames`: of bodies.
+void place_carried(const Model& model, const std::vector<Matrix3>& frames, VectorX& q) {
+  for (const CarriedPart& part : model.carried) {
+    if (!part.is_node()) continue;
+    const int own = part.own_dof, base = part.body_dofs.front();
+    if (model.planar()) {
+      const double angle = q(part.body_dofs.back()), c = std::cos(angle), s = std::sin(angle);
+      const double x = part.arm.dot(model.plane->first), y = part.arm.dot(model.plane->second);
+      q.segment<2>(own) = q.segment<2>(base) + Vector2(c * x - s * y, s * x + c * y);
+    } else {
+      q.segment<3>(own) = q.segment<3>(base) + frames[at(part.frame)] * part.arm;
+    }
   }
 }
 
@@ -165,6 +181,9 @@ void accept_frames(const Model& model, const Configuration& configuration, State
     state.frame[i] = orthonormalized(configuration.frame[i]);
     state.q.segment<3>(model.frame_dof[i]).setZero();
   }
+  for (const CarriedPart& part : model.carried)
+    if (!part.is_node())
+      state.frame[at(part.own_frame)] = state.frame[at(part.frame)] * hinge_turn(model, state.q, part.hinge);
   state.bend_tau = configuration.bend_strain.col(2);
   state.half_tau = configuration.half_strain.col(2);
 }
@@ -202,12 +221,13 @@ double advance_configuration(const Model& model, const State& state, const Vecto
 
 void accept_configuration(const Model& model, const VectorX& q, const Configuration& configuration, State& state) {
   state.q = q;
-  if (model.planar()) return;
+  if (model.planar()) return place_carried(model, state.frame, state.q);
   frame_kernels().carry({.count = model.edge_count,
                          .frames = &configuration.edge.data()->tangent.x,
                          .source = &state.tangent.data()->x,
                          .reference = &state.director.data()->x});
   accept_frames(model, configuration, state);
+  place_carried(model, state.frame, state.q);
 }
 
 Matrix3 hinge_turn(const Model& model, const VectorX& q, int hinge) {

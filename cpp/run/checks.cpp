@@ -42,6 +42,8 @@ void check_reversible(const Model& model, const Options& options, const Paramete
                                                                [](const Support& s) { return s.active && s.yields(); }),
       "integrator 'verlet' supports rigid hands only: use an implicit integrator for "
       "a hand that yields");
+  require(options.integrator != Integrator::verlet || !model.has_bodies(),
+          "integrator 'verlet' does not support rigid bodies: use 'energy_momentum' or 'backward_euler'");
   if (options.integrator != Integrator::fourth_order) return;
   require(!model.description.contact.any(),
           "integrator 'fourth_order' does not support contact, because its inner steps "

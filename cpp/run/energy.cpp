@@ -78,6 +78,7 @@ void EnergyCoefficients::set(const Model& model, const Parameters& p) {
 void EnergyScratch::set(const Model& model, const Parameters& parameters, const State& state) {
   compute_configuration(model, state, state.q, configuration);
   coefficients.set(model, parameters);
+  if (model.has_bodies()) turn_bodies(model, parameters, state, coefficients.mass);
 }
 
 double change_by_settings(const Model& model, const EnergyCoefficients& before, const Parameters& parameters,

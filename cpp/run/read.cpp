@@ -158,6 +158,7 @@ VectorX spins(const Model& model, const State& state, int rod) {
 Momentum momentum(const Model& model, const Parameters& parameters, const State& state) {
   MassMatrix mass;
   set_mass(model, parameters, mass);
+  turn_bodies(model, parameters, state, mass);
   VectorX carried;
   multiply(model, mass, state.v, carried);
   Momentum out;

@@ -97,7 +97,21 @@ State transferred(const Model& old, const State& from, const Model& model) {
       copy(old.edge_dof[at(e)], model.edge_dof[at(e)], 1);
     }
   }
+  for (std::size_t b = 0; b < model.body_frame.size(); ++b) {
+    const int f = model.body_frame[b], old_f = old.body_frame[b], dof = model.frame_dof[at(f)];
+    if (lifted) {
+      to.frame[at(f)] = rotation_exp(from.q(old.frame_dof[at(old_f)]) * old.plane->normal);
+      to.v.segment<3>(dof) = from.v(old.frame_dof[at(old_f)]) * old.plane->normal;
+    } else {
+      if (!model.planar()) to.frame[at(f)] = from.frame[at(old_f)];
+      copy(old.frame_dof[at(old_f)], dof, model.frame_size());
+    }
+  }
+  const auto is_body = [&](int f) {
+    return std::find(model.body_frame.begin(), model.body_frame.end(), f) != model.body_frame.end();
+  };
   for (int f = 0; f < model.frame_count; ++f) {
+    if (is_body(f)) continue;
     const Eigen::Index known = known_half(model, f, old);
     if (known < 0) continue;
     const FrameStencil& half = old.half[static_cast<std::size_t>(known)];

@@ -87,6 +87,7 @@ void Equations::begin(const State& state, const Parameters& parameters, StepRule
     problem_.held_acceleration = *held_acceleration;
   else
     problem_.held_acceleration.resize(0);
+  if (model().has_bodies()) turn_bodies(model(), parameters, state, problem_.mass);
   problem_.number = next_number();
   problem_.slip_time = problem_.moves() ? problem_.duration() : static_duration_;
   for (const std::unique_ptr<Term>& term : terms_.all) term->begin(problem_);
@@ -106,6 +107,7 @@ void Equations::clear(const VectorX& z, StepData& data) const {
   data.gradient.setZero(model().dof_count + kPadding);
   data.row_magnitude.setZero(model().dof_count + kPadding);
   data.z = z;
+  place_carried(problem_, data.z);
 }
 
 /// Finds the forces of all terms, and reserves their entries in the matrix.
@@ -131,6 +133,10 @@ void Equations::evaluate(const VectorX& z, bool with_matrix, const double* axial
     std::fill(values.begin(), values.end(), 0.0);
   }
   for (const std::unique_ptr<Term>& term : terms_.all) term->add(problem_, data, assembler_, values);
+  if (!model().carried.empty()) {
+    fold_rows(problem_, data.z, data.gradient, data.row_magnitude, data.carrying);
+    if (with_matrix) assembler_.fold_carried(data.carrying);
+  }
   finish(data);
   if (with_matrix && !problem_.exact) assembler_.project_matrix();
   data.axial_force = nullptr;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "assembly/assembler.hpp"
+#include "steps/carried_parts.hpp"
 #include "steps/terms.hpp"
 
 namespace withe {
@@ -56,6 +57,11 @@ class Equations {
   bool has_potential_here() const;
 
   const std::vector<std::unique_ptr<Term>>& terms() const { return terms_.all; }
+
+  /// Puts the parts that bodies carry where the bodies have them at z.
+  void place(VectorX& z) const { place_carried(problem_, z); }
+  /// Sets the displacements of these parts in a step from the last evaluation by those of the bodies.
+  void expand(const StepData& data, VectorX& step) const { expand_step(model(), data.carrying, step); }
 
   /// Null if no contact is possible in the scene.
   Contact* contact() { return terms_.contact ? &terms_.contact->contact() : nullptr; }

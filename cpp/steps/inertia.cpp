@@ -79,6 +79,69 @@ void set_turning_frames(const StepProblem& problem, StepData& data) {
   }
 }
 
+/// A rigid body in a step, in the axes of space: it turns by the Cayley vector w over `duration`.
+///
+/// The moment of a step, m = (R1 J W1 - R0 J W0) / dt, makes the change of angular momentum exact. Midpoint steps have
+/// (W0 + W1) / 2 = R0^T w / dt with the rates W about the axes of the body, so w . m dt is the change of kinetic energy
+/// [Simo and Wong 1991, with the Cayley map]. Backward Euler has W1 = R1^T w / dt.
+struct TurningBody {
+  int dof;
+  double duration;
+  Vector3 w, spin, carried_spin;  ///< at the end; that of the start, turned with the body
+  Matrix3 inertia;                ///< at the end
+  Vector3 moment;
+
+  TurningBody(const StepProblem& problem, const VectorX& z, int body)
+      : dof(problem.model.frame_dof[at(problem.model.body_frame[at(body)])]),
+        duration(problem.duration()),
+        w((problem.in_middle() ? 2.0 : 1.0) * z.segment<3>(dof)) {
+    const double mean = problem.mass.rows[dof];
+    const Matrix3 before = problem.mass.bodies[at(body)] + mean * Matrix3::Identity(), turn = cayley(w);
+    const Vector3 rate = problem.start->v.segment<3>(dof);
+    inertia = turn * before * turn.transpose();
+    carried_spin = turn * rate;
+    spin = (1.0 / duration) * w;
+    if (problem.in_middle()) spin = 2.0 * spin - carried_spin;
+    moment = (inertia * spin - before * rate) / duration;
+  }
+
+  /// Derivative of the moment by the unknowns of the frame at z.
+  Matrix3 slope(const StepProblem& problem) const {
+    const double rate = problem.in_middle() ? 2.0 : 1.0;
+    const Matrix3 turn = rate * cayley_spin(w);  // spatial spin of the end by the unknowns
+    Matrix3 by_spin = (rate * rate / duration) * Matrix3::Identity();
+    if (problem.in_middle()) by_spin += cross_matrix(carried_spin) * turn;
+    return (1.0 / duration) *
+           ((inertia * cross_matrix(spin) - cross_matrix(inertia * spin)) * turn + inertia * by_spin);
+  }
+};
+
+/// Rows of bodies; their frames have no other inertia.
+void set_turning_bodies(const StepProblem& problem, StepData& data) {
+  for (int b = 0; b < static_cast<int>(problem.mass.bodies.size()); ++b) {
+    const TurningBody body(problem, data.z, b);
+    data.inertia.segment<3>(body.dof) =
+        problem.conserves_energy() ? body.moment
+                                   : Vector3(cayley_spin(data.z.segment<3>(body.dof)).transpose() * body.moment);
+  }
+}
+
+/// Derivatives of the rows of bodies in place of those of the mass matrix.
+void add_body_slopes(const StepProblem& problem, const StepData& data, const Assembler& assembler,
+                     std::span<double> values) {
+  const double rate = 1.0 / (problem.interval * problem.interval);
+  for (int b = 0; b < static_cast<int>(problem.mass.bodies.size()); ++b) {
+    const TurningBody body(problem, data.z, b);
+    Matrix3 slope = body.slope(problem);
+    if (!problem.conserves_energy()) {
+      const Vector3 w = data.z.segment<3>(body.dof);
+      slope = (cayley_spin(w).transpose() * slope + cayley_moment_slope(w, body.moment)).eval();
+    }
+    slope -= rate * (problem.mass.bodies[at(b)] + problem.mass.rows[body.dof] * Matrix3::Identity());
+    assembler.add_block(body.dof, slope, values);
+  }
+}
+
 /// Derivatives of the inertia of edges, beyond those of the mass matrix.
 void add_edge_slopes(const StepProblem& problem, StepData& data, const ElementTable& edges, std::span<double> values) {
   const Model& model = problem.model;
@@ -183,12 +246,14 @@ void Inertia::add(const StepProblem& problem, StepData& data, const Assembler& a
   multiply(problem.model, problem.mass, data.acceleration, data.inertia);
   if (!problem.model.planar()) add_turning_edges(problem, data);
   if (problem.in_middle()) set_turning_frames(problem, data);
+  set_turning_bodies(problem, data);
   const bool turning_too = problem.exact && !values.empty();
   if (turning_too && problem.in_middle()) add_frame_slopes(problem, data, assembler, values);
   data.gradient.head(n) += data.inertia;
   data.row_magnitude.head(n) += data.inertia.cwiseAbs();
   if (values.empty()) return;
   add_mass_matrix(problem, problem.mass, inverse * inverse, assembler, values);
+  add_body_slopes(problem, data, assembler, values);
   if (turning_too && !problem.model.planar()) add_edge_slopes(problem, data, edges_, values);
 }
 
@@ -232,6 +297,8 @@ void add_mass_matrix(const StepProblem& problem, const MassMatrix& mass, double 
   const Model& model = problem.model;
   const std::vector<std::ptrdiff_t>& diagonal = assembler.diagonal_offsets();
   for (int i = 0; i < model.dof_count; ++i) values[static_cast<std::size_t>(diagonal[at(i)])] += factor * mass.rows[i];
+  for (std::size_t b = 0; b < mass.bodies.size(); ++b)
+    assembler.add_block(model.frame_dof[at(model.body_frame[b])], factor * mass.bodies[b], values);
   const auto size = static_cast<std::size_t>(model.dimension);
   for (int e = 0; e < model.edge_count; ++e) {
     const double coupling = factor * mass.coupling[e];
@@ -286,6 +353,15 @@ void for_each_finite_turn(const Model& model, const VectorX& change, const Use& 
 
 void set_turning_velocities(const Model& model, const VectorX& v0, const VectorX& change, double dt, VectorX& v1) {
   for_each_finite_turn(model, change, [&](int dof, double turn) { v1[dof] = 2.0 * turn / dt - v0[dof]; });
+}
+
+void set_body_velocities(const Model& model, const VectorX& v0, const VectorX& change, double dt, VectorX& v1) {
+  if (model.planar()) return;
+  for (int frame : model.body_frame) {
+    const int dof = model.frame_dof[at(frame)];
+    const Vector3 w = change.segment<3>(dof);
+    v1.segment<3>(dof) = (2.0 / dt) * w - cayley(w) * v0.segment<3>(dof);
+  }
 }
 
 double farthest_turn(const Model& model, const VectorX& q0, const VectorX& q1) {

@@ -34,6 +34,9 @@ void add_explicit_spin_couple(const StepProblem& problem, StepData& data, int ed
 double farthest_turn(const Model& model, const VectorX& q0, const VectorX& q1);
 /// Velocities of angles at the end of an energy-momentum step that changes the unknowns by `change`.
 void set_turning_velocities(const Model& model, const VectorX& v0, const VectorX& change, double dt, VectorX& v1);
+/// Angular velocities of bodies at the end of a midpoint step: the mean of their rates about the axes of the body at
+/// both ends is that of the step.
+void set_body_velocities(const Model& model, const VectorX& v0, const VectorX& change, double dt, VectorX& v1);
 /// Derivatives of these velocities by `change`, per unknown: 2 / dt for unknowns that are not angles.
 void set_velocity_rates(const Model& model, const VectorX& change, double dt, VectorX& rates);
 /// Displacement over which forces of an energy-momentum step do work. It is the change of the unknowns, except for

@@ -55,7 +55,7 @@ void set_rounding_bounds(const StepProblem& problem, StepData& data) {
   out.number = problem.number;
   const double turned = set_inertial_bounds(problem, data, out);
   VectorX& floor = out.rows;
-  out.relative = kRounding * (out.reach / problem.model.edge_length.minCoeff() + turned);
+  out.relative = kRounding * (out.reach / problem.model.shortest_length + turned);
   out.axial.resize(problem.model.edge_count);
   for (int e = 0; e < problem.model.edge_count; ++e)
     out.axial(e) = kRounding * k.stretch_stiffness(e) * (out.reach / problem.model.edge_length(e) + 1.0);

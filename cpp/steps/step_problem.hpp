@@ -10,6 +10,7 @@
 ///   bending, twisting: moments with the exact work, see elasticity/discrete_gradient.hpp; contact: along the mean of
 ///   the vectors between surfaces, see contact/pressing.cpp.
 
+#include "assembly/assembler.hpp"
 #include "contact/contact_linearisation.hpp"
 #include "elasticity/discrete_elements.hpp"
 #include "elasticity/elements.hpp"
@@ -130,6 +131,7 @@ struct StepData {
   VectorX flow_force, flow_drag;  ///< force of a fluid, and its local drag [N]
   VectorX contact_gradient, contact_floor;
   std::vector<Wrench> hands;           ///< per support that yields: wrench on the rod about the origin
+  std::vector<Carrying> carrying;      ///< per part that a body carries
   std::vector<TurningSlopes> turning;  ///< per edge, of an exact matrix in space
 };
 

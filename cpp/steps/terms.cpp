@@ -90,6 +90,7 @@ std::vector<std::string> asymmetries_of(const Model& model, const Loads& loads, 
     found.emplace_back("custom forces that are solved for");
   if (loads.unsymmetric) found.emplace_back("follower loads or moments in 3D");
   if (rule == StepRule::energy_momentum) found.emplace_back("energy-momentum steps");
+  if (rule == StepRule::midpoint && !model.carried.empty()) found.emplace_back("points of bodies in midpoint steps");
   add_asymmetries(terms.contact, rule, found);
   if (scene.fluid.model == FluidModel::resistive && rule != StepRule::statics)
     found.emplace_back("resistive-force theory");

@@ -67,6 +67,7 @@ void World::Implementation::carry_over(const Model& old, Rebuild why) {
   // Frames that come and go carry inertia, and a support may change where the mass of edges sits.
   MassMatrix mass;
   set_mass(old, parameters, mass);
+  turn_bodies(old, parameters, from, mass);
   const double before = kinetic_energy(old, mass, from.v);
   update_derived(model, parameters);
   relax_frames(model, parameters, is_new, state);
@@ -75,6 +76,7 @@ void World::Implementation::carry_over(const Model& old, Rebuild why) {
     keep_moments(old, elastic, configuration(), model, parameters);
   }
   set_mass(model, parameters, mass);
+  turn_bodies(model, parameters, state, mass);
   ledger.support_work += kinetic_energy(model, mass, state.v) - before;
 }
 

@@ -41,7 +41,25 @@ SparseMatrix matrix_of(const Model& model, const MassMatrix& mass) {
       entries.emplace_back(a, b, m);
       entries.emplace_back(b, a, m);
     }
+  for (std::size_t b = 0; b < mass.bodies.size(); ++b) {
+    const int dof = model.frame_dof[at(model.body_frame[b])];
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) entries.emplace_back(dof + i, dof + j, mass.bodies[b](i, j));
+  }
   return assembled(model.dof_count, model.dof_count, entries);
+}
+
+/// The basis of free motions, in which parts that bodies carry follow them.
+SparseMatrix with_carried(const Model& model, const std::vector<Carrying>& carrying, SparseMatrix basis) {
+  for (std::size_t i = 0; i < carrying.size(); ++i) {
+    const CarriedPart& part = model.carried[i];
+    Entries follow;
+    for (int d = 0; d < part.own_size; ++d)
+      for (std::size_t b = 0; b < part.body_dofs.size(); ++b)
+        follow.emplace_back(part.own_dof + d, part.body_dofs[b], carrying[i].follow(d, static_cast<Eigen::Index>(b)));
+    basis = (basis + assembled(model.dof_count, model.dof_count, follow) * basis).eval();
+  }
+  return basis;
 }
 
 }  // namespace
@@ -55,19 +73,20 @@ Linearisation World::linearise() const {
   prescribed.respond = self.custom().response_at_rest(self.state.time);
   system.begin(self.state, self.parameters, StepRule::statics, 0.0, prescribed);
   StepData evaluation;
-  const SparseMatrix basis = free_basis(model), back = basis.transpose();
   system.evaluate(self.state.q, false, nullptr, evaluation);
+  const SparseMatrix free = free_basis(model), basis = with_carried(model, evaluation.carrying, free),
+                     back = basis.transpose();
   const StrainParts parts(system, self.state, evaluation.configuration);
-  const VectorX imbalance = evaluation.residual;
+  const VectorX imbalance = evaluation.residual;  // forces on carried nodes are among those of their bodies
   system.elastic() = parts.without();
   system.evaluate(self.state.q, true, nullptr, evaluation);
 
   Linearisation out;
-  out.geometric = back * matrix_of(system.assembler()) * basis;
+  out.geometric = free.transpose() * matrix_of(system.assembler()) * free;
   const auto strains = static_cast<Eigen::Index>(parts.stiffnesses().size());
   out.gradients = assembled(strains, model.dof_count, parts.gradients()) * basis;
   out.stiffnesses = Eigen::Map<const VectorX>(parts.stiffnesses().data(), strains);
-  out.imbalance = back * imbalance;
+  out.imbalance = free.transpose() * imbalance;
   out.mass = back * matrix_of(model, system.mass()) * basis;
   Entries moves;
   Matrix3 axes = Matrix3::Identity();

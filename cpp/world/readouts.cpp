@@ -1,6 +1,7 @@
 /// Read-outs of a running scene.
 
 #include "common/check.hpp"
+#include "run/frames.hpp"
 #include "run/read.hpp"
 #include "steps/joint_forces.hpp"
 #include "steps/spring_forces.hpp"
@@ -72,6 +73,23 @@ double World::joint_torque(int joint) const {
   ElasticCoefficients elastic;
   set_elastic(implementation_->parameters, elastic);
   return torque_of(withe::joint_torque(implementation_->parameters, elastic, joint), angle, joint_rate(joint));
+}
+
+Matrix3 World::body_rotation(int body) const {
+  const Implementation& self = *implementation_;
+  return frame_rotation(self.model, self.state, self.model.body_frame.at(at(body)));
+}
+
+int World::body_base(int body) const {
+  const Model& model = implementation_->model;
+  return model.frame_node[at(model.body_frame.at(at(body)))];
+}
+
+Vector3 World::body_spin(int body) const {
+  const Implementation& self = *implementation_;
+  const int dof = self.model.frame_dof[at(self.model.body_frame.at(at(body)))];
+  if (self.model.planar()) return self.state.v(dof) * self.model.plane->normal;
+  return self.state.v.segment<3>(dof);
 }
 
 VectorX World::spins(int rod) const { return withe::spins(implementation_->model, implementation_->state, rod); }

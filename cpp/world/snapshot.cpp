@@ -150,6 +150,11 @@ std::uint64_t fingerprint(const SceneDescription& scene) {
     w(rod.contact_radius);
     w(rod.fluid_radius);
   }
+  for (const BodyDescription& body : scene.bodies) {
+    w(body.node);
+    for (int node : body.carried) w(node);
+    w(body.inertia);
+  }
   w(static_cast<std::int64_t>(scene.joints.size()));
   for (const JointDescription& joint : scene.joints) w(static_cast<std::int64_t>(joint.links.size()));
   w(static_cast<std::int64_t>(drawn_loads(scene)));
@@ -242,10 +247,7 @@ StoredSupports read_supports(Reader& r, const SceneDescription& scene) {
     d.kind = static_cast<SupportKind>(kind);
     r(d.pass.rod);
     r(d.pass.node);
-    const auto& rods = scene.rods;
-    require(d.pass.rod >= 0 && d.pass.rod < static_cast<int>(rods.size()) && d.pass.node >= 0 &&
-                d.pass.node < static_cast<int>(rods[static_cast<std::size_t>(d.pass.rod)].nodes.size()),
-            "snapshot is damaged: support of a node that is not there");
+    require(is_there(scene, d.pass), "snapshot is damaged: support of a node that is not there");
     r(d.free);
     r(d.gripped);
     r(d.axis);

@@ -102,10 +102,12 @@ void World::Implementation::lump_held() {
   account_for_settings();
   MassMatrix mass;
   set_mass(model, parameters, mass);
+  turn_bodies(model, parameters, state, mass);
   ledger.support_work -= kinetic_energy(model, mass, state.v);
   parameters.held_lumped = true;
   update_derived(model, parameters);
   set_mass(model, parameters, mass);
+  turn_bodies(model, parameters, state, mass);
   ledger.support_work += kinetic_energy(model, mass, state.v);
   plan_current = false;
 }

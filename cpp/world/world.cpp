@@ -410,6 +410,47 @@ void World::set_gravity(const Vector3& gravity) {
   set({&setting, 1});
 }
 
+void World::set_body_motion(int body, const Vector3& velocity, const Vector3& spin) {
+  Implementation& self = *implementation_;
+  require(velocity.allFinite() && spin.allFinite(), "velocities of a body must be finite");
+  self.account_for_settings();
+  const int frame = self.model.body_frame.at(at(body)), base = self.model.frame_node[at(frame)];
+  if (self.model.planar()) {
+    const Vector3& n = self.model.plane->normal;
+    if (std::abs(velocity.dot(n)) > 1e-9 * velocity.norm() || spin.cross(n).norm() > 1e-9 * spin.norm())
+      self.leave_plane("the motion of a body");
+  }
+  const Model& model = self.model;
+  VectorX& v = self.state.v;
+  const auto put_spin = [&](int f, const Vector3& turn) {
+    const int dof = model.frame_dof[at(f)];
+    if (model.planar())
+      v(dof) = turn.dot(model.plane->normal);
+    else
+      v.segment<3>(dof) = turn;
+  };
+  put_node_vector(model, base, velocity, v);
+  put_spin(frame, spin);
+  const auto spin_of = [&](int f) -> Vector3 {
+    const int dof = model.frame_dof[at(f)];
+    return model.planar() ? Vector3(v(dof) * model.plane->normal) : Vector3(v.segment<3>(dof));
+  };
+  // Parts follow their bodies; of a body on a hinge of another, only its turn about the hinge is its own.
+  for (const CarriedPart& part : model.carried) {
+    const Matrix3 turned = frame_rotation(model, self.state, part.frame);
+    if (part.is_node()) {
+      put_node_vector(model, part.node, node_vector(model, v, part.base) + spin_of(part.frame).cross(turned * part.arm),
+                      v);
+      continue;
+    }
+    const Hinge& hinge = model.hinges[at(part.hinge)];
+    const Vector3 axis = turned * hinge.axis;
+    if (part.own_frame == frame) v(hinge.dof) = axis.dot(spin - spin_of(part.frame));
+    put_spin(part.own_frame, spin_of(part.frame) + v(hinge.dof) * axis);
+  }
+  self.forget_motion();
+}
+
 void World::set_velocities(const MatrixX3& velocities) {
   Implementation& self = *implementation_;
   require(velocities.rows() == self.model.node_count, "velocities need one row a node");

@@ -251,7 +251,12 @@ class World {
   double joint_angle(int joint) const;       ///< of what turns, from how it is drawn, whole turns counted [rad]
   double joint_rate(int joint) const;        ///< [rad/s]
   double joint_torque(int joint) const;      ///< on what turns: of its motor, its stiffness and its damping [N m]
-  VectorX spins(int rod) const;              ///< per edge, angular velocity about the tangent [rad/s]
+  Matrix3 body_rotation(int body) const;     ///< of a rigid body since it was drawn
+  Vector3 body_spin(int body) const;         ///< angular velocity of a rigid body [rad/s]
+  int body_base(int body) const;             ///< node whose unknowns are those of a rigid body
+  /// Sets the velocity of the base of a body [m/s], and its angular velocity [rad/s]; all its points follow.
+  void set_body_motion(int body, const Vector3& velocity, const Vector3& spin);
+  VectorX spins(int rod) const;  ///< per edge, angular velocity about the tangent [rad/s]
   Energy energy() const;
   /// Energy of one rod: kinetic, stretch, bend, twist, gravity and their sum. The energy around a joint belongs to the
   /// rods whose edges meet there. The sum over all rods is that of the scene without loads, contact and the ledger.

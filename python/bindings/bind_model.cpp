@@ -60,6 +60,16 @@ void register_rod(py::module_& module) {
       .def_readwrite("fluid_radius", &RodDescription::fluid_radius);
 }
 
+void register_body(py::module_& module) {
+  py::class_<BodyDescription>(module, "BodyDescription", "A rigid body: a frame at a node, and nodes that it carries.")
+      .def(py::init<>())
+      .def_readwrite("name", &BodyDescription::name)
+      .def_readwrite("node", &BodyDescription::node)
+      .def_readwrite("carried", &BodyDescription::carried)
+      .def_readwrite("inertia", &BodyDescription::inertia)
+      .def_readwrite("carrier", &BodyDescription::carrier);
+}
+
 void register_contact(py::module_& module) {
   py::class_<ObstacleDescription> obstacle(module, "ObstacleDescription", "Something solid that does not move.");
   obstacle.def(py::init<>())
@@ -133,6 +143,7 @@ void register_joints_and_supports(py::module_& module) {
   py::class_<JointDescription> joint(module, "JointDescription", "A node that several rods share.");
   joint.def(py::init<>())
       .def_readwrite("clusters", &JointDescription::clusters)
+      .def_readwrite("bodies", &JointDescription::bodies)
       .def_readwrite("links", &JointDescription::links);
   def_word(joint, "form", &JointDescription::form, kJointForms);
 
@@ -155,6 +166,7 @@ void register_joints_and_supports(py::module_& module) {
   support.def(py::init<>())
       .def_readwrite("pass_", &SupportDescription::pass)
       .def_readwrite("free", &SupportDescription::free)
+      .def_readwrite("axis", &SupportDescription::axis)
       .def_readwrite("hand", &SupportDescription::hand);
   def_word(support, "kind", &SupportDescription::kind, kSupportKinds);
 }
@@ -204,6 +216,7 @@ void register_torsions(py::module_& module) {
 
 void register_model(py::module_& module) {
   register_rod(module);
+  register_body(module);
   register_joints_and_supports(module);
   register_loads(module);
   register_springs(module);
@@ -218,6 +231,7 @@ void register_model(py::module_& module) {
       .def_readwrite("added_mass", &SceneDescription::added_mass)
       .def_readwrite("gravity", &SceneDescription::gravity)
       .def_readwrite("rods", &SceneDescription::rods)
+      .def_readwrite("bodies", &SceneDescription::bodies)
       .def_readwrite("joints", &SceneDescription::joints)
       .def_readwrite("supports", &SceneDescription::supports)
       .def_readwrite("loads", &SceneDescription::loads)

@@ -458,6 +458,19 @@ void define_readouts(WorldClass& world) {
   world.def(
       "joint_torque", [](const GuardedWorld& self, int joint) { return self.reading().joint_torque(joint); },
       py::arg("joint"));
+  world.def(
+      "body_rotation", [](const GuardedWorld& self, int body) { return self.reading().body_rotation(body); },
+      py::arg("body"));
+  world.def(
+      "body_base", [](const GuardedWorld& self, int body) { return self.reading().body_base(body); }, py::arg("body"));
+  world.def(
+      "body_spin", [](const GuardedWorld& self, int body) { return self.reading().body_spin(body); }, py::arg("body"));
+  world.def(
+      "set_body_motion",
+      [](GuardedWorld& self, int body, const Vector3& velocity, const Vector3& spin) {
+        self.changing().set_body_motion(body, velocity, spin);
+      },
+      py::arg("body"), py::arg("velocity"), py::arg("spin"));
   world.def("spins", [](const GuardedWorld& self, int rod) { return self.reading().spins(rod); }, py::arg("rod"));
   world.def("take_warnings", [](GuardedWorld& self) { return self.changing().take_warnings(); });
   world.def("energy", [](const GuardedWorld& self) { return self.reading().energy(); });

@@ -10,7 +10,7 @@ by rounding, so set it to "baseline" everywhere to find the same bits on unlike 
 ``print(simulation.plan)`` says which are in use.
 """
 
-from withe import deployment, folding, knots, learning, perception, real2sim, shapes, view
+from withe import deployment, folding, knots, learning, perception, real2sim, shapes, solids, view
 from withe._core import __version__
 from withe.batch import Batch
 from withe.batch.records import BatchRecord, Equilibria
@@ -32,6 +32,7 @@ from withe.errors import (
 )
 from withe.parts.friction_fields import FrictionMap
 from withe.parts.handles import (
+    Body,
     CustomForce,
     Drag,
     EdgeHandle,
@@ -64,6 +65,7 @@ from withe.simulation.snapshots import Snapshot
 __all__ = [
     "Batch",
     "BatchRecord",
+    "Body",
     "BranchChangedWarning",
     "Circle",
     "CoarseMeshWarning",
@@ -130,6 +132,7 @@ __all__ = [
     "real2sim",
     "run_many",
     "shapes",
+    "solids",
     "track",
     "view",
 ]

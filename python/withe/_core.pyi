@@ -11,6 +11,7 @@ import typing
 
 __all__: list[str] = [
     "Batch",
+    "BodyDescription",
     "ContactDescription",
     "ContactPairDescription",
     "ContactTable",
@@ -140,6 +141,30 @@ class RodDescription:
     @viscous_time.setter
     def viscous_time(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None: ...
 
+class BodyDescription:
+    """
+    A rigid body: a frame at a node, and nodes that it carries.
+    """
+
+    name: str
+    def __init__(self) -> None: ...
+    @property
+    def carried(self) -> list[int]: ...
+    @carried.setter
+    def carried(self, arg0: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> None: ...
+    @property
+    def carrier(self) -> int: ...
+    @carrier.setter
+    def carrier(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    @property
+    def inertia(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]: ...
+    @inertia.setter
+    def inertia(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"]) -> None: ...
+    @property
+    def node(self) -> int: ...
+    @node.setter
+    def node(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+
 class RodPass:
     """
     A node of a rod.
@@ -202,6 +227,10 @@ class JointDescription:
 
     form: str
     def __init__(self) -> None: ...
+    @property
+    def bodies(self) -> list[int]: ...
+    @bodies.setter
+    def bodies(self, arg0: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> None: ...
     @property
     def clusters(self) -> list[list[RodPass]]: ...
     @clusters.setter
@@ -266,6 +295,10 @@ class SupportDescription:
     kind: str
     pass_: RodPass
     def __init__(self) -> None: ...
+    @property
+    def axis(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...
+    @axis.setter
+    def axis(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None: ...
     @property
     def free(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]: ...
     @free.setter
@@ -481,6 +514,10 @@ class SceneDescription:
     def added_mass(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
     @added_mass.setter
     def added_mass(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None: ...
+    @property
+    def bodies(self) -> list[BodyDescription]: ...
+    @bodies.setter
+    def bodies(self, arg0: collections.abc.Sequence[BodyDescription]) -> None: ...
     @property
     def gravity(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...
     @gravity.setter
@@ -1047,6 +1084,13 @@ class World:
         """
         Advance to a time [s].
         """
+    def body_base(self, body: typing.SupportsInt | typing.SupportsIndex) -> int: ...
+    def body_rotation(
+        self, body: typing.SupportsInt | typing.SupportsIndex
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]: ...
+    def body_spin(
+        self, body: typing.SupportsInt | typing.SupportsIndex
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...
     def check_idle(self) -> None:
         """
         Raises in the middle of a step.
@@ -1178,6 +1222,12 @@ class World:
         Set parameters of a rod, a part or the scene by their names, over a duration [s]: all, or where one is refused none.
         """
     def set_added_mass(self, mass: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None: ...
+    def set_body_motion(
+        self,
+        body: typing.SupportsInt | typing.SupportsIndex,
+        velocity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
+        spin: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
+    ) -> None: ...
     def set_friction_shares(
         self,
         pair: typing.SupportsInt | typing.SupportsIndex,

@@ -282,7 +282,8 @@ TEST(Joints, RodsThatAPlaneLetsTurnByNothingAreOneWhoeverIsJoinedToWhom) {
   RevoluteLink first, second;
   first.parent = 0, first.child = 1, first.axis = Vector3::UnitX();
   second.parent = 2, second.child = 1, second.axis = Vector3::UnitX();
-  builder.scene.joints.push_back({{{{0, 2}}, {{1, 0}}, {{2, 0}}}, {first, second}, JointForm::frame});
+  builder.scene.joints.push_back(
+      {.clusters = {{{0, 2}}, {{1, 0}}, {{2, 0}}}, .bodies = {}, .links = {first, second}, .form = JointForm::frame});
   const Model model = build_model(builder.scene, true);
   EXPECT_EQ(model.frame_count, 1);
   EXPECT_EQ(model.half.size(), 3u);

@@ -77,11 +77,14 @@ class SceneBuilder {
 
   /// Rigidly joins rods that share a node.
   SceneBuilder& join(std::vector<RodPass> passes, JointForm form = JointForm::frame) {
-    scene.joints.push_back({{std::move(passes)}, {}, form});
+    scene.joints.push_back({.clusters = {std::move(passes)}, .bodies = {}, .links = {}, .form = form});
     return *this;
   }
   SceneBuilder& join_revolute(std::vector<RodPass> fixed, RodPass turning, const Vector3& axis) {
-    scene.joints.push_back({{std::move(fixed), {turning}}, {{0, 1, axis.normalized()}}, JointForm::frame});
+    scene.joints.push_back({.clusters = {std::move(fixed), {turning}},
+                            .bodies = {},
+                            .links = {{0, 1, axis.normalized()}},
+                            .form = JointForm::frame});
     return *this;
   }
   int support(SupportKind kind, RodPass pass, const Matrix3& free = Matrix3::Zero()) {

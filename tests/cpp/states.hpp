@@ -103,9 +103,10 @@ inline SceneBuilder hinged(const RodMaterial& material = {}) {
   builder.add_rod(line(o, Vector3(0.0, -0.5, 2.0), 3), material);
   builder.add_rod(line(Vector3(0.3, 1.7, -0.4), o, 3), material);
   builder.scene.joints.push_back(
-      {{{{0, 2}, {1, 0}}, {{2, 0}}, {{3, 2}}},
-       {{0, 1, Vector3(0.2, 0.9, -0.3).normalized()}, {0, 2, Vector3(1, 0.1, 0.4).normalized()}},
-       JointForm::frame});
+      {.clusters = {{{0, 2}, {1, 0}}, {{2, 0}}, {{3, 2}}},
+       .bodies = {},
+       .links = {{0, 1, Vector3(0.2, 0.9, -0.3).normalized()}, {0, 2, Vector3(1, 0.1, 0.4).normalized()}},
+       .form = JointForm::frame});
   return builder;
 }
 

@@ -232,7 +232,8 @@ TEST(Supports, LeaveTwoFramesOfOneNodeAsTheyAre) {
   builder.add_rod(testing::line(o, Vector3(0, 0.2, 0.05), 5), m, false, Vector3(1, 0, 0));
   builder.add_rod(testing::line(Vector3(0.1, -0.2, 0), o, 5), m);
   builder.add_rod(testing::line(o, Vector3(0.05, 0.1, -0.2), 5), m, false, Vector3(1, 0, 0));
-  builder.scene.joints.push_back({{{{0, 4}, {1, 0}}, {{2, 4}, {3, 0}}}, {}, JointForm::frame});
+  builder.scene.joints.push_back(
+      {.clusters = {{{0, 4}, {1, 0}}, {{2, 4}, {3, 0}}}, .bodies = {}, .links = {}, .form = JointForm::frame});
   builder.scene.gravity = Vector3(0, 0, -9.81);
   builder.support(SupportKind::clamp, {0, 0});
   World world(builder.scene, options(Integrator::implicit_midpoint));

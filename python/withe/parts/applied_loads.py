@@ -12,7 +12,7 @@ import numpy.typing as npt
 from withe.common import validation
 from withe.common.keywords import keyword_hints
 from withe.parts.directory import Directory
-from withe.parts.handles import Load, NodeHandle, Rod
+from withe.parts.handles import Body, Load, NodeHandle, Rod
 from withe.parts.kinds import LoadKind, LoadPart, Pass, RodPart
 
 __all__ = ["AppliedLoads", "Bearer", "load_values"]
@@ -46,16 +46,24 @@ class AppliedLoads(ABC):
         """Return the bearer of loads."""
 
     def add_force(
-        self, node: NodeHandle | str, force: Value, *, follower: bool = False, name: str | None = None
+        self,
+        node: NodeHandle | Body | str,
+        force: Value,
+        *,
+        at: npt.ArrayLike | None = None,
+        follower: bool = False,
+        name: str | None = None,
     ) -> Load:
-        """Add a force at a node.
+        """Add a force at a node, or at a point of a rigid body.
 
         Parameters
         ----------
-        node : NodeHandle or str
-            Node on which the force acts.
+        node : NodeHandle, Body or str
+            Node or body on which the force acts.
         force : array_like of shape (3,) [N], or a function of time [s] that returns it
             Force in world axes, as drawn.
+        at : array_like of shape (3,) [m]
+            Point of a body at which the force acts, as drawn. By default its centre of mass.
         follower : bool
             True if the force turns with the rod, half of it with each edge at the node.
         name : str
@@ -75,17 +83,22 @@ class AppliedLoads(ABC):
         Simulation.set : Change the force during a simulation.
         add_load : Add a distributed force.
         """
-        return _put_at_node(self._bearer, "force", node, force, follower, name)
+        return _put_at_node(self._bearer, "force", node, force, follower, name, at)
 
     def add_moment(
-        self, node: NodeHandle | str, moment: Value, *, follower: bool = False, name: str | None = None
+        self,
+        node: NodeHandle | Body | str,
+        moment: Value,
+        *,
+        follower: bool = False,
+        name: str | None = None,
     ) -> Load:
-        """Add a moment at a node.
+        """Add a moment at a node, or on a rigid body.
 
         Parameters
         ----------
-        node : NodeHandle or str
-            Node on which the moment acts.
+        node : NodeHandle, Body or str
+            Node or body on which the moment acts.
         moment : array_like of shape (3,) [N m], or a function of time [s] that returns it
             Moment in world axes, as drawn. The function is called once before every step; if it is added to a
             simulation, it may read the state of the simulation for an explicit feedback torque.
@@ -190,10 +203,19 @@ class AppliedLoads(ABC):
 
 
 def _put_at_node(
-    bearer: Bearer, kind: LoadKind, node: NodeHandle | str, value: Value, follower: bool, name: str | None
+    bearer: Bearer,
+    kind: LoadKind,
+    node: NodeHandle | Body | str,
+    value: Value,
+    follower: bool,
+    name: str | None,
+    at: npt.ArrayLike | None = None,
 ) -> Load:
-    place, _ = bearer.directory.node(node, f"node of the {kind}")
-    return _put(bearer, kind, place, value, validation.truth(follower, "follower"), name)
+    place, owner = bearer.directory.place(node, at, f"node of the {kind}")
+    follows = validation.truth(follower, "follower")
+    if follows and place[0] < 0:
+        raise ValueError(f"follower=True is for loads on rods, got body {owner!r}: give a function of time instead")
+    return _put(bearer, kind, place, value, follows, name)
 
 
 def _put(

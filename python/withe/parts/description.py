@@ -8,18 +8,21 @@ import numpy as np
 import numpy.typing as npt
 
 from withe import _core
+from withe.parts.bodies import describe_bodies
 from withe.parts.contacts import describe_contact
 from withe.parts.directory import Directory
 from withe.parts.fluid import describe_fluid
 from withe.parts.hands import check_free
 from withe.parts.joints import describe_joint, groups
 from withe.parts.kinds import (
+    BodyPart,
     CustomForcePart,
     DragPart,
     Grasp,
     JoinPart,
     LoadPart,
     MassPart,
+    Pass,
     RodPart,
     SupportPart,
 )
@@ -43,10 +46,12 @@ def describe(directory: Directory, gravity: FloatArray, bending: Bending = "angl
         A scene without rods, or two supports, or a spring, at nodes that were joined later.
     """
     rods = directory.all(RodPart)
-    if not rods:
+    if not rods and not directory.all(BodyPart):
         raise ValueError("the scene must have at least one rod: add one with add_rod")
     scene = _core.SceneDescription()
     positions = np.empty((directory.layout.node_count, 3))
+    for body, points in enumerate(directory.layout.body_points):
+        positions[directory.layout.rows(-1 - body)] = points
     for rod in reversed(rods):  # the first rod at a shared node places it
         positions[directory.layout.rows(rod.index)] = rod.points
     scene.positions = positions
@@ -55,9 +60,10 @@ def describe(directory: Directory, gravity: FloatArray, bending: Bending = "angl
     scene.added_mass = added_mass(directory, {mass.name: mass.mass for mass in directory.all(MassPart)})
     coefficients = {part.name: part.coefficient for part in directory.all(DragPart)}
     scene.rods = [_describe_rod(directory, rod, drag(directory, coefficients, rod)) for rod in rods]
+    scene.bodies = describe_bodies(directory)
     scene.joints = [describe_joint(group) for group in groups(directory.all(JoinPart))]
     scene.supports = _describe_supports(directory)
-    scene.loads = [describe_load(load) for load in directory.all(LoadPart)]
+    scene.loads = [describe_load(directory, load) for load in directory.all(LoadPart)]
     scene.springs = describe_springs(directory)
     for kind in KINDS:
         if kind.described is not None:
@@ -77,6 +83,8 @@ def added_mass(directory: Directory, masses: dict[str, float]) -> FloatArray:
     total = np.zeros(directory.layout.node_count)
     for part in directory.all(MassPart):
         total[directory.row(part.node)] += masses[part.name]
+    for body in directory.all(BodyPart):
+        total[directory.row((-1 - body.index, 0))] += body.mass
     return total
 
 
@@ -99,15 +107,22 @@ def parameters_of(directory: Directory) -> list[RodParameters]:
     ]
 
 
-def describe_support(part: SupportPart) -> _core.SupportDescription:
+def describe_support(directory: Directory, part: SupportPart) -> _core.SupportDescription:
     """One support."""
     support = _core.SupportDescription()
     support.kind = part.kind
-    support.pass_ = _core.RodPass(*part.node)
+    support.pass_ = _pass(directory, part.node)
+    if part.axis is not None:
+        support.axis = part.axis
     support.free = part.free
     if part.grasp is not None:
         support.hand = _describe_hand(part.grasp)
     return support
+
+
+def _pass(directory: Directory, node: Pass) -> _core.RodPass:
+    """A node as the engine takes it: a point of a body by its row."""
+    return _core.RodPass(node[0], directory.row(node) if node[0] < 0 else node[1])
 
 
 def _describe_hand(grasp: Grasp) -> _core.HandDescription:
@@ -164,7 +179,7 @@ def _describe_supports(directory: Directory) -> list[_core.SupportDescription]:
             other = holder.setdefault(row, part)
             if other is not part:
                 raise ValueError(_held_twice(directory, other, part))
-    return [describe_support(part) for part in directory.all(SupportPart)]
+    return [describe_support(directory, part) for part in directory.all(SupportPart)]
 
 
 def _held_twice(directory: Directory, first: SupportPart, second: SupportPart) -> str:
@@ -179,11 +194,11 @@ def _held_twice(directory: Directory, first: SupportPart, second: SupportPart) -
     )
 
 
-def describe_load(part: LoadPart) -> _core.LoadDescription:
+def describe_load(directory: Directory, part: LoadPart) -> _core.LoadDescription:
     """One load."""
     load = _core.LoadDescription()
     load.kind = "distributed" if part.kind == "load" else part.kind
-    load.pass_ = _core.RodPass(*part.node)
+    load.pass_ = _pass(directory, part.node)
     load.values = np.atleast_2d(part.value)
     load.follower = part.follower
     load.varies = part.function is not None

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from typing import Any, TypeVar
 
+import numpy as np
+import numpy.typing as npt
+
+from withe.common import validation
 from withe.common.validation import near_word
 from withe.parts.handles import EdgeHandle, Handle, Layout, NodeHandle, Rod, parse_place
-from withe.parts.kinds import Actuation, ContactSettings, Part, Pass, RodPart
+from withe.parts.kinds import Actuation, BodyPart, ContactSettings, Part, Pass, RodPart
 from withe.parts.table import handle_of, kind_of
 
 __all__ = ["Directory"]
@@ -138,6 +142,18 @@ class Directory:
         else:
             node = found.node(place[2])
         return (found.index, node.index), node.name
+
+    def place(self, handle: Handle | str, at: npt.ArrayLike | None, what: str) -> tuple[Pass, str]:
+        """The node of a rod, or the point of a body at `at` as drawn, by default its centre of mass; and its name."""
+        part = self.parts.get(handle if isinstance(handle, str) else handle.name)
+        if not isinstance(part, BodyPart):
+            if at is not None:
+                raise ValueError(f"at= is a point of a body, but {what} must be a node of a rod or a body")
+            return self.node(handle, what)
+        body = self.find(handle, BodyPart, what)
+        point = body.center if at is None else validation.vector(at, f"at of body {body.name!r}")
+        near = 1e-9 * float(np.linalg.norm(point - body.center)) + 1e-12 * float(np.linalg.norm(point))
+        return self.layout.body_point(body.index, point, near), body.name
 
     def edge(self, handle: Handle | str, what: str = "edge") -> tuple[int, int]:
         """The edge that a handle or a name such as "arm.edge(3)" stands for: rod, edge of the rod."""

@@ -17,6 +17,7 @@ from withe.common import validation
 from withe.common.attributes import of_a_simulation
 
 __all__ = [
+    "Body",
     "CustomForce",
     "Drag",
     "EdgeHandle",
@@ -52,18 +53,25 @@ class RodPlace:
 
 
 class Layout:
-    """Which row of `positions()` each node of each rod has; joined nodes share one."""
+    """Which row of `positions()` each node of each rod has; joined nodes share one.
+
+    Points of bodies have rows too, after those of rods. A body stands for the number -1 - index.
+    """
 
     def __init__(self) -> None:
         self.rods: list[RodPlace] = []
+        self.body_points: list[tuple[FloatArray, ...]] = []  # per body, the centre of mass first (3,) [m]
         self._merges: list[tuple[tuple[int, int], tuple[int, int]]] = []
         self._rows: list[npt.NDArray[np.int64]] | None = None
         self._node_count = 0
+        self._is_open = True  # whether bodies may get new points
 
     def copy(self) -> Layout:
         """A layout that no longer changes with this one."""
         other = Layout()
         other.rods = list(self.rods)
+        other.body_points = list(self.body_points)
+        other._is_open = False
         other._merges = list(self._merges)
         return other
 
@@ -73,14 +81,35 @@ class Layout:
         self._rows = None
         return len(self.rods) - 1
 
+    def add_body(self, center: FloatArray) -> int:
+        """Append a body by its centre of mass; returns its index."""
+        self.body_points.append((center,))
+        self._rows = None
+        return len(self.body_points) - 1
+
+    def body_point(self, body: int, position: FloatArray, near: float) -> tuple[int, int]:
+        """Return the point of a body at a position, or as near to it, which is a new one if there is none."""
+        points = self.body_points[body]
+        for i, point in enumerate(points):
+            if np.linalg.norm(point - position) <= near:
+                return -1 - body, i
+        if not self._is_open:
+            raise ValueError(
+                f"a body of a running simulation has no new points, got {position.tolist()}: place joints, supports "
+                "and loads there before build()"
+            )
+        self.body_points[body] = (*points, position)
+        self._rows = None
+        return -1 - body, len(points)
+
     def merge(self, a: tuple[int, int], b: tuple[int, int]) -> None:
         """Make two nodes, each (rod, node), one."""
         self._merges.append((a, b))
         self._rows = None
 
     def rows(self, rod: int) -> npt.NDArray[np.int64]:
-        """Rows of the nodes of a rod."""
-        return self._numbered()[rod]
+        """Rows of the nodes of a rod, or of the points of a body."""
+        return self._numbered()[rod if rod >= 0 else len(self.rods) - 1 - rod]
 
     @property
     def node_count(self) -> int:
@@ -95,16 +124,22 @@ class Layout:
         return self._rows
 
     def _number(self) -> list[npt.NDArray[np.int64]]:
-        starts = np.concatenate([[0], np.cumsum([rod.nodes for rod in self.rods])]).astype(int)
+        counts = [rod.nodes for rod in self.rods] + [len(points) for points in self.body_points]
+        starts = np.concatenate([[0], np.cumsum(counts)]).astype(int)
         roots = UnionFind(int(starts[-1]))
-        for (rod_a, a), (rod_b, b) in self._merges:
-            roots.unite(int(starts[rod_a]) + a, int(starts[rod_b]) + b)
+
+        def place(node: tuple[int, int]) -> int:
+            owner = node[0] if node[0] >= 0 else len(self.rods) - 1 - node[0]
+            return int(starts[owner]) + node[1]
+
+        for a, b in self._merges:
+            roots.unite(place(a), place(b))
         root = np.array([roots.find(i) for i in range(int(starts[-1]))], dtype=np.int64)
         # Rows in order of first appearance: a root is the first of its group.
         is_first = root == np.arange(len(root))
         row_of_root = np.cumsum(is_first) - 1
         rows = row_of_root[root]
-        return [rows[starts[i] : starts[i + 1]] for i in range(len(self.rods))]
+        return [rows[starts[i] : starts[i + 1]] for i in range(len(counts))]
 
 
 class UnionFind:
@@ -138,6 +173,11 @@ class Handle:
         def __getattr__(self, word: str) -> Any:
             what = f"{type(self).__name__} {self.__dict__.get('name')!r}"
             raise of_a_simulation(what, word, f"simulation.{{}}({self.__dict__.get('name')!r}, ...)")
+
+
+@dataclass(frozen=True)
+class Body(Handle):
+    """Handle of a rigid body, made by `Scene.add_body`."""
 
 
 @dataclass(frozen=True)

@@ -192,10 +192,10 @@ def held_edges(directory: Directory, part: SupportPart) -> set[tuple[int, int]]:
 def _nodes(directory: Directory, part: SupportPart) -> set[int]:
     """Rows of the nodes that it touches."""
     index, _ = part.node
-    count = directory.layout.rods[index].nodes
     edges = held_edges(directory, part)
     if not edges:
         return {directory.row(part.node)}
+    count = directory.layout.rods[index].nodes
     return {directory.row((index, (edge + step) % count)) for _, edge in edges for step in (0, 1)}
 
 

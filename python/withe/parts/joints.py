@@ -67,6 +67,9 @@ def gather(joins: Sequence[JoinPart]) -> JointGroup:
         raise ValueError(f"form must be the same in all joints at one node, got {forms[0]!r} and {forms[1]!r}")
     order = sorted({roots.find(i) for i in range(len(nodes))})
     clusters = tuple(tuple(node for node in nodes if roots.find(number[node]) == root) for root in order)
+    for cluster in clusters:
+        if sum(node[0] < 0 for node in cluster) > 1:
+            raise ValueError("two bodies must not be joined rigidly: describe them by one body")
 
     links: dict[tuple[int, int], JoinPart] = {}
     for join in joins:
@@ -107,7 +110,9 @@ def revolute_joints(joins: Sequence[JoinPart]) -> list[JoinPart]:
 def describe_joint(group: JointGroup) -> _core.JointDescription:
     """One joint as the engine takes it."""
     joint = _core.JointDescription()
-    joint.clusters = [[_core.RodPass(*node) for node in cluster] for cluster in group.clusters]
+    joint.clusters = [[_core.RodPass(*node) for node in cluster if node[0] >= 0] for cluster in group.clusters]
+    bodies = [next((-1 - node[0] for node in cluster if node[0] < 0), -1) for cluster in group.clusters]
+    joint.bodies = bodies if max(bodies) >= 0 else []
     joint.links = [_describe_link(parent, child, join) for parent, child, join in group.links]
     joint.form = group.form
     return joint

@@ -18,6 +18,7 @@ __all__ = [
     "LOAD_KINDS",
     "SUPPORT_KINDS",
     "Actuation",
+    "BodyPart",
     "ContactModel",
     "ContactSettings",
     "CustomForcePart",
@@ -43,7 +44,7 @@ __all__ = [
 ]
 
 FloatArray = npt.NDArray[np.float64]
-Pass = tuple[int, int]  # rod, node of the rod
+Pass = tuple[int, int]  # rod, node of the rod; or -1 - body, point of the body
 JoinKind = Literal["rigid", "pinned", "revolute"]
 JointForm = Literal["frame", "pairs"]
 ContactModel = Literal["imcv2", "barrier", "imcv1", "spillmann_teschner"]
@@ -113,6 +114,19 @@ class RodPart(Part):
 
 
 @dataclass(frozen=True, eq=False)
+class BodyPart(Part):
+    """A rigid body as it was drawn. Its points in the layout begin with its centre of mass."""
+
+    index: int
+    mass: float  # [kg]
+    inertia: FloatArray  # about the centre of mass, axes of the world, (3, 3) [kg m^2]
+    center: FloatArray  # centre of mass (3,) [m]
+    position: FloatArray  # origin of its axes (3,) [m]
+    rotation: FloatArray  # of its axes, columns, (3, 3)
+    solid: Any  # for pictures; None: a body without shape
+
+
+@dataclass(frozen=True, eq=False)
 class JoinPart(Part):
     """Two nodes that are one."""
 
@@ -151,6 +165,7 @@ class SupportPart(Part):
     node_name: str
     free: FloatArray  # projector onto the directions along which the node may slide, (3, 3)
     grasp: Grasp | None = None  # of a hand
+    axis: FloatArray | None = None  # about which a held body may turn
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 from withe.common import validation
 from withe.parts.directory import Directory
-from withe.parts.handles import NodeHandle
+from withe.parts.handles import Body, NodeHandle
 from withe.parts.hands import check_free
-from withe.parts.kinds import SupportKind, SupportPart
+from withe.parts.kinds import Pass, SupportKind, SupportPart
 
 __all__ = ["check_not_held", "held_rows", "make_clamp", "make_pin"]
 
@@ -21,30 +21,56 @@ FloatArray = npt.NDArray[np.float64]
 
 def make_clamp(
     directory: Directory,
-    node: NodeHandle | str,
+    node: NodeHandle | Body | str,
     hold: Literal["frame", "edge"],
     free: npt.ArrayLike | None,
-    spin: bool,
+    spin: bool | npt.ArrayLike,
     name: str | None,
+    at: npt.ArrayLike | None = None,
 ) -> SupportPart:
     """A clamp, checked; not yet in the directory."""
     name = directory.new_name(name, "clamp")
-    place, node_name = directory.node(node, "node to clamp")
+    place, node_name = directory.place(node, at, "node to clamp")
     validation.choice(hold, "hold of the clamp", ("frame", "edge"))
+    if place[0] < 0:
+        return _clamp_of_body(name, place, node_name, hold, free, spin)
     kinds: dict[tuple[str, bool], SupportKind] = {
         ("frame", False): "clamp",
         ("frame", True): "spinning_clamp",
         ("edge", False): "hold_edge",
         ("edge", True): "spinning_edge",
     }
+    if np.ndim(spin) > 0:
+        raise ValueError("spin of the clamp must be True or False: an axis is for bodies")
     kind = kinds[hold, validation.truth(spin, "spin of the clamp")]
     return SupportPart(name, kind, place, node_name, _projector(free, "free of the clamp"))
 
 
-def make_pin(directory: Directory, node: NodeHandle | str, free: npt.ArrayLike | None, name: str | None) -> SupportPart:
+def _clamp_of_body(
+    name: str, place: Pass, body: str, hold: str, free: npt.ArrayLike | None, spin: bool | npt.ArrayLike
+) -> SupportPart:
+    """A clamp of a body, which lets it turn about an axis where `spin` gives one."""
+    if hold != "frame":
+        raise ValueError(f"hold='edge' is for rods, got body {body!r}")
+    free_of = _projector(free, "free of the clamp")
+    if np.ndim(spin) == 0:
+        if validation.truth(spin, "spin of the clamp"):
+            raise ValueError(f"spin of a clamp of body {body!r} must be the axis, for example spin=(0, 0, 1)")
+        return SupportPart(name, "clamp", place, body, free_of)
+    axis = validation.unit_vector(spin, "spin of the clamp")
+    return SupportPart(name, "spinning_clamp", place, body, free_of, axis=axis)
+
+
+def make_pin(
+    directory: Directory,
+    node: NodeHandle | Body | str,
+    free: npt.ArrayLike | None,
+    name: str | None,
+    at: npt.ArrayLike | None = None,
+) -> SupportPart:
     """A pin, checked; not yet in the directory."""
     name = directory.new_name(name, "pin")
-    place, node_name = directory.node(node, "node to pin")
+    place, node_name = directory.place(node, at, "node to pin")
     return SupportPart(name, "pin", place, node_name, _projector(free, "free of the pin"))
 
 

@@ -21,6 +21,7 @@ from withe import _core
 from withe.common import validation
 from withe.common.outlines import SpringOutline, TendonOutline
 from withe.parts.handles import (
+    Body,
     CustomForce,
     Drag,
     Fluid,
@@ -38,6 +39,7 @@ from withe.parts.handles import (
 )
 from withe.parts.kinds import (
     LOAD_KINDS,
+    BodyPart,
     CustomForcePart,
     DragPart,
     FluidPart,
@@ -144,6 +146,7 @@ KINDS: tuple[PartKind, ...] = (
             Word("discrete_curvature", "-", is_read=False, has_gradient=False, is_ramped=True),
         ),
     ),
+    PartKind(BodyPart, Body, "body", "bodies"),
     PartKind(LoadPart, Load, "load", "loads", tuple(map(_load_word, LOAD_KINDS))),
     PartKind(
         MassPart,

@@ -36,6 +36,7 @@ class Section:
 
 SECTIONS = (
     Section("rods", {"": "add_rod"}),
+    Section("bodies", {"": "add_body"}),
     Section("joints", {"": "join"}),
     Section("supports", {"clamp": "clamp", "pin": "pin", "hand": "grasp"}),
     Section("loads", {"force": "add_force", "moment": "add_moment", "load": "add_load", "pressure": "add_pressure"}),

@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 from withe.common import validation
 from withe.parts.directory import Directory
-from withe.parts.handles import NodeHandle
+from withe.parts.handles import Body, NodeHandle
 from withe.parts.joints import connected, gather
-from withe.parts.kinds import JoinKind, JoinPart, JointForm, Pass
+from withe.parts.kinds import BodyPart, JoinKind, JoinPart, JointForm, Pass
 from withe.parts.table import checked, kind_of
 
 __all__ = ["JoinedNodes"]
@@ -33,7 +33,8 @@ class JoinedNodes:
 
     def join(
         self,
-        nodes: Sequence[NodeHandle | str],
+        nodes: Sequence[NodeHandle | Body | str],
+        at: npt.ArrayLike | None,
         kind: JoinKind,
         axis: npt.ArrayLike | None,
         form: JointForm,
@@ -45,10 +46,7 @@ class JoinedNodes:
         All or none; see `Scene.join`.
         """
         names = self._new_names(name, len(nodes) - 1)
-        first, *others = (
-            self._directory.node(node, f"{_ORDINALS[i] if i < len(_ORDINALS) else 'another'} node to join")
-            for i, node in enumerate(nodes)
-        )
+        first, *others = self._places(nodes, at)
         parts = [
             self._part(own, first, other, kind, axis, form, numbers) for own, other in zip(names, others, strict=True)
         ]
@@ -59,6 +57,39 @@ class JoinedNodes:
                 self._joins_at.setdefault(node, []).append(part)
             self._directory.layout.merge(*part.nodes)
         return parts
+
+    def _places(self, nodes: Sequence[NodeHandle | Body | str], at: npt.ArrayLike | None) -> list[tuple[Pass, str]]:
+        """The nodes of rods, and the points of bodies where the joint is; each with its name."""
+        layout = self._directory.layout
+        point = None if at is None else validation.vector(at, "at of the joint")
+        places: list[tuple[Pass, str] | BodyPart] = []
+        for i, node in enumerate(nodes):
+            name = node if isinstance(node, str) else node.name
+            part = self._directory.parts.get(name)
+            if isinstance(part, BodyPart) and not isinstance(node, NodeHandle):
+                places.append(self._directory.find(node, BodyPart, "body to join"))
+                continue
+            what = f"{_ORDINALS[i] if i < len(_ORDINALS) else 'another'} node to join"
+            places.append(self._directory.node(node, what))
+        drawn = next((self._point(place[0]) for place in places if not isinstance(place, BodyPart)), None)
+        if all(not isinstance(place, BodyPart) for place in places):
+            if point is not None:
+                raise ValueError("at of the joint is for bodies: rods are joined at their nodes")
+        elif drawn is None and point is None:
+            raise ValueError(
+                "at must be given to join bodies: the point of the joint as drawn, for example at=(0, 0, 0.1)"
+            )
+        elif drawn is not None and point is not None and np.linalg.norm(drawn - point) > 1e-9 * self._extent():
+            raise ValueError(f"at of the joint must be the node, but is {np.linalg.norm(drawn - point):g} m away")
+        where = drawn if drawn is not None else point
+        found = []
+        for place in places:
+            if isinstance(place, BodyPart):
+                assert where is not None
+                found.append((layout.body_point(place.index, where, 1e-9 * self._extent()), place.name))
+            else:
+                found.append(place)
+        return found
 
     def _new_names(self, name: str | None, count: int) -> list[str]:
         """One name for one joint; for several a number follows it."""
@@ -105,6 +136,8 @@ class JoinedNodes:
         return JoinPart(name, (node_a, node_b), (name_a, name_b), kind, direction, form, **values)
 
     def _point(self, node: Pass) -> FloatArray:
+        if node[0] < 0:
+            return self._directory.layout.body_points[-1 - node[0]][node[1]]
         rod = self._directory.layout.rods[node[0]].name
         return np.asarray(self._directory.rod(rod).points[node[1]])
 
@@ -118,4 +151,7 @@ class JoinedNodes:
                 np.maximum(self._high, points.max(axis=0)),
             )
         self._measured = len(rods)
-        return float(np.linalg.norm(self._high - self._low))
+        low, high = self._low, self._high
+        for body in self._directory.layout.body_points:
+            low, high = np.minimum(low, body[0]), np.maximum(high, body[0])
+        return float(np.linalg.norm(high - low))

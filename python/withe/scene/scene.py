@@ -19,8 +19,9 @@ from withe.common.keywords import keyword_hints
 from withe.common.log import logs_info
 from withe.parts.actuation import add_actuation
 from withe.parts.applied_loads import AppliedLoads, Bearer
+from withe.parts.bodies import make_body
 from withe.parts.directory import Directory
-from withe.parts.handles import Joint, Load, NodeHandle, Rod, RodPlace, parse_place
+from withe.parts.handles import Body, Joint, Load, NodeHandle, Rod, RodPlace, parse_place
 from withe.parts.kinds import JoinKind, JointForm, LoadPart, RodPart
 from withe.parts.materials import Material, Section, Stiffness
 from withe.parts.options import Bending, BuildOptions, Integrator, Solver
@@ -37,6 +38,7 @@ from withe.simulation.logs import log_build
 from withe.simulation.parameters import Settable
 from withe.simulation.schedule import check_actuations
 from withe.simulation.simulation import Simulation
+from withe.solids import Solid
 
 __all__ = ["Scene"]
 
@@ -53,7 +55,7 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
 
     Methods and properties by purpose:
 
-    * describe: `add_rod`, `join`, `add_mass`, `add_spring`, `add_torsion_spring`, `add_tendon`, `gravity`
+    * describe: `add_rod`, `add_body`, `join`, `add_mass`, `add_spring`, `add_torsion_spring`, `add_tendon`, `gravity`
     * hold: `clamp`, `pin`, `grasp`
     * load: `add_force`, `add_moment`, `add_load`, `add_pressure`, `add_drag`, `add_fluid`, `add_custom_force`,
       `actuate` at given times
@@ -243,13 +245,95 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         self._directory.layout.add(place)
         return cast(Rod, self._directory.add(rod))
 
+    def add_body(
+        self,
+        solid: Solid | None = None,
+        *,
+        density: float | None = None,
+        mass: float | None = None,
+        inertia: npt.ArrayLike | None = None,
+        center: npt.ArrayLike | None = None,
+        position: npt.ArrayLike = (0.0, 0.0, 0.0),
+        rotation: npt.ArrayLike | None = None,
+        name: str | None = None,
+    ) -> Body:
+        """Add a rigid body: a plug, a payload, a hub, the trunk of a robot.
+
+        A body is free until it is joined to rods or to other bodies by `join`. Its motion conserves momentum and
+        angular momentum, and in energy-momentum steps also energy, to rounding.
+
+        Parameters
+        ----------
+        solid : Sphere, Box, Cylinder, Capsule or Mesh of withe.solids
+            Shape of uniform density, from which centre and inertia follow. Give `density` or `mass` with it.
+        density : float [kg/m^3]
+            Density of the solid.
+        mass : float [kg]
+            Mass.
+        inertia : float, or array_like of shape (3,) or (3, 3) [kg m^2]
+            Moment of inertia about the centre of mass in the axes of the body. Three numbers are principal moments
+            about these axes.
+        center : array_like of shape (3,) [m]
+            Centre of mass in the axes of the body. By default their origin.
+        position : array_like of shape (3,) [m]
+            Origin of the axes of the body, as drawn.
+        rotation : array_like of shape (3, 3) or (4,), or scipy.spatial.transform.Rotation
+            Orientation of the axes of the body: a matrix whose columns are the axes, or a unit quaternion
+            (w, x, y, z). By default the axes of the world.
+        name : str
+            Name of the body.
+
+        Returns
+        -------
+        Body
+
+        Raises
+        ------
+        ValueError
+            A mass that is not positive, an inertia that is not symmetric and positive or whose principal moments
+            belong to no body (J1 + J2 < J3), a mass and a density, or a rotation that is none.
+
+        See Also
+        --------
+        join : Join the body to rods and other bodies.
+        add_mass : Add a point mass at a node.
+        Simulation.position : Position of a body.
+
+        Notes
+        -----
+        Midpoint steps integrate the rates of turn about the axes of the body with the Cayley map [1]_.
+
+        References
+        ----------
+        .. [1] J. C. Simo and K. K. Wong, Unconditionally stable algorithms for rigid body dynamics that exactly
+           preserve energy and momentum, Int. J. Numer. Methods Eng. 31 (1991) 19-52.
+
+        Examples
+        --------
+        >>> cord = scene.add_rod(
+        ...     start=(0, 0, 0), end=(0, 0, -0.5), nodes=21, radius=3e-3,
+        ...     material=withe.Material(youngs_modulus=1e7, density=1100),
+        ... )
+        >>> hold = scene.clamp(cord.start)
+        >>> plug = scene.add_body(withe.solids.Box((0.03, 0.03, 0.06)), density=1200, position=(0, 0, -0.53))
+        >>> joint = scene.join(cord.end, plug)
+        >>> simulation = scene.build()
+        >>> record = simulation.run(0.5)
+        """
+        name = self._directory.new_name(name, "body")
+        index = len(self._directory.layout.body_points)
+        part = make_body(name, index, solid, density, mass, inertia, center, position, rotation)
+        self._directory.layout.add_body(part.center)
+        return cast(Body, self._directory.add(part))
+
     @overload
     def join(
         self,
-        a: NodeHandle | str,
-        b: NodeHandle | str,
+        a: NodeHandle | Body | str,
+        b: NodeHandle | Body | str,
         kind: JoinKind = "rigid",
         *,
+        at: npt.ArrayLike | None = None,
         axis: npt.ArrayLike | None = None,
         form: JointForm = "frame",
         stiffness: float = 0.0,
@@ -262,12 +346,13 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
     @overload
     def join(
         self,
-        a: NodeHandle | str,
-        b: NodeHandle | str,
-        c: NodeHandle,
+        a: NodeHandle | Body | str,
+        b: NodeHandle | Body | str,
+        c: NodeHandle | Body,
         /,
-        *others: NodeHandle | str,
+        *others: NodeHandle | Body | str,
         kind: JoinKind = "rigid",
+        at: npt.ArrayLike | None = None,
         axis: npt.ArrayLike | None = None,
         form: JointForm = "frame",
         stiffness: float = 0.0,
@@ -279,10 +364,11 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
 
     def join(
         self,
-        a: NodeHandle | str,
-        b: NodeHandle | str,
-        *others: NodeHandle | str,
+        a: NodeHandle | Body | str,
+        b: NodeHandle | Body | str,
+        *others: NodeHandle | Body | str,
         kind: JoinKind = "rigid",
+        at: npt.ArrayLike | None = None,
         axis: npt.ArrayLike | None = None,
         form: JointForm = "frame",
         stiffness: float = 0.0,
@@ -307,10 +393,12 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
 
         Parameters
         ----------
-        a, b, *others : NodeHandle or str
-            Ends or inner nodes of one or several rods.
+        a, b, *others : NodeHandle, Body or str
+            Ends or inner nodes of one or several rods, and rigid bodies.
         kind : {"rigid", "pinned", "revolute"}
             Relative rotation of the rods: none, free, or about one axis. May follow the nodes by position.
+        at : array_like of shape (3,) [m]
+            Place of the joint of two bodies, as drawn. With a rod, the joint is at its node.
         axis : array_like of shape (3,)
             Axis of a revolute joint as drawn. The axis turns with `a`.
         form : {"frame", "pairs"}
@@ -355,12 +443,13 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         >>> record = simulation.run(1.0)
         """
         nodes = [a, b, *others]
-        if others and isinstance(others[-1], str) and parse_place(others[-1]) is None:
+        last = others[-1] if others else None
+        if isinstance(last, str) and parse_place(last) is None and last not in self._directory.parts:
             if kind != "rigid":
                 raise ValueError(f"kind of the joint must be given once, got {others[-1]!r} and {kind!r}")
             kind = cast(JoinKind, nodes.pop())
         numbers = (stiffness, rest_angle, damping, moment)
-        parts = self._joints.join(nodes, kind, axis, form, numbers, name)
+        parts = self._joints.join(nodes, at, kind, axis, form, numbers, name)
         joints = tuple(cast(Joint, self._directory.add(part)) for part in parts)
         return joints if len(joints) > 1 else joints[0]
 

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from withe.common.keywords import keyword_hints
 from withe.parts.directory import Directory
-from withe.parts.handles import Hand, NodeHandle, Rod, Support
+from withe.parts.handles import Body, Hand, NodeHandle, Rod, Support
 from withe.parts.hands import Sliding, make_hand
 from withe.parts.kinds import SupportPart
 from withe.parts.supports import check_not_held, make_clamp, make_pin
@@ -24,26 +24,30 @@ class Supports:
 
     def clamp(
         self,
-        node: NodeHandle | str,
+        node: NodeHandle | Body | str,
         *,
+        at: npt.ArrayLike | None = None,
         hold: Literal["frame", "edge"] = "frame",
         free: npt.ArrayLike | None = None,
-        spin: bool = False,
+        spin: bool | npt.ArrayLike = False,
         name: str | None = None,
     ) -> Support:
-        """Fix the position of a node, and the direction and roll of its rod.
+        """Fix the position of a node, and the direction and roll of its rod; or a rigid body.
 
         Parameters
         ----------
-        node : NodeHandle or str
-            Node to clamp.
+        node : NodeHandle, Body or str
+            Node or body to clamp.
+        at : array_like of shape (3,) [m]
+            Point at which a body is held, as drawn. By default its centre of mass.
         hold : {"frame", "edge"}
             "frame" clamps the rod at the node, as a wall does. "edge" holds the end edge: both of its nodes and its
             angle.
         free : array_like of shape (3,) or (2, 3)
             Directions along which the clamp may slide.
-        spin : bool
-            True if the rod may spin about its tangent, whose direction stays held.
+        spin : bool, or array_like of shape (3,)
+            True if the rod may spin about its tangent, whose direction stays held. For a body the axis about which it
+            may turn: a hinge to the world.
         name : str
             Name of the support. By default "clamp 1", ...
 
@@ -63,17 +67,26 @@ class Supports:
         Simulation.move : Move the clamp.
         Simulation.reaction : Force and moment of the clamp.
         """
-        return _hold(self._directory, make_clamp(self._directory, node, hold, free, spin, name))
+        return _hold(self._directory, make_clamp(self._directory, node, hold, free, spin, name, at))
 
-    def pin(self, node: NodeHandle | str, *, free: npt.ArrayLike | None = None, name: str | None = None) -> Support:
-        """Fix the position of a node. The rod is free to turn.
+    def pin(
+        self,
+        node: NodeHandle | Body | str,
+        *,
+        at: npt.ArrayLike | None = None,
+        free: npt.ArrayLike | None = None,
+        name: str | None = None,
+    ) -> Support:
+        """Fix the position of a node, or of a point of a rigid body. The rod or the body is free to turn.
 
         Arguments, return value and errors are those of `clamp`.
 
         Parameters
         ----------
-        node : NodeHandle or str
-            Node to pin.
+        node : NodeHandle, Body or str
+            Node or body to pin.
+        at : array_like of shape (3,) [m]
+            Point at which a body is held, as drawn. By default its centre of mass.
         free : array_like of shape (3,) or (2, 3)
             Directions along which the pin may slide.
         name : str
@@ -93,7 +106,7 @@ class Supports:
         clamp : Hold the direction of the rod too.
         Simulation.move : Move the pin.
         """
-        return _hold(self._directory, make_pin(self._directory, node, free, name))
+        return _hold(self._directory, make_pin(self._directory, node, free, name, at))
 
     def grasp(
         self,

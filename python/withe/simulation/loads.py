@@ -47,7 +47,7 @@ class RunningLoads:
 
     def take(self, part: LoadPart) -> Load:
         """Add a load that acts from now on."""
-        self._session.world.add_load(describe_load(part))
+        self._session.world.add_load(describe_load(self._session.directory, part))
         self._session.settings.loads[part.name] = part
         if part.function is not None:
             self._session.settings.functions[part.name] = part.function

@@ -9,8 +9,9 @@ import numpy.typing as npt
 
 from withe.knots import link
 from withe.parts.contacts import contact_table
-from withe.parts.handles import Hand, Joint, NodeHandle, Obstacle, Rod, Spring, Support, Tendon
+from withe.parts.handles import Body, Hand, Joint, NodeHandle, Obstacle, Rod, Spring, Support, Tendon
 from withe.parts.kinds import ObstaclePart, RodPart, SpringPart, TendonPart
+from withe.simulation.bodies import body_position, body_rotation, body_spin, body_velocity
 from withe.simulation.hands import (
     Deflection,
     HeldPose,
@@ -41,6 +42,100 @@ class Measurements:
     def rods(self) -> tuple[Rod, ...]:
         """Return the handles of all rods, in the order of the scene."""
         return self._session.directory.rods
+
+    def position(self, body: Body | str) -> FloatArray:
+        """Return the position of the origin of a rigid body's axes.
+
+        Parameters
+        ----------
+        body : Body or str
+            Body to read.
+
+        Returns
+        -------
+        ndarray of shape (3,) [m]
+
+        Raises
+        ------
+        ValueError
+            No body of this scene.
+
+        See Also
+        --------
+        rotation : Orientation of a body.
+        positions : Positions of the nodes of rods.
+        """
+        return body_position(self._session, body)
+
+    def rotation(self, body: Body | str) -> FloatArray:
+        """Return the orientation of a rigid body: its axes as the columns of a matrix.
+
+        Parameters
+        ----------
+        body : Body or str
+            Body to read.
+
+        Returns
+        -------
+        ndarray of shape (3, 3)
+
+        Raises
+        ------
+        ValueError
+            No body of this scene.
+
+        See Also
+        --------
+        position : Position of a body.
+        angular_velocity : Angular velocity of a body.
+        """
+        return body_rotation(self._session, body)
+
+    def velocity(self, body: Body | str) -> FloatArray:
+        """Return the velocity of the origin of a rigid body's axes.
+
+        Parameters
+        ----------
+        body : Body or str
+            Body to read.
+
+        Returns
+        -------
+        ndarray of shape (3,) [m/s]
+
+        Raises
+        ------
+        ValueError
+            No body of this scene.
+
+        See Also
+        --------
+        set_velocity : Set the motion of a body.
+        """
+        return body_velocity(self._session, body)
+
+    def angular_velocity(self, body: Body | str) -> FloatArray:
+        """Return the angular velocity of a rigid body, in the axes of the world.
+
+        Parameters
+        ----------
+        body : Body or str
+            Body to read.
+
+        Returns
+        -------
+        ndarray of shape (3,) [rad/s]
+
+        Raises
+        ------
+        ValueError
+            No body of this scene.
+
+        See Also
+        --------
+        set_velocity : Set the motion of a body.
+        """
+        return body_spin(self._session, body)
 
     def positions(self, rod: Rod | str | None = None) -> FloatArray:
         """Return the positions of the nodes of a rod, or of all nodes of the scene.

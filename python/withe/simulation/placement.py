@@ -9,9 +9,10 @@ import numpy.typing as npt
 from withe.common.deprecation import old_word
 from withe.common.keywords import keyword_hints
 from withe.parts.friction import Friction
-from withe.parts.handles import NodeHandle, Obstacle, Rod, Support
+from withe.parts.handles import Body, NodeHandle, Obstacle, Rod, Support
 from withe.parts.hands import Sliding, make_hand
 from withe.parts.supports import make_clamp, make_pin
+from withe.simulation.bodies import set_body_velocity
 from withe.simulation.hands import RunningHand, feed_ring, find_hand
 from withe.simulation.motion import PathLike, RotationLike
 from withe.simulation.obstacles import find_obstacle, move_obstacle
@@ -433,6 +434,32 @@ class Placement:
         >>> simulation.set_state(arm, spins=np.linspace(0.0, 5.0, 30))
         """
         set_state(self._session, rod, positions, velocities, twist, directors, spins)
+
+    def set_velocity(
+        self, body: Body | str, velocity: npt.ArrayLike | None = None, *, angular: npt.ArrayLike | None = None
+    ) -> None:
+        """Set the motion of a rigid body. Rods that are joined to it keep their velocities except at the joint.
+
+        Parameters
+        ----------
+        body : Body or str
+            Body to change.
+        velocity : array_like of shape (3,) [m/s]
+            Velocity of the origin of the body's axes. By default it stays.
+        angular : array_like of shape (3,) [rad/s]
+            Angular velocity in the axes of the world. By default it stays.
+
+        Raises
+        ------
+        ValueError
+            No body of this scene, a wrong shape, or a value that is not finite.
+
+        See Also
+        --------
+        velocity : Velocity of a body.
+        angular_velocity : Angular velocity of a body.
+        """
+        set_body_velocity(self._session, body, velocity, angular)
 
     def set_velocities(self, rod: Rod | str | None, velocities: npt.ArrayLike) -> None:
         """Set the velocities of the nodes of a rod.

@@ -65,7 +65,7 @@ def _check_time_step(stepping: Stepping) -> None:
     damped = any(session.directory.all(FluidPart)) or any(session.directory.all(DragPart))
     if session.options.integrator in ("static", "verlet") or session.custom_forces or damped:
         return
-    if step < max(_cantilever_period(session, rod) for rod in session.directory.all(RodPart)):
+    if step < max((_cantilever_period(session, rod) for rod in session.directory.all(RodPart)), default=math.inf):
         return
     modes = stepping.linearise().frequencies(1)
     lowest = complex(modes[0]).real if len(modes) else 0.0

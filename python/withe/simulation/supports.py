@@ -33,7 +33,7 @@ FloatArray = npt.NDArray[np.float64]
 def hold(session: Session, part: SupportPart) -> Support:
     """Put a support on."""
     check_not_held(session.directory, part, (other for _, other in session.settings.supports.values()))
-    index = session.world.add_support(describe_support(part))
+    index = session.world.add_support(describe_support(session.directory, part))
     session.settings.supports[part.name] = index, part
     return cast(Support, session.directory.add(part))
 

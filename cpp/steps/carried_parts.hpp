@@ -1,0 +1,35 @@
+#pragma once
+/// Parts that rigid bodies carry: nodes at fixed places of a body, and bodies that turn about a hinge of another body.
+/// Their unknowns follow those of the body, and forces on them act on the body.
+///
+/// In a step a body turns by the rotation with the Cayley vector w, R1 = cay(w) R0, so a point at R a from the base of
+/// the body moves exactly by
+///   R1 a - R0 a = w x (R0 a + R1 a) / 2.
+/// Under the midpoint rules the node is in the middle of its chord. There its lever is (R0 a + R1 a) / 2, and a force f
+/// on it has the moment of this lever, whose work over w is the work of f over the chord. Every discrete gradient of a
+/// potential therefore keeps its work, and its zero sum of moments. The lever is not R(w / 2) a, which loses energy.
+///
+/// A body B on a hinge of a body A turns by w_B = w_A + arm D phi, where the arm is along the mean of the hinge's axes
+/// at both ends of the step (`hinge_arm`). A moment on B acts on A, and its product with the arm acts on the angle phi.
+///
+/// Rows of a frame are moments in energy-momentum steps, else generalised forces S(w)^T m, where S dw is the spin.
+
+#include <vector>
+
+#include "assembly/assembler.hpp"
+#include "steps/step_problem.hpp"
+
+namespace withe {
+
+/// Puts all carried parts where their bodies have them at z.
+void place_carried(const StepProblem& problem, VectorX& z);
+
+/// Adds the rows of carried parts to those of their bodies, and clears them. `carrying` gets the derivatives at z, one
+/// per carried part.
+void fold_rows(const StepProblem& problem, const VectorX& z, VectorX& rows, VectorX& magnitude,
+               std::vector<Carrying>& carrying);
+
+/// Displacements of carried parts by those of their bodies.
+void expand_step(const Model& model, const std::vector<Carrying>& carrying, VectorX& step);
+
+}  // namespace withe

@@ -1,0 +1,145 @@
+"""Rigid bodies: how they are made, checked and described to the engine."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import numpy.typing as npt
+
+from withe import _core
+from withe.common import validation
+from withe.parts.directory import Directory
+from withe.parts.handles import UnionFind
+from withe.parts.kinds import BodyPart, JoinPart, SupportPart
+from withe.solids import Solid
+
+__all__ = ["describe_bodies", "make_body"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def make_body(
+    name: str,
+    index: int,
+    solid: Solid | None,
+    density: float | None,
+    mass: float | None,
+    inertia: npt.ArrayLike | None,
+    center: npt.ArrayLike | None,
+    position: npt.ArrayLike,
+    rotation: npt.ArrayLike | None,
+) -> BodyPart:
+    """Make and check a body; see `Scene.add_body`."""
+    owner = f"body {name!r}"
+    origin = validation.vector(position, f"position of {owner}")
+    axes = np.eye(3) if rotation is None else validation.rotation_matrix(rotation, f"rotation of {owner}")
+    if solid is not None:
+        if inertia is not None or center is not None:
+            raise ValueError(f"inertia and center of {owner} follow from its solid: give density= or mass= alone")
+        if (density is None) == (mass is None):
+            raise ValueError(f"{owner} must have either density= or mass=, got {'neither' if mass is None else 'both'}")
+        if mass is not None:
+            kilograms = validation.positive(mass, f"mass of {owner}")
+        else:
+            kilograms = solid.volume * validation.positive(density, f"density of {owner}")
+        moment, middle = kilograms * solid.inertia_per_mass, solid.center
+    else:
+        if density is not None:
+            raise ValueError(f"density of {owner} needs a solid, for example withe.solids.Box((0.1, 0.1, 0.1))")
+        if mass is None or inertia is None:
+            raise ValueError(f"{owner} must have mass= and inertia=, or a solid with density=")
+        kilograms = validation.positive(mass, f"mass of {owner}")
+        moment = _inertia(inertia, owner)
+        middle = np.zeros(3) if center is None else validation.vector(center, f"center of {owner}")
+    return BodyPart(name, index, kilograms, axes @ moment @ axes.T, origin + axes @ middle, origin, axes, solid)
+
+
+def _inertia(value: npt.ArrayLike, owner: str) -> FloatArray:
+    """Return a moment of inertia, (3, 3), from one number, three principal moments or a matrix."""
+    given = np.array(value, dtype=float)
+    if given.shape not in ((), (3,), (3, 3)) or not np.isfinite(given).all():
+        raise ValueError(
+            f"inertia of {owner} must be a number, three principal moments or a matrix (3, 3), got shape {given.shape}"
+        )
+    moment = given * np.eye(3) if given.ndim < 2 else given
+    size = float(np.abs(moment).max())
+    if np.abs(moment - moment.T).max() > 1e-9 * size:
+        raise ValueError(f"inertia of {owner} must be symmetric")
+    moment = 0.5 * (moment + moment.T)
+    principal = np.linalg.eigvalsh(moment)
+    if not principal[0] > 0.0:
+        raise ValueError(f"inertia of {owner} must be positive, got principal moments {principal.tolist()} kg m^2")
+    if principal[0] + principal[1] < principal[2] * (1.0 - 1e-9):
+        raise ValueError(
+            f"inertia of {owner} belongs to no body: the sum of two principal moments must not be less than the "
+            f"third, got {principal.tolist()} kg m^2"
+        )
+    return moment
+
+
+def describe_bodies(directory: Directory) -> list[_core.BodyDescription]:
+    """All bodies for the engine, each after those that carry it.
+
+    Raises
+    ------
+    ValueError
+        Bodies that joints connect to a closed loop.
+    """
+    bodies = directory.all(BodyPart)
+    places = {body: (base, carrier) for body, base, carrier in _bases(directory, bodies)}
+    found = []
+    for body in bodies:
+        rows = directory.layout.rows(-1 - body.index)
+        description = _core.BodyDescription()
+        description.name = body.name
+        description.node, description.carrier = places[body.index]
+        description.carried = [int(row) for row in rows if row != description.node]
+        description.inertia = body.inertia
+        found.append(description)
+    return found
+
+
+def _bases(directory: Directory, bodies: list[BodyPart]) -> Iterator[tuple[int, int, int]]:
+    """Yield the index of each body, the row of its base, and the body on whose hinge it is, or -1.
+
+    The base is the point that is held, else the point that joins it to the body before, else its first joint. A rod
+    with a body at its end then keeps its band.
+    """
+    held = {directory.row(support.node) for support in directory.all(SupportPart)}
+    joined = [node for join in directory.all(JoinPart) for node in join.nodes if node[0] < 0]
+    rows = {body.index: [directory.row(node) for node in joined if node[0] == -1 - body.index] for body in bodies}
+    holds = {body.index: [int(r) for r in directory.layout.rows(-1 - body.index) if r in held] for body in bodies}
+    owners: dict[int, list[int]] = {}
+    for body, own in rows.items():
+        for row in dict.fromkeys(own):
+            owners.setdefault(row, []).append(body)
+    loops = UnionFind(len(bodies))
+    for shared in owners.values():
+        for other in shared[1:]:
+            if loops.find(shared[0]) == loops.find(other):
+                names = " and ".join(repr(bodies[i].name) for i in (shared[0], other))
+                raise ValueError(
+                    f"joints connect bodies {names} to a closed loop, which is not supported: open the loop"
+                )
+            loops.unite(shared[0], other)
+    done: set[int] = set()
+    hinged = {
+        frozenset(-1 - node[0] for node in join.nodes)
+        for join in directory.all(JoinPart)
+        if join.axis is not None and all(node[0] < 0 for node in join.nodes)
+    }
+    starts = sorted(rows, key=lambda body: not holds[body])
+    for start in starts:
+        if start in done:
+            continue
+        first = next(iter([*holds[start], *rows[start]]), None)
+        pending = [(start, directory.row((-1 - start, 0)) if first is None else first, -1)]
+        while pending:
+            body, base, before = pending.pop(0)
+            if body in done:
+                continue
+            done.add(body)
+            yield body, base, before if frozenset((body, before)) in hinged else -1
+            for row in dict.fromkeys(rows[body]):
+                pending += [(other, row, body) for other in owners[row] if other not in done]

@@ -1,0 +1,289 @@
+"""Solids: mass, centre and inertia of rigid bodies from their shapes.
+
+Give one of them to `Scene.add_body`, with a density:
+
+>>> import withe
+>>> plug = withe.solids.Box((0.04, 0.02, 0.02))
+>>> round(plug.volume * 1e6, 6)
+16.0
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.common import validation
+
+__all__ = ["Box", "Capsule", "Cylinder", "Mesh", "Solid", "Sphere"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+class Solid(Protocol):
+    """A shape of uniform density in axes of its own.
+
+    Attributes
+    ----------
+    volume : float [m^3]
+    center : ndarray of shape (3,) [m]
+        Centre of mass.
+    inertia_per_mass : ndarray of shape (3, 3) [m^2]
+        Moment of inertia about the centre of mass over the mass.
+    """
+
+    @property
+    def volume(self) -> float:
+        """Volume [m^3]."""
+
+    @property
+    def center(self) -> FloatArray:
+        """Centre of mass, shape (3,) [m]."""
+
+    @property
+    def inertia_per_mass(self) -> FloatArray:
+        """Moment of inertia about the centre of mass over the mass, shape (3, 3) [m^2]."""
+
+    def surface(self) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+        """Return vertices (n, 3) [m] and triangles (m, 3) of a surface for pictures."""
+
+
+@dataclass(frozen=True)
+class Sphere:
+    """A ball.
+
+    Parameters
+    ----------
+    radius : float [m]
+    """
+
+    radius: float
+
+    def __post_init__(self) -> None:
+        validation.positive(self.radius, "radius of the sphere")
+
+    @property
+    def volume(self) -> float:
+        """Volume [m^3]."""
+        return 4.0 / 3.0 * np.pi * float(self.radius) ** 3
+
+    @property
+    def center(self) -> FloatArray:
+        """Centre of mass, shape (3,) [m]."""
+        return np.zeros(3)
+
+    @property
+    def inertia_per_mass(self) -> FloatArray:
+        """Moment of inertia about the centre of mass over the mass, shape (3, 3) [m^2]."""
+        return 0.4 * float(self.radius) ** 2 * np.eye(3)
+
+    def surface(self) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+        """Return vertices (n, 3) [m] and triangles (m, 3) of a surface for pictures."""
+        angles = np.linspace(0.0, np.pi, 13)
+        return _turned(self.radius * np.sin(angles), -self.radius * np.cos(angles))
+
+
+@dataclass(frozen=True)
+class Box:
+    """A cuboid about the origin.
+
+    Parameters
+    ----------
+    size : tuple of three floats [m]
+        Lengths of the edges along x, y and z.
+    """
+
+    size: tuple[float, float, float]
+
+    def __post_init__(self) -> None:
+        sides = validation.vector(self.size, "size of the box")
+        if not (sides > 0.0).all():
+            raise ValueError(f"size of the box must be positive, got {tuple(map(float, sides))}")
+
+    @property
+    def volume(self) -> float:
+        """Volume [m^3]."""
+        return float(np.prod(np.asarray(self.size, dtype=float)))
+
+    @property
+    def center(self) -> FloatArray:
+        """Centre of mass, shape (3,) [m]."""
+        return np.zeros(3)
+
+    @property
+    def inertia_per_mass(self) -> FloatArray:
+        """Moment of inertia about the centre of mass over the mass, shape (3, 3) [m^2]."""
+        squares = np.asarray(self.size, dtype=float) ** 2
+        return np.diag(squares.sum() - squares) / 12.0
+
+    def surface(self) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+        """Return vertices (n, 3) [m] and triangles (m, 3) of a surface for pictures."""
+        signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
+        quads = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+        triangles = [triangle for a, b, c, d in quads for triangle in ((a, b, c), (a, c, d))]
+        return 0.5 * signs * np.asarray(self.size, dtype=float), np.array(triangles)
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """A cylinder along z, about the origin.
+
+    Parameters
+    ----------
+    radius, length : float [m]
+    """
+
+    radius: float
+    length: float
+
+    def __post_init__(self) -> None:
+        validation.positive(self.radius, "radius of the cylinder")
+        validation.positive(self.length, "length of the cylinder")
+
+    @property
+    def volume(self) -> float:
+        """Volume [m^3]."""
+        return float(np.pi * self.radius**2 * self.length)
+
+    @property
+    def center(self) -> FloatArray:
+        """Centre of mass, shape (3,) [m]."""
+        return np.zeros(3)
+
+    @property
+    def inertia_per_mass(self) -> FloatArray:
+        """Moment of inertia about the centre of mass over the mass, shape (3, 3) [m^2]."""
+        across = self.radius**2 / 4.0 + self.length**2 / 12.0
+        return np.diag([across, across, self.radius**2 / 2.0])
+
+    def surface(self) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+        """Return vertices (n, 3) [m] and triangles (m, 3) of a surface for pictures."""
+        half = 0.5 * self.length
+        return _turned(self.radius * np.array([0.0, 1.0, 1.0, 0.0]), np.array([-half, -half, half, half]))
+
+
+@dataclass(frozen=True)
+class Capsule:
+    """A cylinder along z with hemispheres at both ends, about the origin.
+
+    Parameters
+    ----------
+    radius, length : float [m]
+        `length` is that of the cylinder, without the hemispheres.
+    """
+
+    radius: float
+    length: float
+
+    def __post_init__(self) -> None:
+        validation.positive(self.radius, "radius of the capsule")
+        validation.positive(self.length, "length of the capsule")
+
+    @property
+    def volume(self) -> float:
+        """Volume [m^3]."""
+        return float(np.pi * self.radius**2 * (self.length + 4.0 / 3.0 * self.radius))
+
+    @property
+    def center(self) -> FloatArray:
+        """Centre of mass, shape (3,) [m]."""
+        return np.zeros(3)
+
+    @property
+    def inertia_per_mass(self) -> FloatArray:
+        """Moment of inertia about the centre of mass over the mass, shape (3, 3) [m^2]."""
+        r, h = float(self.radius), float(self.length)
+        barrel, caps = np.pi * r**2 * h, 4.0 / 3.0 * np.pi * r**3
+        along = barrel * r**2 / 2.0 + caps * 0.4 * r**2
+        # A hemisphere's centre of mass is 3 r / 8 from its flat side.
+        across = barrel * (r**2 / 4.0 + h**2 / 12.0) + caps * (0.4 * r**2 + h**2 / 4.0 + 3.0 * h * r / 8.0)
+        return np.diag([across, across, along]) / (barrel + caps)
+
+    def surface(self) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+        """Return vertices (n, 3) [m] and triangles (m, 3) of a surface for pictures."""
+        angles = np.linspace(0.0, np.pi, 14)
+        shift = np.where(angles < 0.5 * np.pi, -0.5, 0.5) * self.length
+        return _turned(self.radius * np.sin(angles), shift - self.radius * np.cos(angles))
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """A closed surface of triangles, whose normals point outwards.
+
+    Parameters
+    ----------
+    vertices : array_like of shape (n, 3) [m]
+    triangles : array_like of shape (m, 3)
+        Rows of `vertices`, counter-clockwise when seen from outside.
+    """
+
+    vertices: npt.ArrayLike
+    triangles: npt.ArrayLike
+
+    def __post_init__(self) -> None:
+        vertices = np.array(self.vertices, dtype=float)
+        triangles = np.array(self.triangles)
+        if vertices.ndim != 2 or vertices.shape[1:] != (3,) or not np.isfinite(vertices).all():
+            raise ValueError(f"vertices must be finite and of shape (n, 3), got shape {vertices.shape}")
+        if triangles.ndim != 2 or triangles.shape[1:] != (3,) or not np.issubdtype(triangles.dtype, np.integer):
+            raise ValueError(f"triangles must be whole numbers of shape (m, 3), got shape {triangles.shape}")
+        if triangles.size == 0 or triangles.min() < 0 or triangles.max() >= len(vertices):
+            raise ValueError("triangles must be rows of vertices")
+        edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+        forth, back = {tuple(edge) for edge in edges.tolist()}, {(b, a) for a, b in edges.tolist()}
+        if len(forth) != len(edges) or forth != back:
+            raise ValueError(
+                "the mesh must be closed and its triangles equally oriented: each edge belongs to two of them"
+            )
+        object.__setattr__(self, "vertices", vertices)
+        object.__setattr__(self, "triangles", triangles)
+        if self.volume <= 0.0:
+            raise ValueError("triangles must be counter-clockwise when seen from outside: the volume is negative")
+
+    def _corners(self) -> tuple[FloatArray, FloatArray]:
+        """Return the corners of the tetrahedra from the origin to each triangle, and their signed volumes."""
+        corners = np.asarray(self.vertices)[np.asarray(self.triangles)]
+        return corners, np.linalg.det(corners) / 6.0
+
+    @property
+    def volume(self) -> float:
+        """Volume [m^3]."""
+        return float(self._corners()[1].sum())
+
+    @property
+    def center(self) -> FloatArray:
+        """Centre of mass, shape (3,) [m]."""
+        corners, volumes = self._corners()
+        return np.asarray(volumes @ corners.sum(axis=1) / 4.0 / volumes.sum())
+
+    @property
+    def inertia_per_mass(self) -> FloatArray:
+        """Moment of inertia about the centre of mass over the mass, shape (3, 3) [m^2]."""
+        corners, volumes = self._corners()
+        sums = corners.sum(axis=1)
+        # Second moments of a tetrahedron with a corner at the origin: V / 20 (sum_i x_i x_i^T + s s^T).
+        second = np.einsum("m,mij,mik->jk", volumes, corners, corners) + np.einsum("m,mj,mk->jk", volumes, sums, sums)
+        second = second / 20.0 / volumes.sum() - np.outer(self.center, self.center)
+        return np.asarray(np.trace(second) * np.eye(3) - second)
+
+    def surface(self) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+        """Return vertices (n, 3) [m] and triangles (m, 3) of a surface for pictures."""
+        return np.asarray(self.vertices), np.asarray(self.triangles)
+
+
+def _turned(radii: FloatArray, heights: FloatArray, sides: int = 24) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+    """Return the surface that a profile draws when it turns about z."""
+    angles = np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)
+    circle = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(sides)])
+    rings = [radius * circle + (0.0, 0.0, height) for radius, height in zip(radii, heights, strict=True)]
+    here = np.arange(sides)
+    after = (here + 1) % sides
+    triangles = []
+    for ring in range(len(radii) - 1):
+        low, high = ring * sides, (ring + 1) * sides
+        triangles.append(np.column_stack([low + here, low + after, high + after]))
+        triangles.append(np.column_stack([low + here, high + after, high + here]))
+    return np.concatenate(rings), np.concatenate(triangles)
