@@ -312,40 +312,66 @@ void Assembler::add_bodies_to(std::vector<std::vector<int>>& cliques) const {
 
 void Assembler::find_folds() {
   folds_.clear();
+  const auto place = [&](int row, int column) {
+    return pattern_.contains(row, column) ? solver_->place(row, column) : std::ptrdiff_t{-1};
+  };
   for (const CarriedPart& part : model_.carried) {
-    Fold fold;
-    append(fold.own, part.own_dof, part.own_size);
-    fold.body = part.body_dofs;
-    for (int dof : fold.own)
+    std::vector<int> own, others;
+    append(own, part.own_dof, part.own_size);
+    std::vector<int> square = own;
+    square.insert(square.end(), part.body_dofs.begin(), part.body_dofs.end());
+    for (int dof : own)
       for (int k = pattern_.column_starts[at(dof)]; k < pattern_.column_starts[at(dof) + 1]; ++k)
-        fold.others.push_back(pattern_.row_indices[at(k)]);
-    std::sort(fold.others.begin(), fold.others.end());
-    fold.others.erase(std::unique(fold.others.begin(), fold.others.end()), fold.others.end());
-    const auto is_its = [&](int dof) {
-      return std::find(fold.own.begin(), fold.own.end(), dof) != fold.own.end() ||
-             std::find(fold.body.begin(), fold.body.end(), dof) != fold.body.end();
+        if (const int other = pattern_.row_indices[at(k)];
+            std::find(square.begin(), square.end(), other) == square.end())
+          others.push_back(other);
+    std::sort(others.begin(), others.end());
+    others.erase(std::unique(others.begin(), others.end()), others.end());
+    Fold fold;
+    fold.own = part.own_size;
+    fold.body = static_cast<int>(part.body_dofs.size());
+    fold.others = static_cast<int>(others.size());
+    const auto list = [&](const std::vector<int>& rows, const std::vector<int>& columns, auto& out) {
+      for (int row : rows)
+        for (int column : columns) out.push_back(place(row, column));
     };
-    fold.others.erase(std::remove_if(fold.others.begin(), fold.others.end(), is_its), fold.others.end());
+    list(own, others, fold.rows);
+    list(part.body_dofs, others, fold.onto_rows);
+    if (symmetry_ != Symmetry::symmetric) {
+      list(others, own, fold.columns);
+      list(others, part.body_dofs, fold.onto_columns);
+    }
+    list(square, square, fold.square);
     folds_.push_back(std::move(fold));
   }
 }
+
+namespace {
+
+/// An entry that is taken out of the matrix; 0 if there is none.
+double taken(std::span<double> values, std::ptrdiff_t place) {
+  return place < 0 ? 0.0 : std::exchange(values[static_cast<std::size_t>(place)], 0.0);
+}
+
+}  // namespace
 
 /// With d its unknowns, u those of its body, dd = G du, and rows r_u += H r_d: K_uj += H K_dj, K_ju += K_jd G.
 void Assembler::fold_carried(const std::vector<Carrying>& carrying) {
   const std::span<double> values = solver_->values();
   const bool symmetric = symmetry_ == Symmetry::symmetric;
-  const auto entry_at = [&](int r, int c) -> double& { return values[static_cast<std::size_t>(solver_->place(r, c))]; };
-  using Small = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 6, 6>;
+  const auto add = [&](std::ptrdiff_t place, double value) {
+    if (value != 0.0) values[static_cast<std::size_t>(place)] += value;
+  };
+  using Small = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, Carrying::kMost, Carrying::kMost>;
   for (std::size_t i = folds_.size(); i-- > 0;) {  // parts of parts first
-    const auto& [own, body, others] = folds_[i];
-    const int d = static_cast<int>(own.size()), u = static_cast<int>(body.size());
+    const Fold& fold = folds_[i];
+    const int d = fold.own, u = fold.body, n = fold.others, all = d + u;
     const Small G = carrying[i].follow.topLeftCorner(d, u), H = carrying[i].act.topLeftCorner(u, d);
-    double row[3], column[3];
-    for (int j : others) {
+    for (int j = 0; j < n; ++j) {
+      double row[3] = {0, 0, 0}, column[3] = {0, 0, 0};
       for (int a = 0; a < d; ++a) {
-        const bool known = pattern_.contains(own[at(a)], j);
-        row[a] = known ? std::exchange(entry_at(own[at(a)], j), 0.0) : 0.0;
-        column[a] = known && !symmetric ? std::exchange(entry_at(j, own[at(a)]), 0.0) : 0.0;
+        row[a] = taken(values, fold.rows[at(a * n + j)]);
+        if (!symmetric) column[a] = taken(values, fold.columns[at(j * d + a)]);
       }
       for (int b = 0; b < u; ++b) {
         double down = 0.0, right = 0.0;
@@ -353,26 +379,29 @@ void Assembler::fold_carried(const std::vector<Carrying>& carrying) {
           down += H(b, a) * row[a];
           right += column[a] * G(a, b);
         }
-        if (down != 0.0) entry_at(body[at(b)], j) += down;
-        if (right != 0.0) entry_at(j, body[at(b)]) += right;
+        add(fold.onto_rows[at(b * n + j)], down);
+        if (!symmetric) add(fold.onto_columns[at(j * u + b)], right);
       }
     }
+    const auto square = [&](int r, int c) -> double& {
+      return values[static_cast<std::size_t>(fold.square[at(r * all + c)])];
+    };
     Small dd(d, d), du(d, u), ud(u, d);
     for (int a = 0; a < d; ++a) {
-      for (int b = 0; b < d; ++b) dd(a, b) = entry_at(own[at(a)], own[at(b)]);
+      for (int b = 0; b < d; ++b) dd(a, b) = square(a, b);
       for (int b = 0; b < u; ++b) {
-        du(a, b) = entry_at(own[at(a)], body[at(b)]);
-        ud(b, a) = entry_at(body[at(b)], own[at(a)]);
+        du(a, b) = square(a, d + b);
+        ud(b, a) = square(d + b, a);
       }
     }
     const double size = dd.norm() / std::sqrt(d);
     for (int a = 0; a < d; ++a) {
-      for (int b = 0; b < d; ++b) entry_at(own[at(a)], own[at(b)]) = a != b ? 0.0 : size > 0.0 ? size : 1.0;
-      for (int b = 0; b < u; ++b) entry_at(own[at(a)], body[at(b)]) = entry_at(body[at(b)], own[at(a)]) = 0.0;
+      for (int b = 0; b < d; ++b) square(a, b) = a != b ? 0.0 : size > 0.0 ? size : 1.0;
+      for (int b = 0; b < u; ++b) square(a, d + b) = square(d + b, a) = 0.0;
     }
     const Small uu = H * du + ud * G + H * dd * G + carrying[i].slope.topLeftCorner(u, u);
     for (int a = 0; a < u; ++a)
-      for (int b = 0; b < (symmetric ? a + 1 : u); ++b) entry_at(body[at(a)], body[at(b)]) += uu(a, b);
+      for (int b = 0; b < (symmetric ? a + 1 : u); ++b) square(d + a, d + b) += uu(a, b);
   }
 }
 
@@ -468,6 +497,7 @@ double Assembler::greatest_stiffness(const VectorX& weight) const {
   for (const int dof : model_.frame_dof) consider(dof, model_.frame_size());
   for (const int dof : model_.edge_dof) consider(dof, 1);
   for (const Hinge& hinge : model_.hinges) consider(hinge.dof, 1);
+  for (const Slide& slide : model_.slides) consider(slide.dof, 1);
   return greatest;
 }
 

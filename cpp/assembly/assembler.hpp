@@ -69,9 +69,10 @@ class ElementTable {
 /// A part that a body carries, at one configuration: derivatives of its own unknowns, up to three, by those of the
 /// body, and of the rows of the body.
 struct Carrying {
-  Eigen::Matrix<double, 3, 6> follow;  ///< of its unknowns by those of the body
-  Eigen::Matrix<double, 6, 3> act;     ///< of the rows of the body by the forces on the part
-  Eigen::Matrix<double, 6, 6> slope;   ///< of these rows by the unknowns of the body, with these forces constant
+  static constexpr int kMost = 7;             ///< unknowns of the body: base, frame and slide
+  Eigen::Matrix<double, 3, kMost> follow;     ///< of its unknowns by those of the body
+  Eigen::Matrix<double, kMost, 3> act;        ///< of the rows of the body by the forces on the part
+  Eigen::Matrix<double, kMost, kMost> slope;  ///< of these rows by the unknowns of the body, with these forces constant
 };
 
 /// Ordinary stencils for the kernels of stencil_kernels.hpp, and the other stencils.
@@ -168,9 +169,13 @@ class Assembler {
     std::ptrdiff_t own[3][3];
   };
   void analyse();
-  /// Rows and columns of a carried part: its own unknowns, those of its body, and all others that are coupled with it.
+  /// Places of the entries that a carried part moves: of its own unknowns, those of its body, and all others that are
+  /// coupled with it. -1: there is none.
   struct Fold {
-    std::vector<int> own, body, others;
+    int own = 0, body = 0, others = 0;  ///< numbers of unknowns
+    /// Row after row: own x others, body x others, and (unsymmetric) others x own, others x body.
+    std::vector<std::ptrdiff_t> rows, onto_rows, columns, onto_columns;
+    std::vector<std::ptrdiff_t> square;  ///< (own, body) x (own, body)
   };
   /// `before(place)`: called before an entry is changed.
   template <class Before>

@@ -209,6 +209,7 @@ void find_end_velocity(const Equations& equations, const StepPlan& plan, const S
   if (plan.rule == StepRule::energy_momentum)
     set_turning_velocities(equations.model(), state.v, work.change, plan.dt, v1);
   if (plan.rule != StepRule::backward_euler) set_body_velocities(equations.model(), state.v, work.change, plan.dt, v1);
+  balance_bodies(equations.problem(), work.newton.data, v1);
   equations.assembler().set_held_part(work.held_velocity, v1);
 }
 

@@ -37,6 +37,7 @@ struct LinkPlace {
   double sign;        ///< sign of its unknown
   int hinge = -1;
   bool turns = true;
+  int slide = -1;
 };
 
 VectorX to_vector(const std::vector<double>& v) {
@@ -145,8 +146,9 @@ class Builder {
   }
 
   void add_links(const JointDescription& joint, int base) {
-    if (model_.planar()) return add_planar_links(joint, base);
     if (joint.links.empty()) return;
+    if (joint.links.front().slides) return add_slide(joint, base);
+    if (model_.planar()) return add_planar_links(joint, base);
     const int root = root_of(joint, base);
     for (const RevoluteLink& link : joint.links) {
       const bool swapped = base + link.child == root;
@@ -159,6 +161,20 @@ class Builder {
       hinge_parent_.push_back(root);
       links_.push_back({root, turning, swapped ? -1.0 : 1.0, hinge});
     }
+  }
+
+  /// The turning cluster of a slide: of two bodies that which the other one carries, else that of rods.
+  void add_slide(const JointDescription& joint, int base) {
+    const RevoluteLink& link = joint.links.front();
+    require(joint.links.size() == 1, "a sliding joint must be the only joint at its point");
+    const int parent_body = joint.body_of(at(link.parent)), child_body = joint.body_of(at(link.child));
+    require(parent_body >= 0 || child_body >= 0, "a sliding joint must slide on a body");
+    const bool swapped = parent_body < 0 || (child_body >= 0 && scene_.bodies[at(parent_body)].carrier == child_body);
+    const int root = base + (swapped ? link.child : link.parent), moving = base + (swapped ? link.parent : link.child);
+    const int slide = static_cast<int>(model_.slides.size());
+    model_.slides.push_back({-1, link.axis.normalized(), -1});
+    slide_places_.push_back({root, moving});
+    links_.push_back({root, moving, swapped ? -1.0 : 1.0, -1, true, slide});
   }
 
   /// In a plane, a hinge lies between two frames. A hinge about an axis in the plane cannot turn, so its clusters are
@@ -231,6 +247,11 @@ class Builder {
     std::vector<bool> follows(at(model_.node_count), false), is_placed(scene_.bodies.size(), false);
     for (const BodyDescription& body : scene_.bodies)
       for (int node : body.carried) follows[at(node)] = true;
+    for (std::size_t k = 0; k < slide_places_.size(); ++k) {
+      const auto& [root, moving] = slide_places_[k];
+      model_.slides[k].frame = model_.body_frame[at(clusters_[at(root)].body)];
+      follows[at(slid_node(k))] = true;
+    }
     for (std::size_t pass = 0; pass <= scene_.bodies.size(); ++pass)
       for (std::size_t b = 0; b < scene_.bodies.size(); ++b) {
         const BodyDescription& body = scene_.bodies[b];
@@ -239,11 +260,21 @@ class Builder {
         is_placed[b] = true;
         carry_parts(body, model_.body_frame[b]);
         for (int node : body.carried) follows[at(node)] = false;
+        for (std::size_t k = 0; k < slide_places_.size(); ++k)
+          if (model_.slides[k].frame == model_.body_frame[b]) follows[at(slid_node(k))] = false;
       }
     require(std::all_of(is_placed.begin(), is_placed.end(), [](bool is) { return is; }),
             "bodies carry each other in a closed loop");
     for (Cluster& cluster : clusters_)
       if (cluster.body >= 0) cluster.frame = model_.body_frame[at(cluster.body)];
+    for (const auto& [root, moving] : slide_places_)  // rods on a slide turn with the body
+      if (clusters_[at(moving)].body < 0) clusters_[at(moving)].frame = clusters_[at(root)].frame;
+  }
+
+  /// Node that moves on a slide: the base of a body, or the node of rods.
+  int slid_node(std::size_t slide) const {
+    const Cluster& moving = clusters_[at(slide_places_[slide].second)];
+    return moving.body >= 0 ? scene_.bodies[at(moving.body)].node : node_of(moving);
   }
 
   void carry_parts(const BodyDescription& body, int frame) {
@@ -255,7 +286,26 @@ class Builder {
         part.hinge = static_cast<int>(h);
         model_.carried.push_back(part);
       }
+    for (std::size_t k = 0; k < slide_places_.size(); ++k) {
+      const auto& [root, moving] = slide_places_[k];
+      if (clusters_[at(moving)].body >= 0 && model_.body_frame[at(clusters_[at(moving)].body)] == frame) {
+        CarriedPart part;
+        part.frame = model_.slides[k].frame;
+        part.own_frame = frame;
+        model_.carried.push_back(part);
+      }
+    }
     double mass = scene_.added_mass(body.node);
+    for (std::size_t k = 0; k < slide_places_.size(); ++k) {
+      if (model_.slides[k].frame != frame) continue;
+      CarriedPart part;
+      part.frame = frame;
+      part.node = slid_node(k);
+      part.base = body.node;
+      part.slide = static_cast<int>(k);
+      part.arm = scene_.positions.row(part.node) - scene_.positions.row(body.node);
+      model_.carried.push_back(part);
+    }
     for (int node : body.carried) {
       CarriedPart part;
       part.frame = frame;
@@ -282,11 +332,13 @@ class Builder {
   }
 
   void find_joint_angles() {
-    for (const auto& [parent, child, sign, hinge, turns] : links_) {
+    for (const auto& [parent, child, sign, hinge, turns, slide] : links_) {
       JointAngle joint;
       joint.sign = sign;
       joint.node = node_of(clusters_[at(clusters_[at(parent)].passes.empty() ? child : parent)]);
-      if (hinge >= 0) {
+      if (slide >= 0) {
+        joint.turning = model_.slides[at(slide)].dof;
+      } else if (hinge >= 0) {
         joint.turning = model_.hinges[at(hinge)].dof;
       } else if (turns) {
         joint.turning = model_.frame_dof[at(clusters_[at(child)].frame)];
@@ -557,6 +609,8 @@ class Builder {
     for (std::size_t e = 0; e < model_.edge_dof.size(); ++e) set(model_.edge_dof[e], 1, model_.edge_tail[e]);
     for (std::size_t f = 0; f < model_.frame_dof.size(); ++f)
       set(model_.frame_dof[f], model_.frame_size(), model_.frame_node[f]);
+    for (const Slide& slide : model_.slides)
+      set(slide.dof, 1, model_.frame_node[static_cast<std::size_t>(slide.frame)]);
     for (const Hinge& hinge : model_.hinges)
       if (hinge.dof >= 0) set(hinge.dof, 1, model_.frame_node[static_cast<std::size_t>(hinge.frame)]);
   }
@@ -604,6 +658,7 @@ class Builder {
   std::map<Key, int> cluster_of_;
   std::set<int> gripped_frames_;
   std::vector<LinkPlace> links_;
+  std::vector<std::pair<int, int>> slide_places_;  // clusters: on whose body, and that which moves
   std::vector<int> hinge_parent_, hinged_body_, frame_node_;
   std::vector<double> bend_voronoi_, half_voronoi_;
   std::vector<bool> offsets_keep_drawn_;

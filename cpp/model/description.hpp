@@ -44,11 +44,14 @@ struct RodPass {
   int body() const { return -1 - rod; }
 };
 
-/// A revolute link inside a joint: the second cluster turns about `axis` relative to the first.
+/// A link inside a joint: the second cluster turns about `axis` relative to the first. If it slides, it moves along the
+/// axis instead and does not turn; the first cluster is then that of a body. Its coordinate is in metres, and the
+/// numbers below are forces [N] instead of moments.
 struct RevoluteLink {
   int parent = 0;  ///< index of a cluster of the joint
   int child = 0;
   Vector3 axis = Vector3::UnitZ();  ///< unit length, in the drawn configuration
+  bool slides = false;
   // Between them, see forces/joint.hpp:
   double stiffness = 0;   ///< k [N m/rad]
   double rest_angle = 0;  ///< [rad]
@@ -79,7 +82,7 @@ struct BodyDescription {
   int node = 0;                       ///< row of SceneDescription::positions; its unknowns are the body's
   std::vector<int> carried;           ///< rows of further points of the body
   Matrix3 inertia = Matrix3::Zero();  ///< about the centre of mass, axes as drawn [kg m^2]
-  int carrier = -1;                   ///< body on whose hinge it is; -1: none
+  int carrier = -1;                   ///< body on whose hinge or slide it is; -1: none
 };
 
 enum class SupportKind {

@@ -1,6 +1,7 @@
 #include "model/layout.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 
 #include "common/check.hpp"
@@ -35,11 +36,12 @@ void note_carried(Model& model) {
       part.own_size = model.dimension;
       add(model.node_dof[static_cast<std::size_t>(part.base)], model.dimension);
       add(model.frame_dof[static_cast<std::size_t>(part.frame)], model.frame_size());
+      if (part.slide >= 0) add(model.slides[static_cast<std::size_t>(part.slide)].dof, 1);
     } else {
       part.own_dof = model.frame_dof[static_cast<std::size_t>(part.own_frame)];
       part.own_size = model.frame_size();
       add(model.frame_dof[static_cast<std::size_t>(part.frame)], model.frame_size());
-      add(model.hinges[static_cast<std::size_t>(part.hinge)].dof, 1);
+      if (part.hinge >= 0) add(model.hinges[static_cast<std::size_t>(part.hinge)].dof, 1);
     }
   }
 }
@@ -62,6 +64,8 @@ void lay_out_unknowns(Model& model) {
       next += model.frame_size();
       for (Hinge& hinge : model.hinges)
         if (hinge.frame == f) hinge.dof = next++;
+      for (Slide& slide : model.slides)
+        if (slide.frame == f) slide.dof = next++;
     }
   };
   // Points of bodies that no rod has, such as centres of mass, lie beside the base of their body.
@@ -189,11 +193,13 @@ class Holder {
     require(!is(frame_, support.frame), "joint is already clamped: release the clamp that is there first");
     require(std::none_of(model_.carried.begin(), model_.carried.end(),
                          [&](const CarriedPart& carried) { return carried.own_frame == support.frame; }),
-            "a clamp holds a body on a hinge of another body, which closes a loop: clamp the other body");
+            "a clamp holds a body on a joint of another body, which closes a loop: clamp the other body");
     frame_[at(support.frame)] = true;
     const bool turns = spinning && !model_.planar();
     const Vector3& gripped = support.description.axis;
     const Vector3 axis = gripped.isZero() ? support.tangent : gripped;
+    // In a plane a body turns about the normal, or not at all.
+    if (spinning && model_.planar() && std::abs(axis.dot(model_.plane->normal)) > 0.5) return;
     const Matrix3 free = turns ? Matrix3(axis * axis.transpose()) : Matrix3(Matrix3::Zero());
     model_.constraints.push_back({model_.frame_dof[at(support.frame)], model_.frame_size(), free});
   }

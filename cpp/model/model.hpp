@@ -48,18 +48,27 @@ struct Hinge {
   int dof;
 };
 
-/// A part that a rigid body carries: a node, x = x_base + R arm, where R turns the frame of the body; or the frame of a
-/// second body, on a hinge of the first. It has unknowns like any other part, but they follow those of the body: forces
-/// on it are added to the rows of the body; see steps/carried_parts.hpp.
+/// Motion of a part along an axis of a body.
+struct Slide {
+  int frame;     ///< of the body
+  Vector3 axis;  ///< in the axes of the drawn scene, unit length
+  int dof;       ///< its coordinate, 0 as drawn [m]
+};
+
+/// A part that a rigid body carries: a node, x = x_base + R (arm + s axis), where R turns the frame of the body and s
+/// is the coordinate of a slide, if it is on one; or the frame of a second body, on a hinge or a slide of the first. It
+/// has unknowns like any other part, but they follow those of the body: forces on it are added to the rows of the body;
+/// see steps/carried_parts.hpp.
 struct CarriedPart {
   int frame = -1;  ///< of the body
   // A node:
   int node = -1, base = -1;       ///< the node, and that of the body
   Vector3 arm = Vector3::Zero();  ///< from the base, in the axes of the drawn scene [m]
-  // A frame:
+  int slide = -1;
+  // A frame, which turns with the body if it is on no hinge:
   int own_frame = -1, hinge = -1;
 
-  // Unknowns: its own, and those of the body (base and frame, or frame and hinge).
+  // Unknowns: its own, and those of the body (base, frame and slide, or frame and hinge).
   int own_dof = -1, own_size = 0;
   std::vector<int> body_dofs;
 
@@ -208,11 +217,12 @@ struct Model {
   std::vector<BendStencil> bend;
   std::vector<int> reversed_bend;  ///< stencils with an edge against its rod
   std::vector<FrameStencil> half;
-  VectorX bend_voronoi, half_voronoi;    ///< [m]
-  std::vector<VectorX> rod_voronoi;      ///< [rod](stencil), of the whole stencil, wherever its curvature is [m]
-  MatrixX2 bend_share;                   ///< per stencil: the part of each of its edges whose bending it carries; 1/2,
-  VectorX half_share;                    ///< but 5/12 at a frame and 7/12 at the edge's other end; see build_model.cpp
-  std::vector<Hinge> hinges;             ///< in space
+  VectorX bend_voronoi, half_voronoi;  ///< [m]
+  std::vector<VectorX> rod_voronoi;    ///< [rod](stencil), of the whole stencil, wherever its curvature is [m]
+  MatrixX2 bend_share;                 ///< per stencil: the part of each of its edges whose bending it carries; 1/2,
+  VectorX half_share;                  ///< but 5/12 at a frame and 7/12 at the edge's other end; see build_model.cpp
+  std::vector<Hinge> hinges;           ///< in space
+  std::vector<Slide> slides;
   std::vector<int> body_frame;           ///< per body
   std::vector<CarriedPart> carried;      ///< parts that bodies carry, each after those that carry it
   std::vector<JointAngle> joint_angles;  ///< per revolute joint, in the order of the scene's joints and their links

@@ -76,7 +76,8 @@ bool fits(const ObstacleDescription& o, const Vector3& corner, const Vector3& no
 std::optional<Vector3> turning_across(const SceneDescription& scene, const Vector3& line) {
   std::vector<Vector3> axes;
   for (const JointDescription& joint : scene.joints)
-    for (const RevoluteLink& link : joint.links) axes.push_back(link.axis);
+    for (const RevoluteLink& link : joint.links)
+      if (!link.slides) axes.push_back(link.axis);
   for (const TorsionDescription& torsion : scene.torsions) axes.push_back(torsion.axis);
   for (const Vector3& axis : axes)
     if (const Vector3 across = axis.cross(line); across.norm() > 0.5) return across.normalized();
@@ -195,11 +196,13 @@ std::string why_off_plane(const SceneDescription& scene, const Vector3& normal) 
   const auto across = [&](const Vector3& v) { return v.cross(normal).norm() > kTolerance * 100 * v.norm(); };
   for (const JointDescription& joint : scene.joints)
     for (const RevoluteLink& link : joint.links)
-      if (!is_mirrored(link.axis, normal))
+      if (link.slides && std::abs(link.axis.dot(normal)) > 1e-9)
+        return "a sliding joint leaves the plane";
+      else if (!is_mirrored(link.axis, normal))
         return "the axis of a revolute joint lies at an angle to the plane";
-      else if (turns_out(link, normal))
+      else if (!link.slides && turns_out(link, normal))
         return "a revolute joint is driven out of the plane";
-      else if (turns_body(joint, link) && std::abs(link.axis.dot(normal)) < 0.5)
+      else if (!link.slides && turns_body(joint, link) && std::abs(link.axis.dot(normal)) < 0.5)
         return "a body turns about an axis in the plane";
   for (const TorsionDescription& torsion : scene.torsions)
     if (across(torsion.axis)) return "the axis of a torsion spring lies at an angle to the plane";
@@ -217,6 +220,8 @@ std::string why_off_plane(const SceneDescription& scene, const Vector3& normal) 
   for (const SupportDescription& support : scene.supports) {
     const Vector3 image = support.free * normal;
     if ((image - normal * normal.dot(image)).norm() > 1e-9) return "a support may slide out of the plane";
+    if (!support.axis.isZero() && !is_mirrored(support.axis, normal))
+      return "the axis of a clamp lies at an angle to the plane";
     if (leans(scene, support, normal)) return "the axes of a hand lie at an angle to the plane";
   }
   const Vector3 corner = scene.positions.row(scene.rods.front().nodes.front());

@@ -164,12 +164,17 @@ void place_carried(const Model& model, const std::vector<Matrix3>& frames, Vecto
   for (const CarriedPart& part : model.carried) {
     if (!part.is_node()) continue;
     const int own = part.own_dof, base = part.body_dofs.front();
+    Vector3 arm = part.arm;
+    if (part.slide >= 0) {
+      const Slide& slide = model.slides[at(part.slide)];
+      arm += q(slide.dof) * slide.axis;
+    }
     if (model.planar()) {
-      const double angle = q(part.body_dofs.back()), c = std::cos(angle), s = std::sin(angle);
-      const double x = part.arm.dot(model.plane->first), y = part.arm.dot(model.plane->second);
+      const double angle = q(model.frame_dof[at(part.frame)]), c = std::cos(angle), s = std::sin(angle);
+      const double x = arm.dot(model.plane->first), y = arm.dot(model.plane->second);
       q.segment<2>(own) = q.segment<2>(base) + Vector2(c * x - s * y, s * x + c * y);
     } else {
-      q.segment<3>(own) = q.segment<3>(base) + frames[at(part.frame)] * part.arm;
+      q.segment<3>(own) = q.segment<3>(base) + frames[at(part.frame)] * arm;
     }
   }
 }
@@ -221,7 +226,12 @@ double advance_configuration(const Model& model, const State& state, const Vecto
 
 void accept_configuration(const Model& model, const VectorX& q, const Configuration& configuration, State& state) {
   state.q = q;
-  if (model.planar()) return place_carried(model, state.frame, state.q);
+  if (model.planar()) {
+    for (const CarriedPart& part : model.carried)
+      if (!part.is_node() && part.hinge < 0) state.q(part.own_dof) = state.q(part.body_dofs.front());
+    place_carried(model, state.frame, state.q);
+    return;
+  }
   frame_kernels().carry({.count = model.edge_count,
                          .frames = &configuration.edge.data()->tangent.x,
                          .source = &state.tangent.data()->x,

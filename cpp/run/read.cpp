@@ -131,6 +131,7 @@ double joint_rate(const Model& model, const State& state, const Configuration& c
   if (!turning.turns()) return 0.0;
   const auto hinge =
       std::find_if(model.hinges.begin(), model.hinges.end(), [&](const Hinge& h) { return h.dof == turning.turning; });
+  if (!model.planar() && hinge == model.hinges.end()) return turning.angle(state.v);  // it slides
   const auto belongs = [&](const FrameStencil& half, bool turns) {
     if (model.planar()) return model.frame_dof[at(half.frame)] == (turns ? turning.turning : turning.against);
     return half.frame == hinge->frame && (turns ? half.hinge == hinge - model.hinges.begin() : half.hinge < 0);

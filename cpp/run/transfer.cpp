@@ -124,6 +124,7 @@ State transferred(const Model& old, const State& from, const Model& model) {
       copy(old.frame_dof[at(half.frame)], dof, model.frame_size());
     }
   }
+  for (std::size_t k = 0; k < model.slides.size(); ++k) copy(old.slides[k].dof, model.slides[k].dof, 1);
   for (std::size_t j = 0; !model.planar() && j < model.joint_angles.size(); ++j) {
     const JointAngle &before = old.joint_angles[j], &now = model.joint_angles[j];
     to.q[now.turning] = now.sign * before.angle(from.q);

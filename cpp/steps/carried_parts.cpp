@@ -66,6 +66,15 @@ struct SpaceNode {
       rows[3 + i] = row[i];
     }
   }
+  /// Bounds on the rows by those of the forces.
+  void bound(const double (&force)[kOwn], double (&rows)[kBody]) const {
+    const double length = std::sqrt(dot(start, start));
+    const double moment = length * (force[0] + force[1] + force[2]);
+    for (int i = 0; i < 3; ++i) {
+      rows[i] = force[i];
+      rows[3 + i] = moment;
+    }
+  }
 };
 
 /// The same in a plane, by the base and the angle at z.
@@ -97,6 +106,11 @@ struct PlaneNode {
     rows[0] = Scalar(force[0]);
     rows[1] = Scalar(force[1]);
     rows[2] = at.x * force[1] - at.y * force[0];
+  }
+  void bound(const double (&force)[kOwn], double (&rows)[kBody]) const {
+    rows[0] = force[0];
+    rows[1] = force[1];
+    rows[2] = std::hypot(arm[0], arm[1]) * (force[0] + force[1]);
   }
 };
 
@@ -154,6 +168,125 @@ struct HingedFrame {
     for (int i = 0; i < 3; ++i) rows[i] = row[i];
     rows[3] = dot(by_angle, moment);
   }
+  void bound(const double (&force)[kOwn], double (&rows)[kBody]) const {
+    const double sum = force[0] + force[1] + force[2];
+    for (double& row : rows) row = sum;
+  }
+};
+
+/// A node on a slide of a body in space, by the base, w and the coordinate s of the slide at z. With L the mean of its
+/// levers R (a + s n) at both ends, a step changes its lever exactly by
+///   R1 (a + s1 n) - R0 (a + s0 n) = w x L + (n0 + w x n0 / 2) (s1 - s0),    n0 = R0 n.
+struct SpaceSlider {
+  static constexpr int kOwn = 3, kBody = 7;
+  BodyRule rule;
+  Vec3d arm, axis;  ///< turned to the start of the step
+  double start;     ///< coordinate at the start
+
+  template <class Scalar>
+  Vec3<Scalar> lever(const Vec3<Scalar>& w, const Scalar& s) const {
+    const Vec3<Scalar> a = constant<Scalar>(arm), n = constant<Scalar>(axis);
+    if (!rule.in_middle) return turned(w, a + s * n);
+    const Vec3<Scalar> end = turned(Scalar(2.0) * w, a + Scalar(2.0 * s - start) * n);
+    return Scalar(0.5) * (a + Scalar(start) * n + end);
+  }
+  template <class Scalar>
+  void place(const Scalar (&body)[kBody], Scalar (&own)[kOwn]) const {
+    const Vec3<Scalar> at = lever(Vec3<Scalar>{body[3], body[4], body[5]}, body[6]);
+    for (int i = 0; i < 3; ++i) own[i] = body[i] + at[i];
+  }
+  template <class Scalar>
+  void act(const Scalar (&body)[kBody], const double (&force)[kOwn], Scalar (&rows)[kBody]) const {
+    const Vec3<Scalar> w{body[3], body[4], body[5]}, n = constant<Scalar>(axis);
+    const Vec3<Scalar> f = constant<Scalar>({force[0], force[1], force[2]});
+    const Vec3<Scalar> moment = cross(lever(w, body[6]), f);
+    const Vec3<Scalar> row = rule.are_moments ? moment : row_of_moment(w, moment);
+    for (int i = 0; i < 3; ++i) {
+      rows[i] = Scalar(force[i]);
+      rows[3 + i] = row[i];
+    }
+    rows[6] = dot(rule.in_middle ? n + cross(w, n) : turned(w, n), f);
+  }
+  void bound(const double (&force)[kOwn], double (&rows)[kBody]) const {
+    const double sum = force[0] + force[1] + force[2];
+    const double length = std::sqrt(dot(arm, arm)) + std::abs(start);
+    for (int i = 0; i < 3; ++i) {
+      rows[i] = force[i];
+      rows[3 + i] = length * sum;
+    }
+    rows[6] = sum;
+  }
+};
+
+/// The same in a plane, by the base, the angle and the coordinate of the slide at z.
+struct PlaneSlider {
+  static constexpr int kOwn = 2, kBody = 4;
+  BodyRule rule;
+  double arm[2], axis[2], start_angle, start;
+
+  template <class Scalar>
+  Vec3<Scalar> turned_by(const Scalar& angle, const Scalar& x, const Scalar& y) const {
+    const double c = std::cos(value_of(angle)), s = std::sin(value_of(angle));
+    const Scalar cosine = chain(angle, c, -s), sine = chain(angle, s, c);
+    return {x * cosine - y * sine, x * sine + y * cosine, Scalar(0.0)};
+  }
+  template <class Scalar>
+  Vec3<Scalar> arm_at(const Scalar& angle, const Scalar& s) const {
+    return turned_by(angle, Scalar(arm[0] + s * axis[0]), Scalar(arm[1] + s * axis[1]));
+  }
+  template <class Scalar>
+  Vec3<Scalar> lever(const Scalar& angle, const Scalar& s) const {
+    if (!rule.in_middle) return arm_at(angle, s);
+    return Scalar(0.5) * (arm_at(Scalar(start_angle), Scalar(start)) +
+                          arm_at(Scalar(2.0 * angle - start_angle), Scalar(2.0 * s - start)));
+  }
+  template <class Scalar>
+  void place(const Scalar (&body)[kBody], Scalar (&own)[kOwn]) const {
+    const Vec3<Scalar> at = lever(body[2], body[3]);
+    own[0] = body[0] + at.x;
+    own[1] = body[1] + at.y;
+  }
+  template <class Scalar>
+  void act(const Scalar (&body)[kBody], const double (&force)[kOwn], Scalar (&rows)[kBody]) const {
+    const Vec3<Scalar> at = lever(body[2], body[3]);
+    Vec3<Scalar> along =
+        turned_by(Scalar(rule.in_middle ? Scalar(start_angle) : body[2]), Scalar(axis[0]), Scalar(axis[1]));
+    if (rule.in_middle) {
+      // Half of the Cayley vector of the turn by 2 (angle - start).
+      const Scalar half = body[2] - start_angle;
+      const double t = std::tan(value_of(half));
+      const Scalar tangent = chain(half, t, 1.0 + t * t);
+      along = {along.x - tangent * along.y, along.y + tangent * along.x, Scalar(0.0)};
+    }
+    rows[0] = Scalar(force[0]);
+    rows[1] = Scalar(force[1]);
+    rows[2] = at.x * force[1] - at.y * force[0];
+    rows[3] = along.x * force[0] + along.y * force[1];
+  }
+  void bound(const double (&force)[kOwn], double (&rows)[kBody]) const {
+    rows[0] = force[0];
+    rows[1] = force[1];
+    rows[2] = (std::hypot(arm[0], arm[1]) + std::abs(start)) * (force[0] + force[1]);
+    rows[3] = force[0] + force[1];
+  }
+};
+
+/// The frame of a body on a slide turns as the frame that carries it.
+template <int size>
+struct SlidFrame {
+  static constexpr int kOwn = size, kBody = size;
+
+  template <class Scalar>
+  void place(const Scalar (&body)[kBody], Scalar (&own)[kOwn]) const {
+    for (int i = 0; i < size; ++i) own[i] = body[i];
+  }
+  template <class Scalar>
+  void act(const Scalar (&)[kBody], const double (&force)[kOwn], Scalar (&rows)[kBody]) const {
+    for (int i = 0; i < size; ++i) rows[i] = Scalar(force[i]);
+  }
+  void bound(const double (&force)[kOwn], double (&rows)[kBody]) const {
+    for (int i = 0; i < size; ++i) rows[i] = force[i];
+  }
 };
 
 /// Calls use(part) with the carried part as one of the kinds above.
@@ -165,6 +298,19 @@ void with_kind(const StepProblem& problem, const CarriedPart& part, const Use& u
     const Hinge& hinge = model.hinges[at(part.hinge)];
     return use(
         HingedFrame{rule, to_vec3(problem.start->frame[at(part.frame)] * hinge.axis), problem.start->q[hinge.dof]});
+  }
+  if (!part.is_node()) return model.planar() ? use(SlidFrame<1>{}) : use(SlidFrame<3>{});
+  if (part.slide >= 0) {
+    const Slide& slide = model.slides[at(part.slide)];
+    const double start = problem.start->q[slide.dof];
+    if (model.planar())
+      return use(PlaneSlider{rule,
+                             {part.arm.dot(model.plane->first), part.arm.dot(model.plane->second)},
+                             {slide.axis.dot(model.plane->first), slide.axis.dot(model.plane->second)},
+                             problem.start->q[model.frame_dof[at(part.frame)]],
+                             start});
+    const Matrix3& frame = problem.start->frame[at(part.frame)];
+    return use(SpaceSlider{rule, to_vec3(frame * part.arm), to_vec3(frame * slide.axis), start});
   }
   if (model.planar())
     return use(PlaneNode{rule,
@@ -212,27 +358,50 @@ void place_carried(const StepProblem& problem, VectorX& z) {
     });
 }
 
-void fold_rows(const StepProblem& problem, const VectorX& z, VectorX& rows, VectorX& magnitude,
-               std::vector<Carrying>& carrying) {
+namespace {
+
+/// Calls find(kind, part, its body, the force on it, rows of the body) for each part, parts of parts first.
+template <class Find>
+void fold(const StepProblem& problem, const VectorX& z, VectorX& rows, VectorX& magnitude, const Find& find) {
   const std::vector<CarriedPart>& carried = problem.model.carried;
-  carrying.resize(carried.size());
-  for (std::size_t i = carried.size(); i-- > 0;) {  // parts of parts first
+  for (std::size_t i = carried.size(); i-- > 0;) {
     const CarriedPart& part = carried[i];
     with_kind(problem, part, [&]<class Kind>(const Kind& kind) {
-      double body[Kind::kBody], force[Kind::kOwn], acting[Kind::kBody];
+      double body[Kind::kBody], force[Kind::kOwn], acting[Kind::kBody], size[Kind::kOwn], bound[Kind::kBody];
       gather(part, z, body);
-      for (int k = 0; k < Kind::kOwn; ++k) force[k] = rows[part.own_dof + k];
-      find_carrying(kind, body, force, acting, carrying[i]);
+      for (int k = 0; k < Kind::kOwn; ++k) {
+        force[k] = rows[part.own_dof + k];
+        size[k] = magnitude[part.own_dof + k];
+      }
+      find(kind, i, body, force, acting);
+      kind.bound(size, bound);
       for (int b = 0; b < Kind::kBody; ++b) {
         const int dof = part.body_dofs[at(b)];
         rows[dof] += acting[b];
-        for (int k = 0; k < Kind::kOwn; ++k)
-          magnitude[dof] += std::abs(carrying[i].act(b, k)) * magnitude[part.own_dof + k];
+        magnitude[dof] += bound[b];
       }
       rows.segment(part.own_dof, Kind::kOwn).setZero();
       magnitude.segment(part.own_dof, Kind::kOwn).setZero();
     });
   }
+}
+
+}  // namespace
+
+void fold_rows(const StepProblem& problem, const VectorX& z, VectorX& rows, VectorX& magnitude) {
+  fold(problem, z, rows, magnitude,
+       [&](const auto& kind, std::size_t, const auto& body, const auto& force, auto& acting) {
+         kind.act(body, force, acting);
+       });
+}
+
+void fold_rows(const StepProblem& problem, const VectorX& z, VectorX& rows, VectorX& magnitude,
+               std::vector<Carrying>& carrying) {
+  carrying.resize(problem.model.carried.size());
+  fold(problem, z, rows, magnitude,
+       [&](const auto& kind, std::size_t i, const auto& body, const auto& force, auto& acting) {
+         find_carrying(kind, body, force, acting, carrying[i]);
+       });
 }
 
 void expand_step(const Model& model, const std::vector<Carrying>& carrying, VectorX& step) {

@@ -24,8 +24,9 @@ namespace withe {
 /// Puts all carried parts where their bodies have them at z.
 void place_carried(const StepProblem& problem, VectorX& z);
 
-/// Adds the rows of carried parts to those of their bodies, and clears them. `carrying` gets the derivatives at z, one
-/// per carried part.
+/// Adds the rows of carried parts to those of their bodies, and clears them.
+void fold_rows(const StepProblem& problem, const VectorX& z, VectorX& rows, VectorX& magnitude);
+/// The same, and sets the derivatives at z, one per carried part.
 void fold_rows(const StepProblem& problem, const VectorX& z, VectorX& rows, VectorX& magnitude,
                std::vector<Carrying>& carrying);
 

@@ -134,7 +134,10 @@ void Equations::evaluate(const VectorX& z, bool with_matrix, const double* axial
   }
   for (const std::unique_ptr<Term>& term : terms_.all) term->add(problem_, data, assembler_, values);
   if (!model().carried.empty()) {
-    fold_rows(problem_, data.z, data.gradient, data.row_magnitude, data.carrying);
+    if (with_matrix)
+      fold_rows(problem_, data.z, data.gradient, data.row_magnitude, data.carrying);
+    else
+      fold_rows(problem_, data.z, data.gradient, data.row_magnitude);
     if (with_matrix) assembler_.fold_carried(data.carrying);
   }
   finish(data);

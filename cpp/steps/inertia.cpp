@@ -6,6 +6,8 @@
 #include <cmath>
 #include <utility>
 
+#include <Eigen/Cholesky>
+
 #include "geometry/rotation.hpp"
 #include "model/edge_vectors.hpp"
 #include "steps/regular_stencils.hpp"
@@ -81,9 +83,9 @@ void set_turning_frames(const StepProblem& problem, StepData& data) {
 
 /// A rigid body in a step, in the axes of space: it turns by the Cayley vector w over `duration`.
 ///
-/// The moment of a step, m = (R1 J W1 - R0 J W0) / dt, makes the change of angular momentum exact. Midpoint steps have
-/// (W0 + W1) / 2 = R0^T w / dt with the rates W about the axes of the body, so w . m dt is the change of kinetic energy
-/// [Simo and Wong 1991, with the Cayley map]. Backward Euler has W1 = R1^T w / dt.
+/// The moment of a step, m = (R1 J W1 - R0 J W0) / dt, makes the change of angular momentum exact. The rates W are
+/// about the axes of the body. Midpoint steps have (W0 + W1) / 2 = R0^T w / dt. Then w . m dt is the change of kinetic
+/// energy [Simo and Wong 1991, with the Cayley map]. Backward Euler has W1 = R1^T w / dt.
 struct TurningBody {
   int dof;
   double duration;
@@ -361,6 +363,20 @@ void set_body_velocities(const Model& model, const VectorX& v0, const VectorX& c
     const int dof = model.frame_dof[at(frame)];
     const Vector3 w = change.segment<3>(dof);
     v1.segment<3>(dof) = (2.0 / dt) * w - cayley(w) * v0.segment<3>(dof);
+  }
+}
+
+void balance_bodies(const StepProblem& problem, const StepData& data, VectorX& v1) {
+  const Model& model = problem.model;
+  if (!problem.conserves_energy()) return;
+  for (int b = 0; b < static_cast<int>(model.body_frame.size()); ++b) {
+    const int dof = model.frame_dof[at(model.body_frame[at(b)])];
+    if (model.planar()) {
+      v1[dof] -= problem.duration() * data.residual[dof] * problem.mass.inverse[dof];
+    } else {
+      const TurningBody body(problem, data.z, b);
+      v1.segment<3>(dof) -= problem.duration() * body.inertia.ldlt().solve(Vector3(data.residual.segment<3>(dof)));
+    }
   }
 }
 

@@ -73,7 +73,7 @@ Linearisation World::linearise() const {
   prescribed.respond = self.custom().response_at_rest(self.state.time);
   system.begin(self.state, self.parameters, StepRule::statics, 0.0, prescribed);
   StepData evaluation;
-  system.evaluate(self.state.q, false, nullptr, evaluation);
+  system.evaluate(self.state.q, true, nullptr, evaluation);
   const SparseMatrix free = free_basis(model), basis = with_carried(model, evaluation.carrying, free),
                      back = basis.transpose();
   const StrainParts parts(system, self.state, evaluation.configuration);

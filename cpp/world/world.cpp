@@ -429,24 +429,35 @@ void World::set_body_motion(int body, const Vector3& velocity, const Vector3& sp
     else
       v.segment<3>(dof) = turn;
   };
-  put_node_vector(model, base, velocity, v);
-  put_spin(frame, spin);
   const auto spin_of = [&](int f) -> Vector3 {
     const int dof = model.frame_dof[at(f)];
     return model.planar() ? Vector3(v(dof) * model.plane->normal) : Vector3(v.segment<3>(dof));
   };
-  // Parts follow their bodies; of a body on a hinge of another, only its turn about the hinge is its own.
+  put_node_vector(model, base, velocity, v);
+  put_spin(frame, spin);
+  // Parts follow their bodies; of a body on a joint of another, only its motion in the joint is its own.
   for (const CarriedPart& part : model.carried) {
     const Matrix3 turned = frame_rotation(model, self.state, part.frame);
     if (part.is_node()) {
-      put_node_vector(model, part.node, node_vector(model, v, part.base) + spin_of(part.frame).cross(turned * part.arm),
-                      v);
-      continue;
+      Vector3 carried = node_vector(model, v, part.base);
+      if (part.slide < 0) {
+        carried += spin_of(part.frame).cross(turned * part.arm);
+      } else {
+        const Slide& slide = model.slides[at(part.slide)];
+        const Vector3 axis = turned * slide.axis;
+        carried += spin_of(part.frame).cross(turned * (part.arm + self.state.q(slide.dof) * slide.axis));
+        if (part.node == base) v(slide.dof) = axis.dot(velocity - carried);
+        carried += v(slide.dof) * axis;
+      }
+      put_node_vector(model, part.node, carried, v);
+    } else if (part.hinge < 0) {
+      put_spin(part.own_frame, spin_of(part.frame));
+    } else {
+      const Hinge& hinge = model.hinges[at(part.hinge)];
+      const Vector3 axis = turned * hinge.axis;
+      if (part.own_frame == frame) v(hinge.dof) = axis.dot(spin - spin_of(part.frame));
+      put_spin(part.own_frame, spin_of(part.frame) + v(hinge.dof) * axis);
     }
-    const Hinge& hinge = model.hinges[at(part.hinge)];
-    const Vector3 axis = turned * hinge.axis;
-    if (part.own_frame == frame) v(hinge.dof) = axis.dot(spin - spin_of(part.frame));
-    put_spin(part.own_frame, spin_of(part.frame) + v(hinge.dof) * axis);
   }
   self.forget_motion();
 }

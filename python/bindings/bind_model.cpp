@@ -135,6 +135,7 @@ void register_joints_and_supports(py::module_& module) {
       .def_readwrite("parent", &RevoluteLink::parent)
       .def_readwrite("child", &RevoluteLink::child)
       .def_readwrite("axis", &RevoluteLink::axis)
+      .def_readwrite("slides", &RevoluteLink::slides)
       .def_readwrite("stiffness", &RevoluteLink::stiffness)
       .def_readwrite("rest_angle", &RevoluteLink::rest_angle)
       .def_readwrite("damping", &RevoluteLink::damping)

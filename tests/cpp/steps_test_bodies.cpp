@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <random>
+#include <tuple>
 
 #include "case_residual.hpp"
 #include "scenes.hpp"
@@ -50,6 +51,14 @@ SceneDescription two_bodies() {
   return scene;
 }
 
+/// The same with a slide in place of the hinge.
+SceneDescription on_a_slide() {
+  SceneDescription scene = two_bodies();
+  scene.bodies[0].carried = {1, 4};
+  scene.joints[0].links[0].slides = true;
+  return scene;
+}
+
 /// A configuration away from the start: unknowns of the bodies at random, and carried parts in their places.
 VectorX displaced(Equations& equations, const Model& model, std::mt19937& random) {
   std::uniform_real_distribution<double> number(-0.3, 0.3);
@@ -59,9 +68,11 @@ VectorX displaced(Equations& equations, const Model& model, std::mt19937& random
   return z;
 }
 
-class BodiesInAStep : public ::testing::TestWithParam<StepRule> {
+class BodiesInAStep : public ::testing::TestWithParam<std::tuple<StepRule, bool>> {
  protected:
-  BodiesInAStep() : model_(build_model(two_bodies(), false)), state_(initial_state(model_)) {
+  BodiesInAStep()
+      : model_(build_model(std::get<1>(GetParam()) ? on_a_slide() : two_bodies(), false)),
+        state_(initial_state(model_)) {
     std::mt19937 random(3);
     std::uniform_real_distribution<double> number(-1.0, 1.0);
     for (int i = 0; i < model_.dof_count; ++i) state_.v[i] = number(random);
@@ -75,7 +86,7 @@ class BodiesInAStep : public ::testing::TestWithParam<StepRule> {
 };
 
 TEST_P(BodiesInAStep, HaveTheDerivativesOfTheirRows) {
-  const StepRule rule = GetParam();
+  const StepRule rule = std::get<0>(GetParam());
   Equations equations(model_, {.rule = rule});
   equations.begin(state_, parameters_, rule, rule == StepRule::statics ? 0.0 : 0.2);
   std::mt19937 random(7);
@@ -125,26 +136,29 @@ TEST_P(BodiesInAStep, HaveTheDerivativesOfTheirRows) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Rules, BodiesInAStep,
-                         ::testing::Values(StepRule::statics, StepRule::backward_euler, StepRule::midpoint,
-                                           StepRule::energy_momentum));
+                         ::testing::Combine(::testing::Values(StepRule::statics, StepRule::backward_euler,
+                                                              StepRule::midpoint, StepRule::energy_momentum),
+                                            ::testing::Bool()));
 
 /// Sum of the products of rows and displacements over an energy-momentum step.
-TEST(BodiesInAStep, ForcesOnCarriedPartsDoTheirWorkOnTheBodies) {
-  const Model model = build_model(two_bodies(), false);
-  const Parameters parameters = initial_parameters(model);
-  const State state = initial_state(model);
-  Equations equations(model, {.rule = StepRule::energy_momentum});
-  equations.begin(state, parameters, StepRule::energy_momentum, 0.1);
-  std::mt19937 random(11);
-  std::uniform_real_distribution<double> number(-1.0, 1.0);
-  const VectorX z = displaced(equations, model, random), change = 2.0 * (z - state.q);
-  VectorX rows(model.dof_count);
-  for (int i = 0; i < model.dof_count; ++i) rows[i] = number(random);
-  const double work = rows.dot(change);
-  VectorX magnitude = rows.cwiseAbs();
-  std::vector<Carrying> carrying;
-  fold_rows(equations.problem(), z, rows, magnitude, carrying);
-  EXPECT_NEAR(rows.dot(change), work, 1e-13 * magnitude.dot(change.cwiseAbs()));
+TEST(CarriedParts, DoTheWorkOfTheirForcesOnTheBodies) {
+  for (const SceneDescription& scene : {two_bodies(), on_a_slide()}) {
+    const Model model = build_model(scene, false);
+    const Parameters parameters = initial_parameters(model);
+    const State state = initial_state(model);
+    Equations equations(model, {.rule = StepRule::energy_momentum});
+    equations.begin(state, parameters, StepRule::energy_momentum, 0.1);
+    std::mt19937 random(11);
+    std::uniform_real_distribution<double> number(-1.0, 1.0);
+    const VectorX z = displaced(equations, model, random), change = 2.0 * (z - state.q);
+    VectorX rows(model.dof_count);
+    for (int i = 0; i < model.dof_count; ++i) rows[i] = number(random);
+    const double work = rows.dot(change);
+    VectorX magnitude = rows.cwiseAbs();
+    std::vector<Carrying> carrying;
+    fold_rows(equations.problem(), z, rows, magnitude, carrying);
+    EXPECT_NEAR(rows.dot(change), work, 1e-13 * magnitude.dot(change.cwiseAbs()));
+  }
 }
 
 }  // namespace

@@ -235,17 +235,21 @@ def drawn(seed: int) -> tuple[withe.Scene, withe.Body]:
         mass=0.02, inertia=moments, center=0.02 * rng.normal(size=3), position=(0.3, 0, 0), rotation=turn
     )
     scene.join(first.end, body)
-    kinds = ("rigid", "pinned", "revolute")
+    kinds = ("rigid", "pinned", "revolute", "sliding")
     place = np.array([0.3, 0.0, 0.0]) + 0.03 * rng.normal(size=3)
     second = scene.add_rod(start=place, end=place + 0.15 * rng.normal(size=3), **limb)
-    kind = kinds[seed % 3]
-    scene.join(second.start, body, kind, axis=rng.normal(size=3) if kind == "revolute" else None)
+    kind = kinds[seed % 4]
+    axis = rng.normal(size=3) if kind in ("revolute", "sliding") else None
+    scene.join(body, second.start, kind, axis=axis, stiffness=0.0 if axis is None else 1e-3)
     place = place + 0.03 * rng.normal(size=3)
     other = scene.add_body(mass=0.03, inertia=moments[::-1], position=place + 0.01, rotation=turn.T)
-    if seed % 2:
-        scene.join(body, other, "revolute", at=place, axis=rng.normal(size=3), stiffness=1e-3)
-    else:
+    joint = ("revolute", "pinned", "sliding")[seed % 3]
+    if joint == "pinned":
         scene.join(body, other, "pinned", at=place)
+    else:
+        scene.join(
+            body, other, joint, at=place, axis=rng.normal(size=3), stiffness=1e-3 if joint == "revolute" else 5.0
+        )
     place = place + 0.02
     third = scene.add_rod(start=place, end=place + 0.1 * rng.normal(size=3), **limb)
     scene.join(third.start, other)
@@ -253,7 +257,7 @@ def drawn(seed: int) -> tuple[withe.Scene, withe.Body]:
     return scene, body
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(8))
 def test_drawn_scenes_of_rods_and_bodies_keep_momenta_and_energy(seed: int) -> None:
     """Momenta to 1e-9 of their size, energy to 1e-6 of the kinetic energy, over 250 steps."""
     scene, body = drawn(seed)
@@ -342,3 +346,41 @@ def test_a_body_in_a_plane_moves_as_in_space() -> None:
         assert simulation.energy().total == pytest.approx(energy, abs=1e-8)
         found.append(np.concatenate([simulation.position(body), simulation.rotation(body).ravel()]))
     np.testing.assert_allclose(found[0], found[1], atol=1e-8)
+
+
+@pytest.mark.case("bodies", "Bead on a straight wire that swings", source="Lagrange's equations")
+@pytest.mark.parametrize("planar", [True, False])
+def test_a_bead_slides_on_a_bar_that_swings(planar: bool) -> None:
+    """A bar on a hinge with a bead on a spring along it; second order in the step, and energy to rounding."""
+    bar, length, bead, stiffness = 0.2, 0.4, 0.1, 20.0
+    inertia, small = bar * length**2 / 12.0, 1e-5
+
+    def rates(_: float, y: Array) -> list[float]:
+        angle, s, rate, speed = y
+        r = length / 2 + s
+        whole = bar * length**2 / 3.0 + small + bead * r**2
+        torque = -(bar * length / 2 + bead * r) * G * np.sin(angle) - 2.0 * bead * r * speed * rate
+        return [rate, speed, torque / whole, r * rate**2 + G * np.cos(angle) - stiffness / bead * s]
+
+    exact = solve_ivp(rates, (0.0, 0.4), [np.pi / 3, 0.0, 0.0, 0.0], rtol=1e-12, atol=1e-12, method="DOP853").y[:2, -1]
+    errors = []
+    for step in (4e-3, 2e-3, 1e-3):
+        scene = withe.Scene()
+        down = np.array([np.sin(np.pi / 3), 0.0, -np.cos(np.pi / 3)])
+        first = scene.add_body(mass=bar, inertia=inertia, position=length / 2 * down)
+        second = scene.add_body(mass=bead, inertia=small, position=length / 2 * down)
+        scene.clamp(first, at=(0, 0, 0), spin=(0, 1, 0))
+        joint = scene.join(first, second, "sliding", axis=down, at=length / 2 * down, stiffness=stiffness)
+        if planar:  # a scene needs a rod to lie in a plane
+            feather = withe.Stiffness(stretch=1.0, bend=1e-6, twist=1e-6)
+            points = ((1, 0, 0), (1.1, 0, 0), (1.2, 0, 0.1))
+            scene.add_rod(points=points, radius=1e-3, stiffness=feather, line_density=1e-6)
+        simulation = scene.build(time_step=step, planar=planar)
+        energy = simulation.energy().total
+        simulation.step(round(0.4 / step))
+        place = simulation.position(second)
+        found = [np.arctan2(place[0], -place[2]), simulation.joint_angle(joint)]
+        errors.append(np.abs(np.array(found) - exact).max())
+        assert simulation.energy().total == pytest.approx(energy, abs=1e-7)
+    measured(errors[-1])
+    assert_order(errors, 2.0)

@@ -88,16 +88,27 @@ def describe_bodies(directory: Directory) -> list[_core.BodyDescription]:
     """
     bodies = directory.all(BodyPart)
     places = {body: (base, carrier) for body, base, carrier in _bases(directory, bodies)}
+    slid = _slid_rows(directory, bodies)
     found = []
     for body in bodies:
         rows = directory.layout.rows(-1 - body.index)
         description = _core.BodyDescription()
         description.name = body.name
         description.node, description.carrier = places[body.index]
-        description.carried = [int(row) for row in rows if row != description.node]
+        description.carried = [int(row) for row in rows if row != description.node and row not in slid[body.index]]
         description.inertia = body.inertia
         found.append(description)
     return found
+
+
+def _slid_rows(directory: Directory, bodies: list[BodyPart]) -> dict[int, set[int]]:
+    """Rows of sliding joints of each body."""
+    rows: dict[int, set[int]] = {body.index: set() for body in bodies}
+    for join in directory.all(JoinPart):
+        for node in join.nodes if join.kind == "sliding" else ():
+            if node[0] < 0:
+                rows[-1 - node[0]].add(directory.row(node))
+    return rows
 
 
 def _bases(directory: Directory, bodies: list[BodyPart]) -> Iterator[tuple[int, int, int]]:
@@ -129,11 +140,13 @@ def _bases(directory: Directory, bodies: list[BodyPart]) -> Iterator[tuple[int, 
         for join in directory.all(JoinPart)
         if join.axis is not None and all(node[0] < 0 for node in join.nodes)
     }
+    slid = _slid_rows(directory, bodies)
     starts = sorted(rows, key=lambda body: not holds[body])
     for start in starts:
         if start in done:
             continue
-        first = next(iter([*holds[start], *rows[start]]), None)
+        fixed = [row for row in rows[start] if row not in slid[start]]
+        first = next(iter([*holds[start], *fixed]), None)
         pending = [(start, directory.row((-1 - start, 0)) if first is None else first, -1)]
         while pending:
             body, base, before = pending.pop(0)

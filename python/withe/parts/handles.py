@@ -88,9 +88,12 @@ class Layout:
         return len(self.body_points) - 1
 
     def body_point(self, body: int, position: FloatArray, near: float) -> tuple[int, int]:
-        """Return the point of a body at a position, or as near to it, which is a new one if there is none."""
+        """Return the point of a body at a position, or as near to it, which is a new one if there is none.
+
+        A negative distance always makes a new one.
+        """
         points = self.body_points[body]
-        for i, point in enumerate(points):
+        for i, point in enumerate(points if near >= 0.0 else ()):
             if np.linalg.norm(point - position) <= near:
                 return -1 - body, i
         if not self._is_open:

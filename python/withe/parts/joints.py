@@ -121,6 +121,7 @@ def describe_joint(group: JointGroup) -> _core.JointDescription:
 def _describe_link(parent: int, child: int, join: JoinPart) -> _core.RevoluteLink:
     assert join.axis is not None
     link = _core.RevoluteLink(parent, child, join.axis)
+    link.slides = join.kind == "sliding"
     for word in kind_of(join).words:
         setattr(link, word.name, getattr(join, word.name))
     return link

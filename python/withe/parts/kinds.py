@@ -45,7 +45,7 @@ __all__ = [
 
 FloatArray = npt.NDArray[np.float64]
 Pass = tuple[int, int]  # rod, node of the rod; or -1 - body, point of the body
-JoinKind = Literal["rigid", "pinned", "revolute"]
+JoinKind = Literal["rigid", "pinned", "revolute", "sliding"]
 JointForm = Literal["frame", "pairs"]
 ContactModel = Literal["imcv2", "barrier", "imcv1", "spillmann_teschner"]
 FrictionModel = Literal["implicit", "lagged", "anchored", "semi_explicit"]

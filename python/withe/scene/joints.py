@@ -46,7 +46,7 @@ class JoinedNodes:
         All or none; see `Scene.join`.
         """
         names = self._new_names(name, len(nodes) - 1)
-        first, *others = self._places(nodes, at)
+        first, *others = self._places(nodes, at, kind)
         parts = [
             self._part(own, first, other, kind, axis, form, numbers) for own, other in zip(names, others, strict=True)
         ]
@@ -58,7 +58,9 @@ class JoinedNodes:
             self._directory.layout.merge(*part.nodes)
         return parts
 
-    def _places(self, nodes: Sequence[NodeHandle | Body | str], at: npt.ArrayLike | None) -> list[tuple[Pass, str]]:
+    def _places(
+        self, nodes: Sequence[NodeHandle | Body | str], at: npt.ArrayLike | None, kind: JoinKind
+    ) -> list[tuple[Pass, str]]:
         """The nodes of rods, and the points of bodies where the joint is; each with its name."""
         layout = self._directory.layout
         point = None if at is None else validation.vector(at, "at of the joint")
@@ -86,7 +88,9 @@ class JoinedNodes:
         for place in places:
             if isinstance(place, BodyPart):
                 assert where is not None
-                found.append((layout.body_point(place.index, where, 1e-9 * self._extent()), place.name))
+                # What slides leaves the other points of a body.
+                near = -1.0 if kind == "sliding" else 1e-9 * self._extent()
+                found.append((layout.body_point(place.index, where, near), place.name))
             else:
                 found.append(place)
         return found
@@ -112,17 +116,21 @@ class JoinedNodes:
         numbers: tuple[float, float, float, float],
     ) -> JoinPart:
         (node_a, name_a), (node_b, name_b) = a, b
-        validation.choice(kind, "kind of the joint", ("rigid", "pinned", "revolute"))
+        validation.choice(kind, "kind of the joint", ("rigid", "pinned", "revolute", "sliding"))
         validation.choice(form, "form of the joint", ("frame", "pairs"))
-        if (kind == "revolute") != (axis is not None):
+        has_axis = kind in ("revolute", "sliding")
+        if has_axis != (axis is not None):
             raise ValueError(
-                f"axis of the joint must be given for kind='revolute' and for no other kind, got kind={kind!r}"
+                "axis of the joint must be given for kind='revolute' and kind='sliding', and for no other kind, got "
+                f"kind={kind!r}"
             )
+        if kind == "sliding" and min(node_a[0], node_b[0]) >= 0:
+            raise ValueError("a sliding joint must slide on a body: a rod slides through a ring of grasp(slides=True)")
         words = [word.name for word in kind_of(JoinPart).words]
         values = {word: checked(JoinPart, word, value, name) for word, value in zip(words, numbers, strict=True)}
         given = next((word for word in words if values[word] != 0.0), None)
-        if given is not None and kind != "revolute":
-            raise ValueError(f"{given} of joint {name!r} needs kind='revolute', got kind={kind!r}")
+        if given is not None and not has_axis:
+            raise ValueError(f"{given} of joint {name!r} needs kind='revolute' or kind='sliding', got kind={kind!r}")
         if form == "pairs" and kind != "rigid":
             raise ValueError(f"form of the joint must be 'frame' when kind={kind!r}")
         if node_a == node_b:

@@ -389,18 +389,21 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
             moment - stiffness (theta - rest_angle) - damping dtheta/dt,
 
         and on `a` with the opposite torque. For a servo, give a stiffness and move `rest_angle` by `Simulation.set`.
+        For a sliding joint theta is the displacement of `b` along the axis [m], and the torque is a force: stiffness is
+        in N/m, rest_angle in m, damping in N s/m and moment in N.
         `Simulation.joint_angle` returns theta.
 
         Parameters
         ----------
         a, b, *others : NodeHandle, Body or str
             Ends or inner nodes of one or several rods, and rigid bodies.
-        kind : {"rigid", "pinned", "revolute"}
-            Relative rotation of the rods: none, free, or about one axis. May follow the nodes by position.
+        kind : {"rigid", "pinned", "revolute", "sliding"}
+            Relative motion: none, free rotation, rotation about one axis, or, on a body, displacement along one axis
+            without rotation. May follow the nodes by position.
         at : array_like of shape (3,) [m]
             Place of the joint of two bodies, as drawn. With a rod, the joint is at its node.
         axis : array_like of shape (3,)
-            Axis of a revolute joint as drawn. The axis turns with `a`.
+            Axis of a revolute or sliding joint as drawn. The axis turns with `a`.
         form : {"frame", "pairs"}
             Model of a rigid joint: "frame" is a body that is bent against every edge, "pairs" is one bending element
             for every pair of edges (archival and stiffer).
@@ -424,7 +427,7 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         ------
         ValueError
             Nodes further apart than 1e-9 of the scene, a node given twice, contradicting joints at one node, or an
-            axis, stiffness, rest_angle, damping or moment without ``kind="revolute"``. Then no node is joined.
+            axis, stiffness, rest_angle, damping or moment for a joint without an axis. Then no node is joined.
 
         See Also
         --------
