@@ -143,10 +143,14 @@ class Directory:
             node = found.node(place[2])
         return (found.index, node.index), node.name
 
+    def is_body(self, handle: object) -> bool:
+        """True of the handle or the name of a body."""
+        name = handle.name if isinstance(handle, Handle) else handle
+        return isinstance(name, str) and isinstance(self.parts.get(name), BodyPart)
+
     def place(self, handle: Handle | str, at: npt.ArrayLike | None, what: str) -> tuple[Pass, str]:
         """The node of a rod, or the point of a body at `at` as drawn, by default its centre of mass; and its name."""
-        part = self.parts.get(handle if isinstance(handle, str) else handle.name)
-        if not isinstance(part, BodyPart):
+        if not self.is_body(handle):
             if at is not None:
                 raise ValueError(f"at= is a point of a body, but {what} must be a node of a rod or a body")
             return self.node(handle, what)

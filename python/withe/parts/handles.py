@@ -105,6 +105,11 @@ class Layout:
         self._rows = None
         return -1 - body, len(points)
 
+    def restore_points(self, points: list[tuple[FloatArray, ...]]) -> None:
+        """Take back points that bodies got for a joint that was refused."""
+        self.body_points = list(points)
+        self._rows = None
+
     def merge(self, a: tuple[int, int], b: tuple[int, int]) -> None:
         """Make two nodes, each (rod, node), one."""
         self._merges.append((a, b))

@@ -46,16 +46,23 @@ class JoinedNodes:
         All or none; see `Scene.join`.
         """
         names = self._new_names(name, len(nodes) - 1)
-        first, *others = self._places(nodes, at, kind)
-        parts = [
-            self._part(own, first, other, kind, axis, form, numbers) for own, other in zip(names, others, strict=True)
-        ]
-        joins = {join.name: join for part in parts for node in part.nodes for join in connected(self._joins_at, node)}
-        gather([*joins.values(), *parts])
+        layout = self._directory.layout
+        points = list(layout.body_points)
+        try:
+            first, *others = self._places(nodes, at, kind)
+            pairs = zip(names, others, strict=True)
+            parts = [self._part(own, first, other, kind, axis, form, numbers) for own, other in pairs]
+            joins = {
+                join.name: join for part in parts for node in part.nodes for join in connected(self._joins_at, node)
+            }
+            gather([*joins.values(), *parts])
+        except ValueError:
+            layout.restore_points(points)
+            raise
         for part in parts:
             for node in part.nodes:
                 self._joins_at.setdefault(node, []).append(part)
-            self._directory.layout.merge(*part.nodes)
+            layout.merge(*part.nodes)
         return parts
 
     def _places(
@@ -66,9 +73,7 @@ class JoinedNodes:
         point = None if at is None else validation.vector(at, "at of the joint")
         places: list[tuple[Pass, str] | BodyPart] = []
         for i, node in enumerate(nodes):
-            name = node if isinstance(node, str) else node.name
-            part = self._directory.parts.get(name)
-            if isinstance(part, BodyPart) and not isinstance(node, NodeHandle):
+            if self._directory.is_body(node):
                 places.append(self._directory.find(node, BodyPart, "body to join"))
                 continue
             what = f"{_ORDINALS[i] if i < len(_ORDINALS) else 'another'} node to join"

@@ -61,9 +61,11 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
     * load: `add_force`, `add_moment`, `add_load`, `add_pressure`, `remove`
     * touch: ``set((a, b), friction=...)``; old names are `set_friction`, `set_restitution` and
       `set_contact_stiffness`
-    * run: `step`, `run`, `equilibrium`, `set_state`, `set_velocities`, `snapshot`, `restore`, `reset`, `copy`
+    * run: `step`, `run`, `equilibrium`, `set_state`, `set_velocities`, `set_velocity`, `snapshot`, `restore`, `reset`,
+      `copy`
     * read the scene: `time`, `time_step`, `rods`, `get`, `energy`, `momentum`, `statistics`, `plan`, `record`
     * read rods: `positions`, `velocities`, `directors`, `spins`, `curvatures`, `twists`, `tensions`, `link`
+    * read bodies: `position`, `rotation`, `velocity`, `angular_velocity`
     * read parts: `reaction`, `pose`, `wrench`, `deflection`, `passage`, `joint_angle`, `joint_rate`, `joint_torque`,
       `spring_tension`, `tendon_length`, `tendon_points`, `obstacle_position`, `contacts`
     * read pictures: `plot`, `view`, `picture`
