@@ -33,6 +33,7 @@ from withe.errors import (
 from withe.parts.friction_fields import FrictionMap
 from withe.parts.handles import (
     Body,
+    BodyPoint,
     CustomForce,
     Drag,
     EdgeHandle,
@@ -66,6 +67,7 @@ __all__ = [
     "Batch",
     "BatchRecord",
     "Body",
+    "BodyPoint",
     "BranchChangedWarning",
     "Circle",
     "CoarseMeshWarning",

@@ -384,3 +384,81 @@ def test_a_bead_slides_on_a_bar_that_swings(planar: bool) -> None:
         assert simulation.energy().total == pytest.approx(energy, abs=1e-7)
     measured(errors[-1])
     assert_order(errors, 2.0)
+
+
+@pytest.mark.case(
+    "bodies", "Body on a spring at a point off its centre", source="M w^2, J w^2 [any textbook on vibrations]"
+)
+def test_a_body_on_a_spring_at_a_point_off_its_centre() -> None:
+    """A spring of length 0 from the world to a point of a body: the mass matrix at that point has M and J."""
+    scene = withe.Scene(gravity=(0, 0, 0))
+    mass, inertia, arm, stiffness = 0.2, 1e-4, 0.03, 40.0
+    post = limp(scene, 3, (0, 0, -0.1), 1.0, 1.0, 1e6)
+    scene.clamp(post.start, hold="edge")
+    body = scene.add_body(mass=mass, inertia=inertia, position=(arm, 0, 0))
+    scene.add_spring(post.start, body.at((0, 0, 0)), stiffness=stiffness)
+    simulation = scene.build(time_step=1e-4, planar=False)
+    # Across the arm the point has the inverse mass 1 / M + arm^2 / J.
+    rate = np.sqrt(stiffness * (1.0 / mass + arm**2 / inertia))
+    spin = 1e-3
+    simulation.set_velocity(body, (0, 0, spin * inertia / (mass * arm)), angular=(0, spin, 0))
+    quarter = 0.5 * np.pi / rate
+    simulation.step(round(2.0 * quarter / 1e-4))
+    # After half a period the motion is reversed.
+    assert simulation.angular_velocity(body)[1] == pytest.approx(-spin, rel=1e-3)
+
+
+def test_names_of_points_stand_for_points() -> None:
+    """A point of a body has a name, which is accepted wherever the point is."""
+    scene = withe.Scene()
+    body = scene.add_body(withe.solids.Sphere(0.01), mass=0.1, name="ball")
+    assert body.at((0.1, -2e-3, 0)).name == "ball.at(0.1, -0.002, 0.0)"
+    load = scene.add_force("ball.at(0.1, -2e-3, 0)", (0, 0, 1))
+    scene.pin(body.at((0, 0, 0.01)))
+    assert load.name == "force 1"
+    with pytest.raises(ValueError, match="must not look like the name of a node or edge"):
+        scene.add_body(withe.solids.Sphere(0.01), mass=0.1, name="ball.at(1, 2, 3)")
+
+
+@pytest.mark.case("bodies", "Flexible balance with a hub", source="elastica and the moments on the hub")
+@pytest.mark.parametrize("planar", [True, False])
+def test_a_flexible_balance_hangs_as_two_elasticas(planar: bool) -> None:
+    """A hub on a hinge with two weightless rods and two weights; second order in the mesh."""
+    bend, length, weights, low, own = 0.02, 0.25, (0.30, 0.24), 0.02, 1.0
+
+    def tip(weight: float, slope: float) -> Array:
+        """Reach and drop of a cantilever that leaves with a slope."""
+
+        def end(curvature: float) -> Array:
+            return solve_ivp(
+                lambda _, y: [y[1], -weight / bend * np.cos(y[0]), np.cos(y[0]), np.sin(y[0])],
+                (0.0, length),
+                [slope, curvature, 0.0, 0.0],
+                rtol=1e-11,
+                atol=1e-13,
+            ).y[:, -1]
+
+        root = brentq(lambda curvature: end(curvature)[1], 0.0, 3.0 * weight * length / bend)
+        return np.asarray(end(root)[2:])
+
+    def moment(turn: float) -> float:
+        left, right = tip(weights[0], turn), tip(weights[1], -turn)
+        return float(weights[0] * left[0] - weights[1] * right[0] - own * low * np.sin(turn))
+
+    turn = brentq(moment, 0.0, 1.0, xtol=1e-12)
+    expected = [turn, *tip(weights[0], turn), *tip(weights[1], -turn)]
+    scene = withe.Scene()
+    hub = scene.add_body(mass=own / G, inertia=1e-5, center=(0, 0, -low))
+    hold = scene.clamp(hub, at=(0, 0, 0), spin=(0, 1, 0))
+    arms = []
+    for side, weight in zip((-1, 1), weights, strict=True):
+        arms.append(limp(scene, 31, (side * length, 0, 0), bend, 1e-9, 1e6))
+        scene.join(arms[-1].start, hub)
+        load = scene.add_body(mass=weight / G, inertia=1e-7, center=(0, 0, -0.05), position=(side * length, 0, 0))
+        scene.join(arms[-1].end, load, "pinned")
+    simulation = scene.build(integrator="static", planar=planar)
+    assert simulation.equilibrium().stable
+    left, right = (simulation.positions(arm)[-1] for arm in arms)
+    angle = np.arctan2(-simulation.rotation(hub)[0, 2], simulation.rotation(hub)[0, 0])
+    np.testing.assert_allclose([angle, -left[0], -left[2], right[0], -right[2]], expected, atol=2e-5)
+    np.testing.assert_allclose(simulation.reaction(hold).force, (0, 0, own + sum(weights)), atol=1e-7)

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from withe.common import validation
 from withe.common.validation import near_word
-from withe.parts.handles import EdgeHandle, Handle, Layout, NodeHandle, Rod, parse_place
+from withe.parts.handles import EdgeHandle, Handle, Layout, NodeHandle, Rod, parse_place, parse_point
 from withe.parts.kinds import Actuation, BodyPart, ContactSettings, Part, Pass, RodPart
 from withe.parts.table import handle_of, kind_of
 
@@ -79,7 +79,7 @@ class Directory:
             raise ValueError(
                 f"name of the {word} must be new: {name!r} is already the name of a {kind_of(self.parts[name]).noun}"
             )
-        if parse_place(name) is not None:
+        if parse_place(name) is not None or parse_point(name) is not None:
             raise ValueError(f"name of the {word} must not look like the name of a node or edge, got {name!r}")
         return name
 
@@ -130,6 +130,9 @@ class Directory:
     def node(self, handle: Handle | str, what: str = "node") -> tuple[Pass, str]:
         """The node that a handle or a name such as "arm.end" stands for: (rod, node of the rod), its name."""
         name = self._name(handle, what)
+        point = parse_point(name)
+        if point is not None and self.is_body(point[0]):
+            return self.place(point[0], point[1], what)
         if isinstance(handle, NodeHandle):
             place: tuple[str, str, int] | None = (handle.rod, "node", handle.index)
         else:
@@ -174,6 +177,12 @@ class Directory:
         if not isinstance(part, RodPart):
             raise ValueError(f"{what} {name!r:.80} is not in the scene: it has no rod {rod!r:.80}")
         return Rod(self.scene_id, part.name, self.layout, part.index)
+
+    def point(self, node: Pass) -> npt.NDArray[np.float64]:
+        """Return the drawn position of a node of a rod, or of a point of a body, (3,) [m]."""
+        if node[0] < 0:
+            return self.layout.body_points[-1 - node[0]][node[1]]
+        return np.asarray(self.rod(self.layout.rods[node[0]].name).points[node[1]])
 
     def row(self, node: Pass) -> int:
         """The row of a node in the positions of the scene."""

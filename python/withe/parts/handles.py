@@ -18,6 +18,7 @@ from withe.common.attributes import of_a_simulation
 
 __all__ = [
     "Body",
+    "BodyPoint",
     "CustomForce",
     "Drag",
     "EdgeHandle",
@@ -36,6 +37,7 @@ __all__ = [
     "Support",
     "Tendon",
     "parse_place",
+    "parse_point",
 ]
 
 FloatArray = npt.NDArray[np.float64]
@@ -184,11 +186,6 @@ class Handle:
 
 
 @dataclass(frozen=True)
-class Body(Handle):
-    """Handle of a rigid body, made by `Scene.add_body`."""
-
-
-@dataclass(frozen=True)
 class Joint(Handle):
     """Handle of a joint, made by `Scene.join`: nodes that are one."""
 
@@ -259,6 +256,62 @@ class NodeHandle(Handle):
 
     rod: str = field(repr=False)
     index: int = field(repr=False)
+
+
+@dataclass(frozen=True)
+class BodyPoint(NodeHandle):
+    """Handle of a point of a rigid body, made by `Body.at`. It is accepted wherever a node is.
+
+    Attributes
+    ----------
+    name : str
+        "plug.at(0.1, 0.0, 0.2)".
+    rod : str
+        Name of the body.
+    index : int
+        Always -1.
+    position : tuple of three floats [m]
+        Place of the point as the scene is drawn.
+    """
+
+    position: tuple[float, float, float] = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Body(Handle):
+    """Handle of a rigid body, made by `Scene.add_body`.
+
+    See Also
+    --------
+    Scene.add_body : Add a body.
+    Scene.join : Join it to rods and other bodies.
+    """
+
+    def at(self, position: npt.ArrayLike) -> BodyPoint:
+        """Return the point of the body at a place of the drawn scene.
+
+        Parameters
+        ----------
+        position : array_like of shape (3,) [m]
+            Place in the axes of the world, as the scene is drawn. The point moves with the body.
+
+        Returns
+        -------
+        BodyPoint
+
+        Raises
+        ------
+        ValueError
+            A wrong shape, or a value that is not finite.
+
+        Examples
+        --------
+        >>> plug = scene.add_body(withe.solids.Sphere(0.01), mass=0.01, position=(0.1, 0, 0), name="plug")
+        >>> plug.at((0.11, 0, 0))
+        BodyPoint(name='plug.at(0.11, 0.0, 0.0)')
+        """
+        x, y, z = validation.vector(position, f"point of body {self.name!r}").tolist()
+        return BodyPoint(self.scene_id, f"{self.name}.at({x!r}, {y!r}, {z!r})", self.name, -1, (x, y, z))
 
 
 @dataclass(frozen=True)
@@ -402,6 +455,18 @@ class Rod(Handle):
 
 
 _PLACE = re.compile(r"(?P<rod>.+)\.(?:(?P<end>start|end)|(?P<kind>node|edge)\((?P<index>-?\d{1,9})\))")
+
+
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_POINT = re.compile(rf"(?P<body>.+)\.at\((?P<x>{_NUMBER}), *(?P<y>{_NUMBER}), *(?P<z>{_NUMBER})\)")
+
+
+def parse_point(name: str) -> tuple[str, tuple[float, float, float]] | None:
+    """Split the name of a point of a body into body and position; None if it is no such name."""
+    match = _POINT.fullmatch(name)
+    if match is None:
+        return None
+    return match["body"], (float(match["x"]), float(match["y"]), float(match["z"]))
 
 
 def parse_place(name: str) -> tuple[str, str, int] | None:

@@ -7,7 +7,7 @@ import numpy as np
 from withe import _core
 from withe.parts.directory import Directory
 from withe.parts.handles import NodeHandle
-from withe.parts.kinds import Pass, RodPart, SpringPart
+from withe.parts.kinds import SpringPart
 from withe.parts.table import checked, kind_of
 
 __all__ = ["describe_springs", "make_spring"]
@@ -28,7 +28,7 @@ def make_spring(
     second, second_name = directory.node(b, "second node of the spring")
     if directory.row(first) == directory.row(second):
         raise ValueError(_one_node(name, first_name, second_name))
-    distance = float(np.linalg.norm(_point(directory, second) - _point(directory, first)))
+    distance = float(np.linalg.norm(directory.point(second) - directory.point(first)))
     part = SpringPart(
         name,
         (first, second),
@@ -65,10 +65,6 @@ def describe_springs(directory: Directory) -> list[_core.SpringDescription]:
             setattr(spring, word.name, getattr(part, word.name))
         springs.append(spring)
     return springs
-
-
-def _point(directory: Directory, node: Pass) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    return next(rod.points[node[1]] for rod in directory.all(RodPart) if rod.index == node[0])
 
 
 def _one_node(name: str, first: str, second: str) -> str:

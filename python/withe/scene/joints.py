@@ -78,7 +78,7 @@ class JoinedNodes:
                 continue
             what = f"{_ORDINALS[i] if i < len(_ORDINALS) else 'another'} node to join"
             places.append(self._directory.node(node, what))
-        drawn = next((self._point(place[0]) for place in places if not isinstance(place, BodyPart)), None)
+        drawn = next((self._directory.point(place[0]) for place in places if not isinstance(place, BodyPart)), None)
         if all(not isinstance(place, BodyPart) for place in places):
             if point is not None:
                 raise ValueError("at of the joint is for bodies: rods are joined at their nodes")
@@ -140,19 +140,13 @@ class JoinedNodes:
             raise ValueError(f"form of the joint must be 'frame' when kind={kind!r}")
         if node_a == node_b:
             raise ValueError(f"nodes to join must be two, got {name_a!r} twice")
-        distance = float(np.linalg.norm(self._point(node_a) - self._point(node_b)))
+        distance = float(np.linalg.norm(self._directory.point(node_a) - self._directory.point(node_b)))
         if distance > 1e-9 * self._extent():
             raise ValueError(
                 f"nodes {name_a!r} and {name_b!r} must coincide to be joined, but are {distance:g} m apart"
             )
         direction = None if axis is None else validation.unit_vector(axis, "axis of the joint")
         return JoinPart(name, (node_a, node_b), (name_a, name_b), kind, direction, form, **values)
-
-    def _point(self, node: Pass) -> FloatArray:
-        if node[0] < 0:
-            return self._directory.layout.body_points[-1 - node[0]][node[1]]
-        rod = self._directory.layout.rods[node[0]].name
-        return np.asarray(self._directory.rod(rod).points[node[1]])
 
     def _extent(self) -> float:
         """Diagonal of the box around all rods [m]."""

@@ -77,7 +77,8 @@ class Loads:
         Parameters
         ----------
         a, b : NodeHandle or str
-            Nodes of one rod or of two rods, supported or free. For a fixed point, use a node of a pinned rod.
+            Nodes of one rod or of two rods, supported or free, or points of rigid bodies. For a fixed point, use a node
+            of a pinned rod.
         stiffness : float [N/m]
             Stiffness of the spring.
         rest_length : float [m]
