@@ -75,7 +75,9 @@ class PlausibilityWarning(UserWarning):
     - a rod of more than 100 m with a radius below 10 mm,
     - a density below 10 or above 30,000 kg/m^3 under gravity,
     - a Young's modulus below 100 Pa, if the rod cannot carry its weight,
+    - a rod that is thicker than long and joined to no other rod,
     - a tendon whose offset is zero or more than 50 radii of its rod,
+    - a tendon whose offset is more than 8 radii of its rod and more than a quarter of the length of its rods,
     - a rest angle or roll above a full turn that is a multiple of 15, as angles in degrees are,
     - a time step above ten of the slowest periods of the scene, without a fluid or drag,
     - a `withe.learning.Task.build` that draws random numbers without `redraw`, so that all robots are equal.

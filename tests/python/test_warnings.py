@@ -39,9 +39,17 @@ def material(**numbers):
     return withe.Material(**({"youngs_modulus": 1e6, "density": 1000.0} | numbers))
 
 
-def add_tendon(offset, tension=0.0):
-    scene, rod = arm(build=False)
+def add_tendon(offset, tension=0.0, radius=5e-3):
+    scene, rod = arm(build=False, radius=radius)
     scene.add_tendon(rod, offset=offset, tension=tension)
+
+
+def stub():
+    """A short hub, thicker than long, that an arm is joined to."""
+    scene, rod = arm(build=False)
+    hub = scene.add_rod(start=(0.3, 0, 0), end=(0.302, 0, 0), nodes=2, radius=5e-3, material=RUBBER)
+    scene.join(rod.end, hub.start)
+    return scene
 
 
 def joint(rest_angle):
@@ -67,6 +75,8 @@ SLIPS = {
     "soft": (lambda: arm(material(youngs_modulus=1.0)), "youngs_modulus of rod 'arm' is 1 Pa", "MPa"),
     "soft without gravity": (lambda: arm(material(youngs_modulus=2.0), gravity=0.0), "is 2 Pa", "MPa"),
     "offset": (lambda: add_tendon((6.0, 0.0)), r"offset of tendon 'tendon 1' is 6 m, 1\.2e\+03 radii", "millimetres"),
+    "wide offset": (lambda: add_tendon((0.0, 0.1)), r"offset of tendon 'tendon 1' is 0\.1 m, 20 radii", "in metres"),
+    "thickness": (lambda: arm(length=0.1, radius=0.06), "0.12 m thick and 0.1 m long", "radius in metres"),
     "no offset": (lambda: add_tendon((0.0, 0.0), 1.0), "offset of tendon 'tendon 1' is zero", "bends nothing"),
     "rest angle": (lambda: joint(-45.0), "rest_angle of joint 'knee' is -45 rad", "degrees"),
     "set rest angle": (lambda: set_rest_angle(90.0), "rest_angle of joint 'knee' is 90 rad", "degrees"),
@@ -92,7 +102,10 @@ def test_a_slip_is_warned_of_once_with_the_number_and_what_it_may_be(slip):
         lambda: arm(material(density=1e-3), gravity=0.0),  # next to no mass, on purpose
         lambda: arm(material(youngs_modulus=50.0), length=1e-3, radius=1e-4),  # a scaled model that bears its weight
         lambda: add_tendon((0.0, 0.0)),
-        lambda: add_tendon((0.15, 0.0)),  # disks along a thin backbone
+        lambda: add_tendon((0.03, 0.0), radius=1e-3),  # disks along a thin backbone
+        lambda: add_tendon((0.039, 0.0)),
+        lambda: arm(length=0.1, radius=0.049),
+        lambda: stub().build(),
         lambda: joint(4.0 * np.pi),
         lambda: turn(40.0 * np.pi),
         lambda: turn(9.0),

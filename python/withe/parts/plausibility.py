@@ -17,6 +17,7 @@ FloatArray = npt.NDArray[np.float64]
 _LONGEST = 100.0  # m
 _THIN = 1e-2  # m: radii that are said in mm
 _FARTHEST = 50.0  # offset of a tendon over the radius of its rod: on disks along a thin backbone some 25, in mm 1000
+_OUTSIDE, _WIDE = 8.0, 0.25  # offset of a tendon over the radius and over the length of its rods, both exceeded
 _DEGREES = 15.0  # that angles are mostly a whole multiple of, where they are in degrees
 
 
@@ -26,14 +27,19 @@ def check_length(length: float, radius: float, owner: str) -> None:
         _warn(f"{owner} is {length:.4g} m long at a radius of {1e3 * radius:.3g} mm", "is the length in millimetres?")
 
 
-def check_offset(offsets: FloatArray, radii: FloatArray, *, pulls_all_along: bool, owner: str) -> None:
+def check_offset(offsets: FloatArray, radii: FloatArray, length: float, *, pulls_all_along: bool, owner: str) -> None:
     """Warn of a tendon that runs far beside its rods, or that pulls along a centreline.
+
+    An offset is far above 50 radii. An offset of more than 8 radii is also far if it exceeds a quarter of the length
+    of the rods: disks along a thin backbone are smaller.
 
     Parameters
     ----------
     offsets : ndarray of shape (guides, 2) [m]
     radii : ndarray of shape (guides,) [m]
         Of the rods at the guides.
+    length : float [m]
+        Length of all rods of the tendon.
     pulls_all_along : bool
         True if the tendon has a tension, and no stretch of its rod can buckle between two guides.
     owner : str
@@ -42,9 +48,11 @@ def check_offset(offsets: FloatArray, radii: FloatArray, *, pulls_all_along: boo
     guide = int(np.argmax(far / radii))
     if far[guide] == 0.0 and pulls_all_along:
         _warn(f"offset of {owner} is zero at every guide", "a tendon on the centreline bends nothing")
-    elif far[guide] > _FARTHEST * radii[guide]:
-        times = far[guide] / radii[guide]
-        _warn(f"offset of {owner} is {far[guide]:g} m, {times:.3g} radii of its rod", "is it in millimetres?")
+        return
+    times = far[guide] / radii[guide]
+    if times > _FARTHEST or (times > _OUTSIDE and far[guide] > _WIDE * length):
+        slip = "is it in millimetres?" if times > _FARTHEST else "is it in metres, from the centreline?"
+        _warn(f"offset of {owner} is {far[guide]:g} m, {times:.3g} radii of its rod", slip)
 
 
 def check_angle(angle: float, what: str) -> None:

@@ -40,7 +40,8 @@ def make_tendon(
     rods = {rod.index: rod for rod in directory.all(RodPart)}
     radii = np.array([rods[rod].section.radii[edge] for rod, edge, _ in places])
     along = len(places) > 2 and isinstance(guides, Rod | str) and not rods[places[0][0]].closed
-    check_offset(part.offsets, radii, pulls_all_along=along and part.tension > 0.0, owner=f"tendon {name!r}")
+    length = sum(float(rods[rod].lengths.sum()) for rod in {rod for rod, _, _ in places})
+    check_offset(part.offsets, radii, length, pulls_all_along=along and part.tension > 0.0, owner=f"tendon {name!r}")
     return part
 
 

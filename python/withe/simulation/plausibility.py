@@ -8,7 +8,7 @@ import numpy as np
 
 from withe.common.user_warnings import warn
 from withe.errors import PlausibilityWarning
-from withe.parts.kinds import DragPart, FluidPart, RodPart
+from withe.parts.kinds import DragPart, FluidPart, JoinPart, RodPart
 from withe.simulation.session import Session
 from withe.simulation.stepping import Stepping
 
@@ -24,10 +24,23 @@ def check_scene(stepping: Stepping) -> None:
     """Warn of implausible materials and of an implausible time step, at the time of `Scene.build`."""
     session = stepping.session
     gravity = float(np.linalg.norm(session.gravity))
+    joined = {rod for join in session.directory.all(JoinPart) for rod, _ in join.nodes}
     for rod in session.directory.all(RodPart):
         _check_density(session, rod, gravity)
         _check_modulus(session, rod, gravity)
+        if rod.index not in joined:  # stubs to which other rods are joined may be thicker than long
+            _check_thickness(rod)
     _check_time_step(stepping)
+
+
+def _check_thickness(rod: RodPart) -> None:
+    """Warn of a rod that is thicker than long."""
+    thickness, length = 2.0 * float(rod.section.touching.max()), float(rod.lengths.sum())
+    if thickness > length:
+        _warn(
+            f"{rod.owner} is {thickness:.3g} m thick and {length:.3g} m long, thicker than long",
+            "is its radius in metres?",
+        )
 
 
 def _check_density(session: Session, rod: RodPart, gravity: float) -> None:
