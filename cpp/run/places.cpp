@@ -120,7 +120,7 @@ std::string unresolved_mesh(const Model& model, const Parameters& parameters, co
 }
 
 std::string what_to_try(const Model& model, const Options& options, const Parameters& parameters, const State& state,
-                        const Configuration& c, bool frictional) {
+                        const Configuration& c, bool slips) {
   if (options.integrator == Integrator::verlet)
     return "Try a smaller time_step, or an implicit integrator, which takes longer ones";
   if (!unresolved_mesh(model, parameters, state, c).empty()) return "Try more nodes there, or a gentler load or motion";
@@ -138,7 +138,7 @@ std::string what_to_try(const Model& model, const Options& options, const Parame
   if (options.integrator == Integrator::statics)
     return "Try a smaller change of load or motion per step, or "
            "integrator='backward_euler' with viscosity, which comes to rest after a jump";
-  if (frictional) return "Try a smaller time_step, or a greater slip_tolerance of enable_contact";
+  if (slips) return "Try a smaller time_step, or a greater slip_tolerance of enable_contact";
   if (options.integrator == Integrator::implicit_midpoint)
     return "Try integrator='energy_momentum', which conserves energy at any time_step, or "
            "'backward_euler', which damps motion that is too fast for the step";

@@ -25,6 +25,6 @@ std::string unresolved_mesh(const Model& model, const Parameters& parameters, co
                             const Configuration& c);
 /// One sentence about what may help where steps do not converge.
 std::string what_to_try(const Model& model, const Options& options, const Parameters& parameters, const State& state,
-                        const Configuration& c, bool frictional);
+                        const Configuration& c, bool slips);
 
 }  // namespace withe

@@ -32,13 +32,13 @@ void World::Implementation::check_squeezed(Equations& system, const Prescribed& 
 
 void World::Implementation::fail(const NewtonResult& r, double dt, const std::string& what,
                                  const std::string& hint) const {
-  const bool frictional = contact() && contact()->frictional();
+  const bool slips = contact() && contact()->regularises();
   const Place place = place_of(model, r.worst_row);
   throw ConvergenceFailure(
       what + " (time " + text(state.time, 6) + " s" + (dt > 0.0 ? ", step " + text(dt) + " s" : "") + ", residual " +
           text(r.residual) + " N" + place.words + ")" + crushed_edge(model, state) +
           "; the simulation keeps its last accepted state. " +
-          (hint.empty() ? what_to_try(model, options, parameters, state, configuration(), frictional) : hint),
+          (hint.empty() ? what_to_try(model, options, parameters, state, configuration(), slips) : hint),
       state.time, dt, place.rod, place.node, r.residual);
 }
 
