@@ -124,12 +124,25 @@ def broken(simulation):
     raise TypeError("broken on purpose")
 
 
-def test_arguments_that_are_missing_or_given_twice_are_told_by_python():
+MISSING = [
+    (lambda s, m: m.run(), "run() is missing duration="),
+    (lambda s, m: s.build_batch(time_step=0.01), "build_batch() is missing count="),
+    (lambda s, m: s.add_tendon("arm"), "add_tendon() is missing offset="),
+    (lambda s, m: s.add_tendon(offset=(0.1, 0.0)), "add_tendon() is missing guides="),
+    (lambda s, m: s.add_spring("arm.start"), "add_spring() is missing b= and stiffness="),
+]
+
+
+@pytest.mark.parametrize(("call", "message"), MISSING)
+def test_a_missing_argument_is_named_without_the_class_that_defines_the_method(call, message):
     scene, _, simulation = cantilever()
-    with pytest.raises(TypeError, match="missing 1 required positional argument: 'duration'"):
-        simulation.run()
-    with pytest.raises(TypeError, match="missing 1 required positional argument: 'count'"):
-        scene.build_batch(time_step=0.01)
+    with pytest.raises(TypeError) as error:
+        call(scene, simulation)
+    assert str(error.value) == message
+
+
+def test_an_argument_that_is_given_twice_is_explained_by_python():
+    _, _, simulation = cantilever()
     with pytest.raises(TypeError, match="multiple values for argument 'duration'"):
         simulation.run(1.0, duration=2.0)
 
@@ -229,6 +242,10 @@ def test_what_only_a_simulation_has_says_to_build_the_scene_first():
         message = f"has no 'positions': build the scene first, .* simulation.positions\\('{name}', ...\\)"
         with pytest.raises(AttributeError, match=message):
             _ = owner.positions
+    with pytest.raises(
+        AttributeError, match=r"Rod 'arm' has no attribute 'tip': use start, end, node\(i\) or edge\(i\)$"
+    ):
+        _ = arm.tip
     for owner in (scene, arm, arm.end):
         with pytest.raises(AttributeError, match="has no attribute 'nonsense'"):
             _ = owner.nonsense

@@ -66,7 +66,7 @@ SIMULATION_WORDS = frozenset(
 """Attributes of a simulation that new users look for on scenes and handles."""
 
 
-def of_a_simulation(owner: str, name: str, call: str) -> AttributeError:
+def of_a_simulation(owner: str, name: str, call: str, own: str = "") -> AttributeError:
     """Return the error for an attribute that a scene or a handle lacks, and the way to get it from a simulation.
 
     Parameters
@@ -77,9 +77,11 @@ def of_a_simulation(owner: str, name: str, call: str) -> AttributeError:
         Name of the attribute.
     call : str
         Call on a simulation, with {} for the attribute, such as "simulation.{}(arm)".
+    own : str
+        Attributes that the object has, for the message; empty to list none.
     """
     if name not in SIMULATION_WORDS:
-        return AttributeError(f"{owner} has no attribute {name!r}")
+        return AttributeError(f"{owner} has no attribute {name!r}" + (own and f": use {own}"))
     how = f"simulation = scene.build(), then {call.format(name)}"
     return AttributeError(f"{owner} has no {name!r}: build the scene first, {how}")
 

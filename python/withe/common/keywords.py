@@ -116,9 +116,9 @@ _COUNTED_OTHERWISE: dict[str, tuple[str, str]] = {
 def keyword_hints(target: T) -> T:
     """Make a function, or the constructor and public methods of a class, suggest a keyword for an unknown one.
 
-    For too many positional arguments, the message names the keywords. The decorator costs one additional call:
-    signatures are inspected only after Python has refused the arguments. Exceptions of the function itself, also
-    TypeErrors, pass through.
+    For too many positional arguments, and for missing ones, the message names the keywords. The decorator costs one
+    additional call: signatures are inspected only after Python has refused the arguments. Exceptions of the function
+    itself, also TypeErrors, pass through.
 
     Parameters
     ----------
@@ -171,8 +171,18 @@ def _explained(function: Callable[..., Any], name: str, given: int, keywords: Co
     unknown = [word for word in keywords if word not in known and not takes_any]
     if unknown:
         return "\n".join(f"{name}() has no keyword {word!r}; {_meant(word, known)}" for word in unknown)
+    missing = [
+        each.name
+        for place, each in enumerate(parameters)
+        if each.kind in named
+        and each.default is each.empty
+        and each.name not in keywords
+        and (each.kind is each.KEYWORD_ONLY or place >= given)
+    ]
     by_name = [each.name for each in parameters if each.kind is each.KEYWORD_ONLY and each.name not in keywords]
     places = len(parameters) - kinds.count(inspect.Parameter.KEYWORD_ONLY) - takes_any
+    if given <= places and missing:
+        return f"{name}() is missing {' and '.join(f'{word}=' for word in missing)}"
     if given <= places or not by_name or inspect.Parameter.VAR_POSITIONAL in kinds:
         return None
     selves = sum(each.name in _OWN for each in parameters)

@@ -182,7 +182,14 @@ class Handle:
 
         def __getattr__(self, word: str) -> Any:
             what = f"{type(self).__name__} {self.__dict__.get('name')!r}"
-            raise of_a_simulation(what, word, f"simulation.{{}}({self.__dict__.get('name')!r}, ...)")
+            public = not word.startswith("_")
+            raise of_a_simulation(
+                what, word, f"simulation.{{}}({self.__dict__.get('name')!r}, ...)", self._places() if public else ""
+            )
+
+    def _places(self) -> str:
+        """Return the attributes that are handles of places, for an error message; empty without any."""
+        return ""
 
 
 @dataclass(frozen=True)
@@ -404,6 +411,11 @@ class Rod(Handle):
     def end(self) -> NodeHandle:
         """The last node of an open rod."""
         return self._end("end", self.nodes - 1)
+
+    def _places(self) -> str:
+        if "index" not in self.__dict__:  # a copy that is being made
+            return ""
+        return "node(i) or edge(i)" if self.closed else "start, end, node(i) or edge(i)"
 
     def _end(self, word: str, index: int) -> NodeHandle:
         if self.closed:
