@@ -185,6 +185,28 @@ def test_the_plan_says_how_long_and_heavy_a_scene_is_by_which_millimetres_are_no
     assert "- 0.2 m of rod, 0.5157 kg in all" in str(plan(0.2, 5e-3)).splitlines()
 
 
+def test_the_plan_names_rods_that_no_support_holds():
+    def notes(simulation):
+        return [note for note in simulation.plan.notes if note.startswith("no support")]
+
+    scene = withe.Scene()
+    ends = [((0, 0, 0), (0.1, 0, 0)), ((0.1, 0, 0), (0.2, 0, 0)), ((0, 1, 0), (0.1, 1, 0))]
+    arm, tip, _ = (
+        scene.add_rod(start=start, end=end, nodes=5, radius=5e-3, material=RUBBER, name=name)
+        for name, (start, end) in zip(("arm", "tip", "stick"), ends, strict=True)
+    )
+    scene.join(arm.end, tip.start)
+    assert notes(scene.build()) == ["no support holds rods 'arm', 'tip', 'stick': they are free"]
+    wall = scene.clamp(arm.start)
+    simulation = scene.build()
+    assert notes(simulation) == ["no support holds rod 'stick': it is free"]
+    simulation.release(wall)
+    simulation.clamp("stick.start")
+    assert notes(simulation) == ["no support holds rods 'arm', 'tip': they are free"]
+    scene.pin("stick.end")
+    assert notes(scene.build()) == []
+
+
 def test_planar_and_spatial_simulations_agree():
     results = []
     for planar in (True, False):

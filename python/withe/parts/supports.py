@@ -10,11 +10,11 @@ import numpy.typing as npt
 
 from withe.common import validation
 from withe.parts.directory import Directory
-from withe.parts.handles import Body, NodeHandle
+from withe.parts.handles import Body, NodeHandle, UnionFind
 from withe.parts.hands import check_free
-from withe.parts.kinds import Pass, SupportKind, SupportPart
+from withe.parts.kinds import BodyPart, JoinPart, Pass, RodPart, SupportKind, SupportPart
 
-__all__ = ["check_not_held", "held_rows", "make_clamp", "make_pin"]
+__all__ = ["check_not_held", "free_rods", "held_rows", "make_clamp", "make_pin"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -118,3 +118,17 @@ def _projector(free: npt.ArrayLike | None, what: str) -> FloatArray:
     if sizes.min() < 1e-6:
         raise ValueError(f"{what} must be directions that are not parallel")
     return np.asarray(u @ u.T, np.float64)
+
+
+def free_rods(directory: Directory, supports: Iterable[SupportPart]) -> list[RodPart]:
+    """Return the rods that no support holds, also not through the rods and bodies that they are joined to."""
+    rods = directory.all(RodPart)
+    groups = UnionFind(len(rods) + len(directory.all(BodyPart)))
+
+    def number(node: Pass) -> int:
+        return node[0] if node[0] >= 0 else len(rods) - 1 - node[0]
+
+    for join in directory.all(JoinPart):
+        groups.unite(*map(number, join.nodes))
+    held = {groups.find(number(part.node)) for part in supports}
+    return [rod for rod in rods if groups.find(rod.index) not in held]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import overload
 
 import numpy as np
@@ -11,6 +12,7 @@ from withe.knots import link
 from withe.parts.contacts import contact_table
 from withe.parts.handles import Body, Hand, Joint, NodeHandle, Obstacle, Rod, Spring, Support, Tendon
 from withe.parts.kinds import ObstaclePart, RodPart, SpringPart, TendonPart
+from withe.parts.supports import free_rods
 from withe.simulation.bodies import body_position, body_rotation, body_spin, body_velocity
 from withe.simulation.hands import (
     Deflection,
@@ -31,6 +33,7 @@ from withe.simulation.tendons import tendon_length, tendon_points
 __all__ = ["Measurements"]
 
 FloatArray = npt.NDArray[np.float64]
+_LISTED = 5  # names of rods in a note of a plan
 
 
 class Measurements:
@@ -774,11 +777,23 @@ class Measurements:
         rods = zip(parts, self._session.settings.rods, strict=True)
         mass = sum(float(np.sum(numbers.line_density * part.arcs)) for part, numbers in rods)
         mass += sum(self._session.settings.masses.values())
+        free = free_rods(self._session.directory, [part for _, part in self._session.settings.supports.values()])
         return Plan(
             planar=plan.planar,
             plane_normal=np.array(plan.plane_normal) if plan.planar else None,
             unknowns=plan.unknowns,
             solver=plan.solver,
             stable_step=plan.stable_step or None,
-            notes=(f"{length:.4g} m of rod, {mass:.4g} kg in all", *plan.notes),
+            notes=(f"{length:.4g} m of rod, {mass:.4g} kg in all", *_note_of_free(free), *plan.notes),
         )
+
+
+def _note_of_free(rods: Sequence[RodPart]) -> list[str]:
+    """Return the note of a plan on rods without support."""
+    if not rods:
+        return []
+    if len(rods) == 1:
+        return [f"no support holds {rods[0].owner}: it is free"]
+    listed = ", ".join(repr(rod.name) for rod in rods[:_LISTED])
+    others = len(rods) - _LISTED
+    return [f"no support holds rods {listed}{f' and {others} others' if others > 0 else ''}: they are free"]
