@@ -342,7 +342,7 @@ def test_numpy_reads_a_table_by_its_names(record, tmp_path):
 
 @pytest.mark.parametrize("name", ["motion.fbx", "motion.gltf", "motion", "motion.npz"])
 def test_an_unknown_suffix_is_refused_with_the_known_ones(record, tmp_path, name):
-    known = r"`path` must end in one of \.csv, \.glb, \.pvd, \.usda, \.usdc, got"
+    known = r"path must end in one of \.csv, \.glb, \.pvd, \.usda, \.usdc, got"
     with pytest.raises(ValueError, match=known + (r".*use save" if name.endswith("npz") else "")):
         record.export(tmp_path / name)
 

@@ -45,7 +45,7 @@ def export(record: Frames, path: str | os.PathLike[str]) -> Path:
     if write is None:
         known = ", ".join(_WRITERS)
         own = "; to read the record again, use save" if path.suffix.lower() == ".npz" else ""
-        raise ValueError(f"`path` must end in one of {known}, got {str(path)!r}{own}")
+        raise ValueError(f"path must end in one of {known}, got {str(path)!r}{own}")
     if len(record) == 0:
         raise ValueError("record has no frames to write")
     write(record, path)

@@ -605,7 +605,7 @@ class Simulation(AppliedLoads, Control, Placement, Measurements, StateSpace):
         """
         if validation.truth(live, "live"):
             if sliders is not None:
-                raise ValueError("`sliders` and `live` must not be given together: sliders show equilibria")
+                raise ValueError("sliders and live must not be given together: sliders show equilibria")
             return LiveView(self._frame, self._stepping.watchers, lambda: self.time, **options)
         if sliders is None:
             return self._frame().view(**options)

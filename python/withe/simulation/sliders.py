@@ -119,7 +119,7 @@ class EquilibriumSliders:
         self._simulation = simulation
         given = list(sliders) if isinstance(sliders, Sequence) and not isinstance(sliders, str) else None
         if not given or not all(isinstance(each, tuple | list) for each in given):
-            raise ValueError(f"`sliders` must be a list of {_FORMS}, got {sliders!r}")
+            raise ValueError(f"sliders must be a list of {_FORMS}, got {sliders!r}")
         self._parameters = [_parameter(simulation, each, f"sliders[{index}]") for index, each in enumerate(given)]
         self._places = [
             (index, component) for index, parameter in enumerate(self._parameters) for component in parameter.moving

@@ -74,7 +74,7 @@ class LiveView:
         ground: float | None = None,
     ) -> None:
         if not speed > 0.0:
-            raise ValueError(f"`speed` must be positive, got {speed!r}")
+            raise ValueError(f"speed must be positive, got {speed!r}")
         self._present, self._watchers, self._time_now = present, watchers, time_now
         self._speed = float(speed)
         self._place = place_to_show("view(live=True)", "see the run", interactive=False)

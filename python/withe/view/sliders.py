@@ -204,11 +204,11 @@ class SliderView:
         titles = [each.title for each in self._model.sliders]
         known = isinstance(slider, str) and slider in titles
         if not known and (isinstance(slider, str) or not 0 <= slider < len(titles)):
-            raise ValueError(f"`slider` must be one of {', '.join(map(repr, titles))} or its number, got {slider!r}")
+            raise ValueError(f"slider must be one of {', '.join(map(repr, titles))} or its number, got {slider!r}")
         index = titles.index(slider) if isinstance(slider, str) else int(slider)
         each, number = self._model.sliders[index], validation.number(value, "value")
         if not each.low <= number <= each.high:
-            raise ValueError(f"`value` of {each.title!r} must lie in {each.low:g}..{each.high:g}, got {number:g}")
+            raise ValueError(f"value of {each.title!r} must lie in {each.low:g}..{each.high:g}, got {number:g}")
         widget = self._widgets[index]
         widget.GetRepresentation().SetValue(number)
         widget.InvokeEvent("InteractionEvent")
