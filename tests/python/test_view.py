@@ -2,6 +2,7 @@
 
 import builtins
 import importlib
+import itertools
 import os
 import pickle
 import subprocess
@@ -140,8 +141,20 @@ def test_only_what_has_moved_has_a_ghost(renderer, tmp_path):
             first = int(np.flatnonzero(way > 0.1 * 8e-3)[0])
             assert 0 < first < 20
             assert points[shadows > 0.0][:, 0].min() == pytest.approx(0.01 * first, abs=0.01)
+        behind = stage._rendered()
+        layered = stage._layered()
+        for actor in itertools.chain(*stage._layers):
+            actor.SetVisibility(False)
+        present = stage._rendered()
+        for actor in stage._present:
+            actor.SetVisibility(False)
+        rods = (present != stage._rendered()).any(axis=2)
     finally:
         stage.close()
+    assert rods.sum() > 500
+    np.testing.assert_array_equal(layered[rods], present[rods])  # no ghost covers the present rods
+    assert (behind[rods] != present[rods]).any()  # although ghosts are nearer to the camera
+    assert ((layered != present).any(axis=2) & ~rods).sum() > 500
     still = scene.build().run(0.005, progress=False)
     pyplot = pytest.importorskip("matplotlib.pyplot")
     plain, ghostly = (

@@ -53,7 +53,8 @@ def picture(
     frame : int
         Index of the frame; negative numbers count from the last one.
     ghosts : sequence of int
-        Other frames, drawn faintly where rods differ from `frame` by more than a tenth of their radius.
+        Other frames, drawn faintly where rods differ from `frame` by more than a tenth of their radius. Each is
+        behind the next one, and all are behind `frame`.
     size : pair of int [px]
     color_by : {"rod", "tension", "curvature", "twist", "speed"}
         One colour per rod, or the quantity with its scale, which is the same for all frames.

@@ -6,6 +6,7 @@ This is the stage that pictures, films and the viewer share.
 from __future__ import annotations
 
 import contextlib
+import itertools
 from collections.abc import Sequence
 from typing import Any
 
@@ -69,7 +70,7 @@ class Stage:
     frames : sequence of int, optional
         Frames that the camera has in view; all frames by default.
     ghosts : sequence of int
-        Frames drawn faintly behind `frame`, the first one strongest, where they differ from it.
+        Frames drawn faintly behind `frame`, each behind the next one, where they differ from it.
     ground : float, optional [m]
         Height of a level floor, on which shadows fall. By default that of a level plane near the rods; without such a
         plane there is neither a floor nor a shadow.
@@ -151,13 +152,14 @@ class Stage:
             self._floor = Floor(pyvista, self.plotter, _LIVE_SHADOW_CELLS if live else _SHADOW_CELLS)
             self._floor.place(np.concatenate([nodes, self._around]), self._ground, self._extent)
         self._add_obstacles(pyvista, np.concatenate([nodes, self._around]))
+        before = set(self.plotter.actors)
         self._add_rods(pyvista, color_by)
         line = self._fineness * max(1.5, self.size[1] / 300.0)  # [px]
         self._springs = SpringLines(pyvista, self.plotter, record, direction, line)
         self._tendons = TendonLines(pyvista, self.plotter, record, line)
+        self._present = [actor for name, actor in self.plotter.actors.items() if name not in before]
         self._ghosts: list[tuple[FloatArray, FloatArray]] = []
-        for place in range(len(ghosts)):
-            self._add_ghost(pyvista, [*ghosts, frame], place)
+        self._layers = [self._add_ghost(pyvista, [*ghosts, frame], place) for place in range(len(ghosts))]
         if supersampling == 1 and not live:
             self.plotter.enable_anti_aliasing("ssaa")
         self._label: Any = None
@@ -263,9 +265,35 @@ class Stage:
 
     def image(self) -> npt.NDArray[np.uint8]:
         """Return the image of the camera, shape (height, width, 3)."""
+        return mean_of_blocks(self._layered() if self._ghosts else self._rendered(), self._fineness)
+
+    def _rendered(self) -> npt.NDArray[np.uint8]:
+        """Return the rendered pixels."""
         self.plotter.render()
-        fine = self.plotter.screenshot(return_img=True)[..., :3]
-        return mean_of_blocks(fine, self._fineness)
+        return np.asarray(self.plotter.screenshot(return_img=True)[..., :3], np.uint8)
+
+    def _layered(self) -> npt.NDArray[np.uint8]:
+        """Return pixels in which each pose is in front of all earlier ones, wherever they are.
+
+        Poses overlap where rods have moved little: a pale surface in front would hide the present rods in part.
+        """
+        layers = [*self._layers, self._present]
+
+        def rendered(shown: list[Any]) -> npt.NDArray[np.uint8]:
+            for actor in itertools.chain(*layers):
+                actor.SetVisibility(any(actor is each for each in shown))
+            return self._rendered()
+
+        bare = rendered([])
+        pixels = bare.copy()
+        for layer in layers:
+            if layer:
+                image = rendered(layer)
+                covered = (image != bare).any(axis=2)
+                pixels[covered] = image[covered]
+        for actor in itertools.chain(*layers):
+            actor.SetVisibility(True)
+        return pixels
 
     def close(self) -> None:
         """Close the window."""
@@ -411,11 +439,12 @@ class Stage:
             self._obstacles.append((actor, index, None, points))
             self._footprints_of_obstacles.append(np.full(len(points), area / len(points)))
 
-    def _add_ghost(self, pyvista: Any, frames: list[int], place: int) -> None:
+    def _add_ghost(self, pyvista: Any, frames: list[int], place: int) -> list[Any]:
         """Add the rods of one frame in pale colours, at rest, where they differ from those of later frames.
 
-        The points of their surfaces are stored, with the areas that cast shadows.
+        The points of their surfaces are stored, with the areas that cast shadows. Returns the actors.
         """
+        actors = []
         strength = 0.2 + 0.3 * place / max(1, len(frames) - 2)
         for index, rod in enumerate(self._record.rods):
             surface, pose = self._surfaces[index], self._positions[frames[place], rod.rows]
@@ -432,6 +461,8 @@ class Stage:
             actor = self.plotter.add_mesh(mesh, color=pale, ambient=0.5, diffuse=0.6, reset_camera=False)
             actor.prop.interpolation = "Phong"
             self._ghosts.append((surface.spread(points), there * self._footprints[index]))
+            actors.append(actor)
+        return actors
 
 
 def _pyvista(off_screen: bool) -> Any:
