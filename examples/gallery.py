@@ -160,7 +160,7 @@ def gripper() -> Shot:
     """Five limbs that hang side by side curl up and entangle."""
     import gripper
 
-    return Shot(gripper.grip(0.5, 1, 14.0, False)[1], speed=1.8, camera=(0.4, -1.0, 0.2))
+    return Shot(gripper.grip(0.5, 5, 14.0, False)[1], speed=1.8, camera=(0.4, -1.0, 0.2))
 
 
 def tendons() -> Shot:
