@@ -2,15 +2,16 @@
 
     python benchmarks/peers.py [--quick] [--scene "heavy cantilever"]
 
-Scenes: a heavy cantilever at rest, a beam that swings, Michell's ring beyond its critical twist, a cable that is
-dropped on a floor and rests there, and the arm of the learning tasks. Each simulator runs over a grid of meshes, time
-steps and, for scenes at rest, damping and duration. The reference of the cantilever is the elastica. The references of
-the beam, the ring and the cable are fine meshes of withe. The arm of each simulator is compared with its own run in
-short steps. The clamp of PyElastica and MuJoCo is in the middle of the first element (see `peer_rods.py`).
+Scenes: a heavy cantilever at rest, a beam that swings, Michell's ring beyond its critical twist, an overhand knot that
+is pulled tight, a cable that is dropped on a floor and rests there, and the arm of the learning tasks. Each simulator
+runs over a grid of meshes, time steps and, for scenes at rest, damping and duration. The reference of the cantilever is
+the elastica. The references of the beam, the ring, the knot and the cable are fine meshes of withe. The arm of each
+simulator is compared with its own run in short steps. The clamp of PyElastica and MuJoCo is in the middle of the first
+element (see `peer_rods.py`).
 
 All runs are made once for their errors. Runs that could be the fastest at some error are then timed in turns, and the
-table has medians. Time is processor time of one thread without the build. withe finds scenes at rest as equilibria;
-PyElastica and MuJoCo find them in time, which their durations allow for.
+table has medians. Time is processor time of one thread without the build. withe finds scenes at rest as equilibria, and
+the knot also in time. PyElastica and MuJoCo find them in time, which their durations allow for.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
+from peer_knots import ElasticaKnot, Knot, MujocoKnot, shortening, withe_knot
 from peer_rods import (
     ElasticaRing,
     ElasticaRod,
@@ -103,7 +105,7 @@ class Settling:
 
     def __init__(
         self,
-        makes: list[Callable[[], ElasticaRod | ElasticaRing | MujocoRod]],
+        makes: list[Callable[[], ElasticaRod | ElasticaRing | ElasticaKnot | MujocoRod | MujocoKnot]],
         durations: list[float],
         error: Callable[[FloatArray, FloatArray], float],
     ) -> None:
@@ -300,6 +302,77 @@ def ring(quick: bool) -> Iterator[Point]:
                 yield Point("Michell's ring", "PyElastica", words, run, look)
 
 
+# --- an overhand knot that is pulled tight -----------------------------------------------------------------------
+
+KNOT = Knot()
+
+
+@lru_cache
+def _tight(quick: bool) -> float:
+    """Median over fine meshes: contact between polygons makes the shortening depend on the mesh by 0.3 %."""
+    found = []
+    for edges in (80,) if quick else (240, 320, 480):
+        simulation = withe_knot(KNOT, edges, integrator="static")
+        simulation.equilibrium()
+        found.append(shortening(simulation.positions()))
+    return float(np.median(found))
+
+
+def knot(quick: bool) -> Iterator[Point]:
+    """Runs of the knot."""
+
+    def error(_: FloatArray | None, points: FloatArray) -> float:
+        return abs(shortening(points) / _tight(quick) - 1.0)
+
+    def at_rest(edges: int) -> Callable[[], Outcome]:
+        def run() -> Outcome:
+            simulation = withe_knot(KNOT, edges, integrator="static")
+            start = time.thread_time()
+            simulation.equilibrium()
+            return time.thread_time() - start, error(None, simulation.positions())
+
+        return run
+
+    def in_time(edges: int, rate: float, step: float, duration: float) -> Callable[[], Outcome]:
+        def run() -> Outcome:
+            simulation = withe_knot(KNOT, edges, rate, integrator="backward_euler", time_step=step)
+            start = time.thread_time()
+            simulation.step(round(duration / step))
+            return time.thread_time() - start, error(None, simulation.positions())
+
+        return run
+
+    for edges in (60,) if quick else (50, 60, 80, 100, 120, 160):
+        if not quick:
+            yield Point("tightened knot", "withe", f"{edges} edges, equilibrium", at_rest(edges))
+        for step in (0.02,) if quick else (0.01, 0.02, 0.05):
+            for duration in (0.04,) if quick else (0.3, 0.4, 0.6, 1.0):
+                text = f"{edges} edges, backward_euler, damping 14 1/s, step {1e3 * step:g} ms, {duration:g} s"
+                yield Point("tightened knot", "withe", text, in_time(edges, 0.2 * KNOT.pace, step, duration))
+    durations = [value / KNOT.pace for value in ((0.1,) if quick else (12.0, 20.0, 30.0, 45.0, 70.0))]
+    settings: list[tuple[str, str, list]] = []
+    for damping in (0.2,) if quick else (0.1, 0.2, 0.4):
+        rate = damping * KNOT.pace
+        if HAVE_ELASTICA and not quick:
+            for elements, depth in ((60, 0.02), (90, 0.02), (90, 0.1), (120, 0.02), (120, 0.1), (160, 0.02)):
+                makes = [
+                    lambda e=elements, r=rate, s=s, d=depth: ElasticaKnot(KNOT, e, s, r, d) for s in (0.5, 0.35, 0.25)
+                ]
+                text = f"{elements} elements, damping {rate:.3g} 1/s, depth {depth:g}, largest stable step"
+                settings.append(("PyElastica", text, makes))
+        if HAVE_MUJOCO:
+            for edges in (60,) if quick else (60, 75, 95):
+                for step in (2e-3,) if quick else (2.5e-4, 5e-4, 1e-3, 2e-3, 4e-3):
+                    make = lambda e=edges, r=rate, s=step: MujocoKnot(KNOT, e, s, r)  # noqa: E731
+                    text = f"{edges} edges, damping {rate:.3g} 1/s, step {1e3 * step:.3g} ms"
+                    settings.append(("MuJoCo", text, [make]))
+    for simulator, text, makes in settings:
+        settling = Settling(makes, durations, error)
+        for i, duration in enumerate(durations):
+            run, look = (lambda s=settling, i=i: s.alone(i)), (lambda s=settling, i=i: s.look(i))
+            yield Point("tightened knot", simulator, f"{text}, {duration:.2g} s", run, look)
+
+
 # --- a cable that is dropped on a floor --------------------------------------------------------------------------
 
 CABLE = Rod(weight=200.0, height=0.05)
@@ -417,6 +490,14 @@ SCENES = {
             "rod shears. Both other simulators have GJ = 2.5 EI.",
         ),
         Scene(
+            "tightened knot",
+            "shortening",
+            (3e-2, 2e-2, 1e-2),
+            knot,
+            "Contact of PyElastica and MuJoCo is a penalty. Edges of MuJoCo are longer than a diameter, and keep their "
+            "length. PyElastica's rod shears.",
+        ),
+        Scene(
             "dropped cable",
             "length",
             (1e-2, 3e-3, 1e-3),
@@ -510,6 +591,7 @@ def main() -> None:
         ElasticaRod(CANTILEVER, 8, 0.5, 1.0).run(1e-3)  # compiles
         ElasticaRod(CABLE, 8, 0.5, 1.0, _floor(CABLE)).run(1e-3)
         ElasticaRing(RING, 8, 0.5, 1.0).run(1e-3)
+        ElasticaKnot(KNOT, 60, 0.5, 1.0, 0.1).run(1e-3)
     with bar(len(points), "errors") as shown:
         for point in points:
             point.measure()

@@ -146,6 +146,30 @@ def test_rods_of_three_simulators_sag_as_the_elastica(interpreted):
     assert falling.nodes[1][-1, 2] == pytest.approx(ours.positions()[-1, 2], rel=0.02)
 
 
+def test_a_knot_of_three_simulators_starts_alike_and_is_as_tight(interpreted):
+    pytest.importorskip("mujoco")
+    from peer_knots import ElasticaKnot, Knot, MujocoKnot, shortening, withe_knot
+
+    knot = Knot()
+    simulation = withe_knot(knot, 60, 0.2 * knot.pace, integrator="backward_euler", time_step=0.02)
+    stepped = MujocoKnot(knot, 60, 2e-3, 0.2 * knot.pace)
+    # Interpreted steps are slow: the ends of PyElastica's rod begin to part as those of the rod of MuJoCo.
+    begun = ElasticaKnot(knot, 60, 0.5, 0.2 * knot.pace, 0.1)
+    loose = shortening(begun.nodes[1])
+    assert shortening(simulation.positions()) == pytest.approx(loose, rel=1e-12)
+    assert shortening(stepped.nodes[1]) == pytest.approx(loose, rel=1e-12)
+    begun.run(1e-3)
+    ends = begun.nodes[1][[0, -1]] - knot.points(60)[[0, -1]]
+    assert ends[1] == pytest.approx(ends[0] * (-1.0, -1.0, 1.0), rel=0.02)  # symmetric about the axis z
+    assert ends[1] @ (knot.points(60)[-1] - knot.points(60)[0]) > 0.0
+
+    simulation.step(30)
+    stepped.run(0.6)
+    tight = shortening(simulation.positions())
+    assert 25.0 * knot.radius < tight < 0.6 * loose
+    assert shortening(stepped.nodes[1]) == pytest.approx(tight, rel=0.03)
+
+
 @pytest.mark.parametrize("method", ["backward_euler", "backward_euler, on centrelines", "PyElastica"])
 def test_a_rod_that_is_pushed_sticks_or_slides_as_a_block_does(method, request):
     if method == "PyElastica":
