@@ -1,10 +1,11 @@
-"""Cost of pictures and films: a frame of a film in both qualities and two sizes, and the first picture of a process.
+"""Cost of pictures and films: a frame of a film, the first picture of a process, and the redraw after a slider moved.
 
 python benchmarks/drawing.py [--quick]
 
 The scene is the gripper of README.md above a floor. A frame costs processor time of rendering and of ffmpeg; the time
 that a film takes before its first frame is left out. The first picture is timed on the wall, from the call in a new
-process to the written file, imports and the test of the graphics library included; the fastest run counts.
+process to the written file, imports and the test of the graphics library included; the fastest run counts. A redraw is
+`move` of a view with sliders in memory: equilibrium, new surfaces and shadow, and a render of 640 x 480 pixels.
 """
 
 from __future__ import annotations
@@ -30,12 +31,14 @@ FRAME_GOALS = {  # [s of processor a frame]
     ("high", SIZES[1]): 0.28,
 }
 FIRST_GOAL = 2.0  # [s]
+REDRAW_GOAL = 1.0 / 30.0  # [s]
+MOVES = 20  # of a slider, in a round
 FPS, DURATION = 30.0, 0.5  # pictures per second of film; simulated time [s]
 SHORT, LONG, LONG_QUICK = 1.0, 0.25, 0.7  # speeds of the two films whose difference is measured
 
 
-def gripper() -> withe.Record:
-    """The gripper of README.md, which closes above a floor."""
+def build() -> withe.Simulation:
+    """The gripper of README.md above a floor, before it closes."""
     scene = withe.Scene()
     silicone = withe.Material(youngs_modulus=2e6, poisson_ratio=0.5, density=1200.0, viscosity=2e3)
     arm = scene.add_rod(start=(0, 0, 0), end=(0, 0, -0.2), nodes=31, radius=8e-3, material=silicone, name="arm")
@@ -45,7 +48,12 @@ def gripper() -> withe.Record:
         finger = scene.add_rod(start=(0, 0, -0.2), end=tip, nodes=21, radius=5e-3, material=silicone, normal=(x, y, 0))
         scene.join(arm.end, finger.start)
     scene.add_floor(-0.35)
-    simulation = scene.build(time_step=5e-3)
+    return scene.build(time_step=5e-3)
+
+
+def gripper() -> withe.Record:
+    """The gripper, which closes."""
+    simulation = build()
     for finger in simulation.rods[1:]:
         simulation.set(finger, natural_curvature=(-8.0, 0.0), over=0.5)
     return simulation.run(duration=DURATION, record_every=0.02, progress=False)
@@ -139,9 +147,45 @@ def pictures(report: Report, rounds: int) -> list[tuple[str, float, float]]:
     return [("first picture", min(walls), FIRST_GOAL)]
 
 
-# Kinds of drawing: each takes the report and the number of rounds, writes its table and goals, and returns rows of the
-# plot. A further kind, such as the redraw of a view after a slider moved, is a function here.
-PARTS: tuple[Callable[[Report, int], list[tuple[str, float, float]]], ...] = (films, pictures)
+def redraws(report: Report, rounds: int) -> list[tuple[str, float, float]]:
+    """Measure the redraw after a slider moved, and the part of the equilibrium. Return its name, cost and goal."""
+    import pyvista
+
+    pyvista.OFF_SCREEN = True
+    simulation = build()
+    finger = simulation.rods[1]
+    view = simulation.view(sliders=[(finger, "natural_curvature", (-10.0, 0.0))], size=SIZES[0])
+    values = np.linspace(-9.0, -1.0, MOVES)
+
+    def move(redraw: bool) -> float:
+        before = processor_time()
+        for value in values:
+            if redraw:
+                view.move(1, float(value))
+            else:
+                simulation.set(finger, natural_curvature=(0.0, float(value)))
+                simulation.equilibrium()
+        return (processor_time() - before) / MOVES
+
+    try:
+        view.image()
+        move(True)  # compiles shaders, and finds out that smooth edges are too slow without a graphics card
+        timings = interleaved({"redraw": lambda: move(True), "equilibrium alone": lambda: move(False)}, rounds)
+    finally:
+        view.close()
+    report.table(
+        "Redraw after a slider moved, 640 x 480 [ms of processor]",
+        ("part", "a move"),
+        [(name, f"{1e3 * one.median:.1f} +- {100 * one.spread:.0f} %") for name, one in timings.items()],
+    )
+    report.figures["redraws"] = {name: one.as_json() for name, one in timings.items()}
+    report.goal("redraw of a slider [s of processor]", timings["redraw"].median, REDRAW_GOAL, at_least=False)
+    return [("redraw of a slider", timings["redraw"].median, REDRAW_GOAL)]
+
+
+# Kinds of drawing: each takes the report and the number of rounds, writes its table and goals, and returns rows of
+# the plot.
+PARTS: tuple[Callable[[Report, int], list[tuple[str, float, float]]], ...] = (films, pictures, redraws)
 
 
 def draw(rows: list[tuple[str, float, float]], path: Path) -> None:

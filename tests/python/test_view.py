@@ -141,8 +141,8 @@ def test_only_what_has_moved_has_a_ghost(renderer, tmp_path):
             first = int(np.flatnonzero(way > 0.1 * 8e-3)[0])
             assert 0 < first < 20
             assert points[shadows > 0.0][:, 0].min() == pytest.approx(0.01 * first, abs=0.01)
-        behind = stage._rendered()
         layered = stage._layered()
+        behind = stage._rendered()
         for actor in itertools.chain(*stage._layers):
             actor.SetVisibility(False)
         present = stage._rendered()

@@ -50,6 +50,7 @@ _PATCH = 1.3  # half a side of the patch of a slope or wall, over the diagonal o
 _MAX_FINE_PIXELS = 38_000_000  # rendered pixels of a picture with smooth edges: about 0.5 GB
 _MAX_SAMPLES = 6000  # rings of all rods together
 _SHADOW_CELLS, _LIVE_SHADOW_CELLS = 320, 96
+_PIXELS_OF_CELL = 3  # height of a picture over the cells of its shadow: the blur is wider than a cell
 _FIRST_RENDERS, _SLOW = 3, 1.0 / 30.0  # renders that compile shaders; time of a render [s]
 _STEP_BACK = 0.5  # further beyond the region in view, over the way of a node that left it
 
@@ -129,7 +130,8 @@ class Stage:
             raise ValueError(f"ground must be a height in metres, got {ground!r}")
 
         pyvista = _pyvista(off_screen)
-        self._fineness = supersampling
+        self._fineness, self._off_screen, self._initialised = supersampling, off_screen, False
+        self._pixels = require("vtkmodules.vtkCommonCore", "view").vtkUnsignedCharArray()
         window = [side * self._fineness for side in self.size]
         with render_window(off_screen):
             self.plotter: Any = pyvista.Plotter(off_screen=off_screen, window_size=window, lighting="none")
@@ -149,7 +151,8 @@ class Stage:
             look_through(self.plotter.camera, camera, self.size, nodes)
         self._add_lights(pyvista, direction)
         if self._ground is not None:
-            self._floor = Floor(pyvista, self.plotter, _LIVE_SHADOW_CELLS if live else _SHADOW_CELLS)
+            cells = min(max(self.size[1] // _PIXELS_OF_CELL, _LIVE_SHADOW_CELLS), _SHADOW_CELLS)
+            self._floor = Floor(pyvista, self.plotter, _LIVE_SHADOW_CELLS if live else cells)
             self._floor.place(np.concatenate([nodes, self._around]), self._ground, self._extent)
         self._add_obstacles(pyvista, np.concatenate([nodes, self._around]))
         before = set(self.plotter.actors)
@@ -268,9 +271,17 @@ class Stage:
         return mean_of_blocks(self._layered() if self._ghosts else self._rendered(), self._fineness)
 
     def _rendered(self) -> npt.NDArray[np.uint8]:
-        """Return the rendered pixels."""
+        """Return the rendered pixels, shape (height, width, 3 or 4): red, green, blue, and what follows is unused."""
         self.plotter.render()
-        return np.asarray(self.plotter.screenshot(return_img=True)[..., :3], np.uint8)
+        if not (self._off_screen and self._initialised and self._fineness > 1):
+            self._initialised = True
+            return np.asarray(self.plotter.screenshot(return_img=True), np.uint8)
+        # A screenshot copies pixels several times. Four bytes a pixel are as the graphics library stores them.
+        window = self.plotter.render_window
+        width, height = window.GetSize()
+        window.GetRGBACharPixelData(0, 0, width - 1, height - 1, 0, self._pixels)
+        pixels = require("pyvista", "view").convert_array(self._pixels)
+        return np.asarray(pixels.reshape(height, width, 4)[::-1], np.uint8)
 
     def _layered(self) -> npt.NDArray[np.uint8]:
         """Return pixels in which each pose is in front of all earlier ones, wherever they are.
@@ -284,7 +295,8 @@ class Stage:
                 actor.SetVisibility(any(actor is each for each in shown))
             return self._rendered()
 
-        bare = rendered([])
+        self._rendered()  # the first pixels are those of a screenshot, without a fourth byte
+        bare = rendered([]).copy()
         pixels = bare.copy()
         for layer in layers:
             if layer:
@@ -487,7 +499,8 @@ def mean_of_blocks(fine: npt.NDArray[np.uint8], step: int) -> npt.NDArray[np.uin
 
     Parameters
     ----------
-    fine : ndarray of uint8, shape (step * height, step * width, 3)
+    fine : ndarray of uint8, shape (step * height, step * width, 3 or 4)
+        Three colours, and a byte that is not read.
     step : int
         Pixels along the sides of a block, 1 to 16.
 
@@ -495,14 +508,20 @@ def mean_of_blocks(fine: npt.NDArray[np.uint8], step: int) -> npt.NDArray[np.uin
     -------
     ndarray of uint8, shape (height, width, 3)
     """
-    # Sums over whole rows first: a sum over blocks at once takes many times as long.
-    rows = np.full((fine.shape[0] // step, fine.shape[1], 3), 0, np.uint16)
-    for row in range(step):
+    if step == 1:
+        return fine[..., :3]
+    if fine.shape[2] == 3:
+        fine = np.concatenate([fine, fine[..., :1]], axis=2)
+    # Sums of 16 bits of four colours are one number of 64 bits, since none exceeds 255 * 16^2.
+    rows = np.add(fine[::step], fine[1::step], dtype=np.uint16)
+    for row in range(2, step):
         rows += fine[row::step]
-    sums = np.full((rows.shape[0], rows.shape[1] // step, 3), step**2 // 2, np.uint16)
-    for column in range(step):
-        sums += rows[:, column::step]
-    return np.asarray(sums // step**2, np.uint8)
+    packed = rows.view(np.uint64)[..., 0]
+    sums = packed[:, ::step] + packed[:, 1::step]
+    for column in range(2, step):
+        sums += packed[:, column::step]
+    colours = sums.view(np.uint16).reshape(*sums.shape, 4)[..., :3]
+    return np.asarray((colours + np.uint16(step**2 // 2)) // np.uint16(step**2), np.uint8)
 
 
 def _empty_mesh(pyvista: Any, surface: Surface, shown: npt.NDArray[np.int64] | None = None) -> Any:
