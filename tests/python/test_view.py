@@ -142,10 +142,10 @@ def test_only_what_has_moved_has_a_ghost(renderer, tmp_path):
             assert 0 < first < 20
             assert points[shadows > 0.0][:, 0].min() == pytest.approx(0.01 * first, abs=0.01)
         layered = stage._layered()
-        behind = stage._rendered()
+        behind = stage._rendered().copy()
         for actor in itertools.chain(*stage._layers):
             actor.SetVisibility(False)
-        present = stage._rendered()
+        present = stage._rendered().copy()
         for actor in stage._present:
             actor.SetVisibility(False)
         rods = (present != stage._rendered()).any(axis=2)

@@ -271,7 +271,10 @@ class Stage:
         return mean_of_blocks(self._layered() if self._ghosts else self._rendered(), self._fineness)
 
     def _rendered(self) -> npt.NDArray[np.uint8]:
-        """Return the rendered pixels, shape (height, width, 3 or 4): red, green, blue, and what follows is unused."""
+        """Return the rendered pixels, shape (height, width, 3 or 4), of which three are colours.
+
+        The next call overwrites them.
+        """
         self.plotter.render()
         if not (self._off_screen and self._initialised and self._fineness > 1):
             self._initialised = True
