@@ -272,7 +272,7 @@ def main() -> None:
     )
     warnings.simplefilter("ignore", withe.CoarseStepWarning)
     report = Report("ablation", quick=options.quick)
-    names = options.heuristics or (HEURISTICS[:2] if options.quick else HEURISTICS)
+    names = options.heuristics or (HEURISTICS[:1] if options.quick else HEURISTICS)
     chosen = {g: s for g, s in groups(options.quick).items() if not options.groups or g in options.groups}
     found: dict[str, dict[str, dict[str, float]]] = {name: {} for name in names}
     rows = []

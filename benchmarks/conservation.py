@@ -342,8 +342,8 @@ def main() -> None:
     )
     warnings.simplefilter("ignore", UserWarning)  # long steps and coarse meshes are drawn on purpose
     report = Report("conservation", quick=options.quick)
-    cases = [draw(i) for i in range(6 if options.quick else options.cases)]
-    steps = 100 if options.quick else 1000
+    cases = [draw(i) for i in range(3 if options.quick else options.cases)]
+    steps = 50 if options.quick else 1000
     plans = [(c, i, n) for c in cases for i in INTEGRATORS for n in STEPS_A_PERIOD if takes(i, c)]
     flights = []
     with bar(len(plans), "flights") as shown:

@@ -71,19 +71,19 @@ def _tags(report: Report, step: int) -> None:
     report.table("Tags off in frames 85 to 168 [mm]", ("curvature", "tip, mean", "tip, most", "all, RMS"), rows)
 
 
-def _stiffness(report: Report) -> None:
+def _stiffness(report: Report, step: int) -> None:
     """Stills of limbs whose curvatures are unknown do not determine their modulus, and the fit reports it."""
     pixels, limbs, rows = log().pixels, ("upper", "lower"), []
     for factor in (0.25, 1.0, 100.0):
         simulation, places = robot()
         for limb in limbs:
             simulation.set(limb, youngs_modulus=factor * simulation.get(limb, "youngs_modulus"))
-        camera = calibrate(simulation, Tags(pixels, places), slice(0, 85, 4), progress=False)
-        found = fit(simulation, Tags(pixels[85:], camera.places, camera), CONSTANT, progress=False)
+        camera = calibrate(simulation, Tags(pixels, places), slice(0, 85, step), progress=False)
+        found = fit(simulation, Tags(pixels[85 :: step // 4], camera.places, camera), CONSTANT, progress=False)
         off = 1e3 * found.residuals / camera.scale
         rows.append((f"{factor:g}", f"{np.sqrt(2.0 * (off**2).mean()):.2f}"))
         if factor == 1.0:
-            seen = Tags(pixels[:85:8], camera.places, camera)
+            seen = Tags(pixels[: 85 : 2 * step], camera.places, camera)
             asked = fit(simulation, seen, [*CONSTANT, (limbs, "youngs_modulus")], progress=False)
     report.table("Moduli other than the given one", ("times the modulus", "RMS of all tags [mm]"), rows)
     said = any("youngs_modulus" in name for each in asked.unobservable for name in each.weights)
@@ -158,9 +158,9 @@ def _camera() -> withe.perception.Camera:
     )
 
 
-def _ringing(report: Report, seeds: int) -> None:
+def _ringing(report: Report, seeds: int, end: float = 2.0) -> None:
     """Modulus and viscosity from 2 s of ringing of the same mesh, 100 pictures a second, clocks apart by 13 ms."""
-    times, delay, places = np.arange(0.04, 2.0, 0.01), 0.013, range(3, 13, 3)
+    times, delay, places = np.arange(0.04, end, 0.01), 0.013, range(3, 13, 3)
     simulation, exact = ringing(time_step=1e-3, viscosity=TRUTH[1]), []
     for time in times + delay:
         simulation.run(time - simulation.time, progress=False)
@@ -214,10 +214,10 @@ def main() -> None:
     report = Report("real2sim", quick=quick)
     _curvatures(report)
     _tags(report, 20 if quick else 4)
-    _stiffness(report)
+    _stiffness(report, 20 if quick else 4)
     _errors(report, 2 if quick else 100)
     _photograph(report, 2 if quick else 300)
-    _ringing(report, 1 if quick else 4)
+    _ringing(report, 1 if quick else 4, 0.5 if quick else 2.0)
     _cable(report, 1 if quick else 8)
     report.write()
 
