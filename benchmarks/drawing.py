@@ -32,8 +32,8 @@ FRAME_GOALS = {  # [s of processor a frame]
 }
 FIRST_GOAL = 2.0  # [s]
 REDRAW_GOAL = 1.0 / 30.0  # [s]
-MOVES = 20  # of a slider, in a round
-FPS, DURATION = 30.0, 0.5  # pictures per second of film; simulated time [s]
+MOVES, MOVES_QUICK = 20, 3  # of a slider, in a round
+FPS, FPS_QUICK, DURATION = 30.0, 8.0, 0.5  # pictures per second of film; simulated time [s]
 SHORT, LONG, LONG_QUICK = 1.0, 0.25, 0.7  # speeds of the two films whose difference is measured
 
 
@@ -69,15 +69,17 @@ def processor_time() -> float:
     )
 
 
-def frame_cost(record: withe.Record, quality: str, size: tuple[int, int], folder: Path, slow: float = LONG) -> float:
+def frame_cost(
+    record: withe.Record, quality: str, size: tuple[int, int], folder: Path, slow: float = LONG, fps: float = FPS
+) -> float:
     """Processor time of a frame [s]: the difference of a long and a short film, over that of their frames."""
     spent, frames = [], []
     for speed in (SHORT, slow):
         before = processor_time()
         film = folder / "film.mp4"
-        record.animate(film, quality=quality, size=size, speed=speed, fps=FPS, progress=False)
+        record.animate(film, quality=quality, size=size, speed=speed, fps=fps, progress=False)
         spent.append(processor_time() - before)
-        frames.append(int(np.floor(DURATION * FPS / speed + 1e-9)) + 1)
+        frames.append(int(np.floor(DURATION * fps / speed + 1e-9)) + 1)
     return (spent[1] - spent[0]) / (frames[1] - frames[0])
 
 
@@ -103,10 +105,11 @@ def films(report: Report, rounds: int) -> list[tuple[str, float, float]]:
     """Measure frames of films. Return name, cost and goal of each kind."""
     record = gripper()
     with tempfile.TemporaryDirectory() as folder, bar(rounds * len(FRAME_GOALS), "films", "films") as shown:
-        frame_cost(record, "draft", (64, 48), Path(folder), LONG_QUICK)  # imports
+        frame_cost(record, "draft", (64, 48), Path(folder), LONG_QUICK, FPS_QUICK)  # imports
 
         def costs(quality: str, size: tuple[int, int]) -> Callable[[], float]:
-            return lambda: frame_cost(record, quality, size, Path(folder), LONG if rounds > 1 else LONG_QUICK)
+            length = (LONG, FPS) if rounds > 1 else (LONG_QUICK, FPS_QUICK)
+            return lambda: frame_cost(record, quality, size, Path(folder), *length)
 
         actions = {f"{quality}, {size[0]} x {size[1]}": costs(quality, size) for quality, size in FRAME_GOALS}
         timings = interleaved(actions, rounds, lambda: shown.advance(1))
@@ -155,7 +158,7 @@ def redraws(report: Report, rounds: int) -> list[tuple[str, float, float]]:
     simulation = build()
     finger = simulation.rods[1]
     view = simulation.view(sliders=[(finger, "natural_curvature", (-10.0, 0.0))], size=SIZES[0])
-    values = np.linspace(-9.0, -1.0, MOVES)
+    values = np.linspace(-9.0, -1.0, MOVES if rounds > 1 else MOVES_QUICK)
 
     def move(redraw: bool) -> float:
         before = processor_time()
@@ -165,7 +168,7 @@ def redraws(report: Report, rounds: int) -> list[tuple[str, float, float]]:
             else:
                 simulation.set(finger, natural_curvature=(0.0, float(value)))
                 simulation.equilibrium()
-        return (processor_time() - before) / MOVES
+        return (processor_time() - before) / len(values)
 
     try:
         view.image()
