@@ -2,12 +2,19 @@
 
     python benchmarks/peers.py [--quick] [--scene "heavy cantilever"]
 
-Scenes: a heavy cantilever at rest, a beam that swings, Michell's ring beyond its critical twist, an overhand knot that
-is pulled tight, a cable that is dropped on a floor and rests there, and the arm of the learning tasks. Each simulator
-runs over a grid of meshes, time steps and, for scenes at rest, damping and duration. The reference of the cantilever is
-the elastica. The references of the beam, the ring, the knot and the cable are fine meshes of withe. The arm of each
-simulator is compared with its own run in short steps. The clamp of PyElastica and MuJoCo is in the middle of the first
-element (see `peer_rods.py`).
+Scenes:
+
+- a heavy cantilever at rest,
+- a beam that swings,
+- Michell's ring beyond its critical twist,
+- an overhand knot that is pulled tight,
+- a cable that is dropped on a floor and rests there,
+- the arm of the learning tasks.
+
+Each simulator runs over a grid of meshes, time steps and, for scenes at rest, damping and duration. The reference of
+the cantilever is the elastica. The references of the beam, the ring, the knot and the cable are fine meshes of withe.
+The arm of each simulator is compared with its own run in short steps. The clamp of PyElastica and MuJoCo is in the
+middle of the first element (see `peer_rods.py`).
 
 All runs are made once for their errors. Runs that could be the fastest at some error are then timed in turns, and the
 table has medians. Time is processor time of one thread without the build. withe finds scenes at rest as equilibria, and
