@@ -467,8 +467,10 @@ class Stage:
             if not away.any():
                 continue
             points, normals = surface.mesh(pose, self._directors[index][frames[place]])
-            there = surface.on_surface(away.astype(float)) > 0.5
-            mesh = _empty_mesh(pyvista, surface, surface.faces[there[surface.faces].all(axis=1)])
+            share = surface.on_surface(away.astype(float))
+            there = share > 0.5
+            # Up to the first node that is at its place: what is too much lies behind the later pose.
+            mesh = _empty_mesh(pyvista, surface, surface.faces[(share > 0.0)[surface.faces].any(axis=1)])
             mesh.points = points
             mesh.point_data["Normals"] = normals
             paint = rod_color(index) if self._values is None else np.array([0.5, 0.53, 0.56])
