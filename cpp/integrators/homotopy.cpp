@@ -137,6 +137,7 @@ void Homotopy::find_tangent(Tangent& out) {
   if (!out.found) return;
   solver.solve({out.rate.data(), static_cast<std::size_t>(out.rate.size())});
   out.rate += held_;
+  equations_.expand(work_.data, out.rate);
   out.found = out.rate.allFinite();
   out.turn = newton_.norms().turn(out.rate);
 }

@@ -85,7 +85,14 @@ double change_by_settings(const Model& model, const EnergyCoefficients& before, 
                           const State& state, EnergyScratch& scratch) {
   scratch.set(model, parameters, state);
   auto& [c, now, touching, components] = scratch;
-  const Energy a = mechanical_energy(model, before, c, state), b = mechanical_energy(model, now, c, state);
+  const EnergyCoefficients* then = &before;
+  EnergyCoefficients turned;
+  if (model.has_bodies()) {  // which have turned since
+    turned = before;
+    turned.mass.bodies = now.mass.bodies;
+    then = &turned;
+  }
+  const Energy a = mechanical_energy(model, *then, c, state), b = mechanical_energy(model, now, c, state);
   return (b.kinetic - a.kinetic) + (b.stretch - a.stretch) + (b.bend - a.bend) + (b.twist - a.twist) +
          (b.gravity - a.gravity) + (b.spring - a.spring);
 }

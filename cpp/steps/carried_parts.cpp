@@ -404,16 +404,18 @@ void fold_rows(const StepProblem& problem, const VectorX& z, VectorX& rows, Vect
        });
 }
 
-void expand_step(const Model& model, const std::vector<Carrying>& carrying, VectorX& step) {
-  for (std::size_t i = 0; i < carrying.size(); ++i) {
-    const CarriedPart& part = model.carried[i];
-    for (int k = 0; k < part.own_size; ++k) {
-      double sum = 0.0;
-      for (std::size_t b = 0; b < part.body_dofs.size(); ++b)
-        sum += carrying[i].follow(k, static_cast<Eigen::Index>(b)) * step[part.body_dofs[b]];
-      step[part.own_dof + k] = sum;
-    }
-  }
+void expand_step(const StepProblem& problem, const VectorX& z, VectorX& step) {
+  for (const CarriedPart& part : problem.model.carried)
+    with_kind(problem, part, [&]<class Kind>(const Kind& kind) {
+      Dual<1> body[Kind::kBody], own[Kind::kOwn];
+      for (int b = 0; b < Kind::kBody; ++b) {
+        const int dof = part.body_dofs[at(b)];
+        body[b] = Dual<1>(z[dof]);
+        body[b].slope[0] = step[dof];
+      }
+      kind.place(body, own);
+      for (int k = 0; k < Kind::kOwn; ++k) step[part.own_dof + k] = own[k].slope[0];
+    });
 }
 
 }  // namespace withe

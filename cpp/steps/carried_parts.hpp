@@ -30,7 +30,7 @@ void fold_rows(const StepProblem& problem, const VectorX& z, VectorX& rows, Vect
 void fold_rows(const StepProblem& problem, const VectorX& z, VectorX& rows, VectorX& magnitude,
                std::vector<Carrying>& carrying);
 
-/// Displacements of carried parts by those of their bodies.
-void expand_step(const Model& model, const std::vector<Carrying>& carrying, VectorX& step);
+/// Sets the displacements of carried parts in a step from z by those of their bodies.
+void expand_step(const StepProblem& problem, const VectorX& z, VectorX& step);
 
 }  // namespace withe

@@ -61,7 +61,7 @@ class Equations {
   /// Puts the parts that bodies carry where the bodies have them at z.
   void place(VectorX& z) const { place_carried(problem_, z); }
   /// Sets the displacements of these parts in a step from the last evaluation by those of the bodies.
-  void expand(const StepData& data, VectorX& step) const { expand_step(model(), data.carrying, step); }
+  void expand(const StepData& data, VectorX& step) const { expand_step(problem_, data.z, step); }
 
   /// Null if no contact is possible in the scene.
   Contact* contact() { return terms_.contact ? &terms_.contact->contact() : nullptr; }

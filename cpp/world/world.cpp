@@ -250,6 +250,7 @@ void World::set_friction_shares(int pair, const VectorX& shares) {
 /// As the description has it; the equations take another form only where friction comes or goes.
 void World::Implementation::take_contact() {
   model.description.contact = description.contact;
+  spatial_twin.reset();
   withe::set_contact(description.contact, parameters);
   update_derived(model, Derived::nothing, 0, parameters);
   reaction_current = false;

@@ -109,7 +109,7 @@ def add_rods(scene, r, flat, material, joints):
         angle = np.linspace(0.0, 2.0 * np.pi, 9)[:-1]
         ring = np.stack([0.1 + 0.03 * np.cos(angle), 0 * angle, 0.16 + 0.03 * np.sin(angle)], axis=1)
         scene.add_rod(points=ring, closed=True, radius=3e-3, material=material, name="ring")
-    return a, b, 0.09 if up else 0.03
+    return a, b, points[-1], 0.09 if up else 0.03
 
 
 def add_supports_and_loads(scene, r, flat, a, b, varying, clamped):
@@ -161,6 +161,29 @@ def add_surroundings(scene, r, flat, floor):
         scene.add_fluid(0.5, model=r.choice(["resistive", "stokeslets"]), regularization=5e-3, name="fluid")
 
 
+def add_bodies(scene, r, flat, b, end, static):
+    """A hub at the end of the limb, and sometimes a weight on a joint of the hub."""
+    out = 0.0 if flat else 0.01
+    hub = scene.add_body(
+        mass=r.uniform(1e-3, 0.05),
+        inertia=np.array([1.0, 1.4, 1.9]) * r.uniform(1e-7, 1e-5),
+        center=r.choice([(0, 0, 0), (0.01, out, -0.005)]),
+        position=end,
+        name="hub",
+    )
+    axes = {"revolute": (0, 1, 0), "sliding": (1, 0, 0.5)}
+    kind = "rigid" if static else r.choice(["rigid", "rigid", "pinned", "revolute", "sliding"])
+    scene.join(hub, b.end, kind, axis=axes.get(kind), stiffness=5.0 if kind in axes else 0.0)
+    if r.random() < 0.4:
+        place = np.add(end, (0.02, out, 0.01))
+        weight = scene.add_body(withe.solids.Sphere(0.01), mass=r.uniform(1e-3, 0.02), position=place, name="weight")
+        kind = r.choice(["pinned", "revolute", "sliding"])
+        stiffness = 5.0 if kind in axes else 0.0
+        scene.join(hub, weight, kind, at=np.add(end, (0.01, 0, 0)), axis=axes.get(kind), stiffness=stiffness)
+    if r.random() < 0.3:
+        scene.add_spring(hub.at(np.add(end, (0, 0, 0.01))), scene.rods[0].node(1), stiffness=r.uniform(0.0, 20.0))
+
+
 def draw_scene(number: int):
     """A scene, and what it is to be built with."""
     r = random.Random(number)
@@ -171,7 +194,7 @@ def draw_scene(number: int):
     static = integrator == "static"  # mechanisms have no equilibrium, and finding this takes long
     fourth = integrator == "fourth_order"  # goes back in time: no viscosity, no contact, no fluid
     material = ELASTIC if fourth else r.choice([SOFT, ELASTIC])
-    a, b, floor = add_rods(scene, r, flat, material, ["rigid"] if static else JOINTS)
+    a, b, end, floor = add_rods(scene, r, flat, material, ["rigid"] if static else JOINTS)
     add_supports_and_loads(scene, r, flat, a, b, varying=not planar, clamped=static)
     if not fourth:
         add_surroundings(scene, r, flat, floor)
@@ -185,4 +208,6 @@ def draw_scene(number: int):
         options["solver"] = withe.Solver(max_halvings=r.choice([6, 2]))  # or a step without solution takes long to fail
         if r.random() < 0.15:
             options["tolerance"] = r.choice([1e-3, 1e-4])
+    if integrator != "verlet" and r.random() < 0.35:  # last, so that all else is drawn as without bodies
+        add_bodies(scene, r, flat, b, end, static)
     return scene, options

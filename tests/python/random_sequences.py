@@ -109,6 +109,10 @@ def velocities(simulation, r):
     simulation.set_velocities(r.choice(["a", "b", None]), vector(r, r.choice([0.1, 1.0, 1.0, 30.0])))
 
 
+def body_motion(simulation, r):
+    simulation.set_velocity(r.choice(["hub", "weight"]), vector(r, 1.0), angular=vector(r, 20.0))
+
+
 def move(simulation, r):
     """Within the plane or out of it, at once or in some steps' time."""
     options = {"over": r.choice([0.0, 0.004, 0.03, 0.03])}
@@ -205,9 +209,9 @@ def equilibrium(simulation, r):
 
 
 CALLS = {
-    step: 4, run: 2, set_rod: 2, set_part: 2, gravity: 1, curvature: 1, twist: 1, velocities: 1, move: 7, path: 1,
-    interrupted_path: 1, move_obstacle: 1, hold: 2, release: 2, equilibrium: 1, turn_obstacle: 1, friction: 1, load: 1,
-    grasp: 3, move_hand: 2, ring: 2,
+    step: 4, run: 2, set_rod: 2, set_part: 2, gravity: 1, curvature: 1, twist: 1, velocities: 1, body_motion: 1, move: 7,
+    path: 1, interrupted_path: 1, move_obstacle: 1, hold: 2, release: 2, equilibrium: 1, turn_obstacle: 1, friction: 1,
+    load: 1, grasp: 3, move_hand: 2, ring: 2,
 }  # fmt: skip
 
 
