@@ -163,3 +163,20 @@ def test_hinges_follow_into_space_at_every_equilibrium():
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             assert simulation.equilibrium().stable, degrees
+
+
+def test_friction_of_a_pair_reaches_the_scene_in_space():
+    """A pair that gets coefficients of its own between two equilibria, as in the scene in space."""
+    scene = withe.Scene()
+    rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+    line = {"start": (0, 0, 0.05), "end": (0.2, 0, 0.05), "nodes": 11}
+    arm = scene.add_rod(**line, radius=4e-3, material=rubber, normal=(0, 0, 1))
+    scene.clamp(arm.start)
+    floor = scene.add_floor(0.0, friction=0.0)
+    bar = scene.add_capsule((0.15, -0.1, 0.02), (0.15, 0.1, 0.02), 0.02, friction=0.0)
+    simulation = scene.build(integrator="static")
+    for pair in (floor, bar):
+        assert simulation.equilibrium().stable
+        simulation.set((arm, pair), friction=0.3)
+    assert simulation.equilibrium().stable
+    assert simulation.plan.planar

@@ -209,9 +209,9 @@ def equilibrium(simulation, r):
 
 
 CALLS = {
-    step: 4, run: 2, set_rod: 2, set_part: 2, gravity: 1, curvature: 1, twist: 1, velocities: 1, body_motion: 1, move: 7,
-    path: 1, interrupted_path: 1, move_obstacle: 1, hold: 2, release: 2, equilibrium: 1, turn_obstacle: 1, friction: 1,
-    load: 1, grasp: 3, move_hand: 2, ring: 2,
+    step: 4, run: 2, set_rod: 2, set_part: 2, gravity: 1, curvature: 1, twist: 1, velocities: 1, body_motion: 1,
+    move: 7, path: 1, interrupted_path: 1, move_obstacle: 1, hold: 2, release: 2, equilibrium: 1, turn_obstacle: 1,
+    friction: 1, load: 1, grasp: 3, move_hand: 2, ring: 2,
 }  # fmt: skip
 
 
