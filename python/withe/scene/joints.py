@@ -93,7 +93,7 @@ class JoinedNodes:
         for place in places:
             if isinstance(place, BodyPart):
                 assert where is not None
-                # What slides leaves the other points of a body.
+                # A part that slides leaves the other points of a body.
                 near = -1.0 if kind == "sliding" else 1e-9 * self._extent()
                 found.append((layout.body_point(place.index, where, near), place.name))
             else:

@@ -290,8 +290,8 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         Raises
         ------
         ValueError
-            A mass that is not positive, an inertia that is not symmetric and positive or whose principal moments
-            belong to no body (J1 + J2 < J3), a mass and a density, or a rotation that is none.
+            A mass that is not positive, a mass and a density, or a rotation that is none. An inertia that is not
+            symmetric and positive, or that no body has because J1 + J2 < J3 for its principal moments.
 
         See Also
         --------
@@ -389,8 +389,8 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
             moment - stiffness (theta - rest_angle) - damping dtheta/dt,
 
         and on `a` with the opposite torque. For a servo, give a stiffness and move `rest_angle` by `Simulation.set`.
-        For a sliding joint theta is the displacement of `b` along the axis [m], and the torque is a force: stiffness is
-        in N/m, rest_angle in m, damping in N s/m and moment in N.
+        For a sliding joint theta is the displacement of `b` along the axis [m], and the torque is a force. Stiffness is
+        then in N/m, rest_angle in m, damping in N s/m and moment in N.
         `Simulation.joint_angle` returns theta.
 
         Parameters
