@@ -185,6 +185,8 @@ class RevoluteLink:
     """
     The child cluster turns about an axis relative to the parent.
     """
+
+    slides: bool
     def __init__(
         self,
         parent: typing.SupportsInt | typing.SupportsIndex,
