@@ -55,10 +55,10 @@ struct Slide {
   int dof;       ///< its coordinate, 0 as drawn [m]
 };
 
-/// A part that a rigid body carries: a node, x = x_base + R (arm + s axis), where R turns the frame of the body and s
-/// is the coordinate of a slide, if it is on one; or the frame of a second body, on a hinge or a slide of the first. It
-/// has unknowns like any other part, but they follow those of the body: forces on it are added to the rows of the body;
-/// see steps/carried_parts.hpp.
+/// A part that a rigid body carries. It has unknowns like any other part, but they follow those of the body: forces on
+/// it are added to the rows of the body; see steps/carried_parts.hpp. The part is one of these:
+/// - a node, x = x_base + R (arm + s axis), where R turns the frame of the body; s is the coordinate of a slide, or 0
+/// - the frame of a second body, on a hinge or a slide of the first
 struct CarriedPart {
   int frame = -1;  ///< of the body
   // A node:
