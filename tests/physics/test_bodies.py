@@ -462,3 +462,23 @@ def test_a_flexible_balance_hangs_as_two_elasticas(planar: bool) -> None:
     angle = np.arctan2(-simulation.rotation(hub)[0, 2], simulation.rotation(hub)[0, 0])
     np.testing.assert_allclose([angle, -left[0], -left[2], right[0], -right[2]], expected, atol=2e-5)
     np.testing.assert_allclose(simulation.reaction(hold).force, (0, 0, own + sum(weights)), atol=1e-7)
+
+
+def test_motions_of_a_free_body_are_neutral() -> None:
+    """Nothing holds a free body: six frequencies of zero."""
+    scene = withe.Scene(gravity=(0, 0, 0))
+    scene.add_body(mass=0.1, inertia=(1e-4, 2e-4, 2.5e-4), center=(0.01, 0, 0))
+    frequencies = scene.build().linearise().frequencies(6)
+    np.testing.assert_allclose(np.abs(frequencies), 0.0, atol=1e-6)
+
+
+@pytest.mark.case("bodies", "Small oscillations of a compound pendulum", source="m g l / (J + m l^2)")
+def test_small_oscillations_of_a_compound_pendulum() -> None:
+    """A body on a hinge of the world, without a rod."""
+    mass, arm, inertia = 0.4, 0.3, 2e-3
+    scene = withe.Scene()
+    body = scene.add_body(mass=mass, inertia=inertia, center=(0, 0, -arm))
+    scene.clamp(body, at=(0, 0, 0), spin=(0, 1, 0))
+    found = scene.build(integrator="static").linearise().frequencies(1)[0]
+    expected = np.sqrt(mass * G * arm / (inertia + mass * arm**2)) / (2.0 * np.pi)
+    assert found == pytest.approx(expected, rel=1e-9)

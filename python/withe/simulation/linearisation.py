@@ -297,7 +297,10 @@ class Linearisation:
         digits.
         """
         nodes = max(2, self._displacement.shape[0] // 3)
-        shift = float(np.median(np.abs(self._assembled.diagonal()) / self._mass.diagonal())) / nodes**4
+        ratios = np.abs(self._assembled.diagonal()) / self._mass.diagonal()
+        if not ratios.any():
+            return 1.0  # nothing is stiff, so every motion is neutral for any shift
+        shift = float(np.median(ratios) or ratios.max()) / nodes**4
         count = _BLOCK
         for _ in range(40):
             squares, shapes, _ = self._krylov(self._inverse(shift), shift, count, rounds=2)
