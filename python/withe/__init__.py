@@ -15,7 +15,7 @@ from withe._core import __version__
 from withe.batch import Batch
 from withe.batch.records import BatchRecord, Equilibria
 from withe.common.frames import EnergyHistory
-from withe.common.outlines import ObstacleOutline, RodOutline, SpringOutline, TendonOutline
+from withe.common.outlines import BodyOutline, ObstacleOutline, RodOutline, SpringOutline, TendonOutline
 from withe.common.progress import track
 from withe.errors import (
     BranchChangedWarning,
@@ -67,6 +67,7 @@ __all__ = [
     "Batch",
     "BatchRecord",
     "Body",
+    "BodyOutline",
     "BodyPoint",
     "BranchChangedWarning",
     "Circle",

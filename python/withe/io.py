@@ -418,7 +418,7 @@ def write_vtk(record: Frames, folder: str | os.PathLike[str]) -> Path:
     Every rod is one polyline. Its points carry radius [m], tension [N] (mean of the two edges at a node), curvature
     (towards d1 and d2) [1/m], twist [rad/m], the first director and the velocity [m/s]. The ends of an open rod have
     the curvature and twist of the nearest inner node. The polyline carries the index of its rod, and the file carries
-    the names of the rods.
+    the names of the rods. Rigid bodies are surfaces in files of their own, which carry the indices and names of bodies.
 
     Parameters
     ----------
@@ -477,19 +477,25 @@ def write_collection(record: Frames, collection: Path, folder: Path) -> Path:
     digits = max(4, len(str(len(record) - 1)))
     names = [f"frame_{frame:0{digits}d}.vtp" for frame in range(len(record))]
     within = "" if folder == collection.parent else f"{folder.relative_to(collection.parent).as_posix()}/"
-    polylines = _Polylines(record)
-    for frame, name in enumerate(names):
-        with written_beside(folder / name) as temporary:
-            temporary.write_text(polylines.document(frame, float(times[frame])), encoding="utf-8")
-    entries = "\n".join(
-        f'    <DataSet timestep="{time!r}" group="" part="0" file={quoteattr(within + name)}/>'
-        for time, name in zip(times.tolist(), names, strict=True)
-    )
+    parts: list[tuple[list[str], _Polylines | _Surfaces]] = []
+    if record.rods:
+        parts.append((names, _Polylines(record)))
+    if record.bodies:
+        parts.append(([name.replace("frame", "bodies") for name in names], _Surfaces(record)))
+    entries = []
+    for part, (files, content) in enumerate(parts):
+        for frame, name in enumerate(files):
+            with written_beside(folder / name) as temporary:
+                temporary.write_text(content.document(frame, float(times[frame])), encoding="utf-8")
+        entries += [
+            f'    <DataSet timestep="{time!r}" group="" part="{part}" file={quoteattr(within + name)}/>'
+            for time, name in zip(times.tolist(), files, strict=True)
+        ]
     with written_beside(collection) as temporary:
         temporary.write_text(
             '<?xml version="1.0"?>\n'
             '<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n'
-            f"  <Collection>\n{entries}\n  </Collection>\n</VTKFile>\n",
+            "  <Collection>\n" + "\n".join(entries) + "\n  </Collection>\n</VTKFile>\n",
             encoding="utf-8",
         )
     return collection
@@ -553,6 +559,39 @@ class _Polylines:
             f"<Lines>\n{self._lines}</Lines>\n"
             f'<PointData Scalars="curvature">\n{point_data}</PointData>\n'
             f"<CellData>\n{self._cell_data}</CellData>\n"
+            "</Piece>\n</PolyData>\n</VTKFile>\n"
+        )
+
+
+class _Surfaces:
+    """The rigid bodies of a record, frame by frame, as VTK PolyData documents."""
+
+    def __init__(self, record: Frames) -> None:
+        bodies = record.bodies
+        self._names = [body.name for body in bodies]
+        self._points = [body.placed(record.body_position(body), record.body_rotation(body)) for body in bodies]
+        starts = np.cumsum([0, *(len(body.vertices) for body in bodies)])
+        triangles = np.concatenate([body.triangles + start for body, start in zip(bodies, starts, strict=False)])
+        counts = [len(body.triangles) for body in bodies]
+        self._counts = f'NumberOfPoints="{starts[-1]}" NumberOfVerts="0" NumberOfLines="0" NumberOfStrips="0"'
+        self._counts += f' NumberOfPolys="{len(triangles)}"'
+        self._polygons = _data_array("connectivity", triangles.ravel())
+        self._polygons += _data_array("offsets", 3 * np.arange(1, len(triangles) + 1))
+        self._cell_data = _data_array("body", np.repeat(np.arange(len(bodies)), counts))
+
+    def document(self, frame: int, time: float) -> str:
+        """One frame as the text of a .vtp file."""
+        points = np.concatenate([points[frame] for points in self._points])
+        names = _string_array("body_names", self._names)
+        return (
+            '<?xml version="1.0"?>\n'
+            '<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" header_type="UInt64">\n'
+            "<PolyData>\n"
+            f"<FieldData>\n{_data_array('TimeValue', np.array([time]), field=True)}{names}</FieldData>\n"
+            f"<Piece {self._counts}>\n"
+            f"<Points>\n{_data_array('points', points)}</Points>\n"
+            f"<Polys>\n{self._polygons}</Polys>\n"
+            f'<CellData Scalars="body">\n{self._cell_data}</CellData>\n'
             "</Piece>\n</PolyData>\n</VTKFile>\n"
         )
 

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from withe.common.outlines import Named, ObstacleOutline, RodOutline, SpringOutline, TendonOutline
+from withe.common.outlines import BodyOutline, Named, ObstacleOutline, RodOutline, SpringOutline, TendonOutline
 from withe.common.short_repr import ShortRepr
 
 __all__ = ["ENERGIES", "EnergyHistory", "Frames", "edges_to_nodes", "stencils_to_nodes"]
@@ -49,7 +49,7 @@ ENERGIES = tuple(field.name for field in fields(EnergyHistory))
 
 
 class Frames(Protocol):
-    """Motion of a scene, frame by frame. A rod or an obstacle is given by its outline, its handle or its name."""
+    """Motion of a scene, frame by frame. Rods, bodies and obstacles are given by outline, by handle or by name."""
 
     def __len__(self) -> int:
         """Number of frames."""
@@ -61,6 +61,10 @@ class Frames(Protocol):
     @property
     def rods(self) -> tuple[RodOutline, ...]:
         """Rods in the order of the scene."""
+
+    @property
+    def bodies(self) -> tuple[BodyOutline, ...]:
+        """Rigid bodies in the order of the scene."""
 
     @property
     def obstacles(self) -> tuple[ObstacleOutline, ...]:
@@ -91,6 +95,12 @@ class Frames(Protocol):
 
     def tensions(self, rod: Named) -> FloatArray:
         """Axial forces of the edges, shape (frames, edges) [N]."""
+
+    def body_position(self, body: Named) -> FloatArray:
+        """Origin of the axes of a body, shape (frames, 3) [m]."""
+
+    def body_rotation(self, body: Named) -> FloatArray:
+        """Axes of a body as the columns of matrices, shape (frames, 3, 3)."""
 
     def obstacle_position(self, obstacle: Named) -> FloatArray:
         """Positions of an obstacle: a plane's point, a sphere's centre or a capsule's start, shape (frames, 3) [m]."""

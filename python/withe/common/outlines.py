@@ -1,4 +1,4 @@
-"""Outlines of rods, obstacles, springs and tendons for pictures and files, without their motion."""
+"""Outlines of rods, bodies, obstacles, springs and tendons for pictures and files, without their motion."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from withe.common.short_repr import ShortRepr
 
-__all__ = ["Named", "ObstacleOutline", "RodOutline", "SpringOutline", "TendonOutline", "index_of"]
+__all__ = ["BodyOutline", "Named", "ObstacleOutline", "RodOutline", "SpringOutline", "TendonOutline", "index_of"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -132,8 +132,43 @@ class TendonOutline(ShortRepr):
         return np.stack(points, axis=-2)
 
 
-def index_of(outlines: tuple[RodOutline, ...] | tuple[ObstacleOutline, ...], handle: Named, what: str) -> int:
-    """Return the index of a rod or an obstacle in a record, by its name or its handle."""
+@dataclass(frozen=True, repr=False)
+class BodyOutline(ShortRepr):
+    """Surface of a rigid body for pictures and files, in the axes of the body.
+
+    Attributes
+    ----------
+    name : str
+    vertices : ndarray of shape (vertices, 3) [m]
+    triangles : ndarray of int, shape (triangles, 3)
+        Rows of `vertices`, counter-clockwise from outside.
+    """
+
+    name: str
+    vertices: FloatArray
+    triangles: npt.NDArray[np.int64]
+
+    def placed(self, positions: FloatArray, rotations: FloatArray) -> FloatArray:
+        """Return the vertices in the world.
+
+        Parameters
+        ----------
+        positions : ndarray of shape (..., 3) [m]
+            Origin of the axes of the body.
+        rotations : ndarray of shape (..., 3, 3)
+            Axes of the body, as columns.
+
+        Returns
+        -------
+        ndarray of shape (..., vertices, 3) [m]
+        """
+        return np.asarray(positions[..., None, :] + self.vertices @ np.swapaxes(rotations, -1, -2))
+
+
+def index_of(
+    outlines: tuple[RodOutline, ...] | tuple[BodyOutline, ...] | tuple[ObstacleOutline, ...], handle: Named, what: str
+) -> int:
+    """Return the index of a rod, a body or an obstacle in a record, by its name or its handle."""
     name = handle if isinstance(handle, str) else getattr(handle, "name", None)
     names = [outline.name for outline in outlines]
     if name not in names:

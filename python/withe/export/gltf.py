@@ -1,4 +1,4 @@
-"""Animated binary glTF 2.0: rods as skinned meshes, obstacles as meshes.
+"""Animated binary glTF 2.0: rods as skinned meshes, rigid bodies and obstacles as meshes.
 
 A rod has one joint per node. Its mesh is drawn along the z axis, and the joints move it. A point at the place s of an
 edge of length l, from 0 to 1, has the weights 1 - s and s. The nodes of the drawn mesh are l / 2 apart. Linear blending
@@ -23,12 +23,13 @@ import numpy.typing as npt
 
 from withe._core import __version__
 from withe.common.frames import Frames
-from withe.common.outlines import ObstacleOutline, RodOutline
+from withe.common.outlines import BodyOutline, ObstacleOutline, RodOutline
 from withe.view import scenery
-from withe.view.colors import PLANE_COLOR, SOLID_COLOR, linear, rgb, rod_color
+from withe.view.bodies import body_points, shaded
+from withe.view.colors import PLANE_COLOR, SOLID_COLOR, body_color, linear, rgb, rod_color
 from withe.view.surfaces import end_caps, rectangle_section, ring_faces, round_section, unit
 
-__all__ = ["node_frames", "write_glb"]
+__all__ = ["node_frames", "quaternions", "write_glb"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -55,7 +56,9 @@ def write_glb(record: Frames, path: Path) -> None:
     document.scene.append(root)
     for index, rod in enumerate(record.rods):
         _add_rod(document, record, rod, clock, root, document.material(rod.name, rod_color(index)))
-    nodes = record.positions().reshape(-1, 3)
+    for index, body in enumerate(record.bodies):
+        _add_body(document, record, body, clock, root, document.material(body.name, body_color(index)))
+    nodes = np.concatenate([record.positions().reshape(-1, 3), body_points(record)])
     for obstacle in record.obstacles:
         _add_obstacle(document, record, obstacle, nodes, clock, root)
     document.write(path)
@@ -104,7 +107,7 @@ def _add_rod(document: _Document, record: Frames, rod: RodOutline, clock: int | 
         positions, frames = (np.concatenate([values, values[:, :1]], axis=1) for values in (positions, frames))
     lengths = np.linalg.norm(np.diff(positions, axis=1), axis=-1).mean(axis=0)
     drawn = np.concatenate([[0.0], np.cumsum(0.5 * lengths)])
-    rotations = _quaternions(frames)
+    rotations = quaternions(frames)
     joints = []
     for index in range(positions.shape[1]):
         places, turns = positions[:, index], rotations[:, index]
@@ -169,6 +172,21 @@ def _tube(
     )
 
 
+def _add_body(
+    document: _Document, record: Frames, body: BodyOutline, clock: int | None, root: int, material: int
+) -> None:
+    """Add a body as a node that moves and turns."""
+    places = record.body_position(body)
+    turns = quaternions(np.swapaxes(record.body_rotation(body), -1, -2)[:, None])[:, 0]
+    points, normals = shaded(body)
+    mesh = document.mesh(body.name, material, points, normals, np.arange(len(points)).reshape(-1, 3))
+    node = document.node(name=body.name, mesh=mesh, translation=places[0].tolist(), rotation=turns[0].tolist())
+    document.gltf["nodes"][root]["children"].append(node)
+    if clock is not None:
+        document.animate(node, "translation", clock, places)
+        document.animate(node, "rotation", clock, turns)
+
+
 def _add_obstacle(
     document: _Document, record: Frames, obstacle: ObstacleOutline, nodes: FloatArray, clock: int | None, root: int
 ) -> None:
@@ -211,8 +229,14 @@ def _film_times(times: FloatArray) -> FloatArray:
     return np.asarray(times - times[0] if advances else np.arange(len(times)) / _STILL_RATE, np.float64)
 
 
-def _quaternions(frames: FloatArray) -> FloatArray:
-    """Quaternions x, y, z, w of frames, shape (frames, nodes, 4), without changes of sign from frame to frame."""
+def quaternions(frames: FloatArray) -> FloatArray:
+    """Return quaternions x, y, z, w without changes of sign from frame to frame, shape (frames, nodes, 4).
+
+    Parameters
+    ----------
+    frames : ndarray of shape (frames, nodes, 3, 3)
+        Unit vectors as rows.
+    """
     from scipy.spatial.transform import Rotation
 
     matrices = np.swapaxes(frames, -1, -2).reshape(-1, 3, 3)

@@ -1,4 +1,4 @@
-"""Table of a motion: one row per frame and node, with units in the header."""
+"""Table of a motion: one row per frame and node or body, with units in the header."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common.frames import Frames, edges_to_nodes
+from withe.export.gltf import quaternions
 
 __all__ = ["write_csv"]
 
@@ -30,13 +31,15 @@ _COLUMNS = (
     "curvature_2 [1/m]",
     "twist [rad/m]",
 )
+_BODY_COLUMNS = ("body", "qw [-]", "qx [-]", "qy [-]", "qz [-]")
 
 
 def write_csv(record: Frames, path: Path) -> None:
-    """Write a table with a row for each frame, rod and node.
+    """Write a table with a row for each frame, rod and node, and for each frame and rigid body.
 
     Numbers have all their digits. The tension of a node is the mean of its edges. The ends of an open rod have no
-    curvature and no twist, so these cells are empty.
+    curvature and no twist, so these cells are empty. Bodies have their name, the position of their origin and a unit
+    quaternion, in columns that tables without bodies do not have.
 
     Parameters
     ----------
@@ -44,14 +47,19 @@ def write_csv(record: Frames, path: Path) -> None:
     path : pathlib.Path
     """
     blocks = [(rod.name, _values(record, rod)) for rod in record.rods]
+    bodies = [(body.name, record.body_position(body), _turns(record, body)) for body in record.bodies]
+    beyond = [""] * len(_BODY_COLUMNS) if bodies else []
     with path.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(_COLUMNS)
+        writer.writerow(_COLUMNS + (_BODY_COLUMNS if bodies else ()))
         for frame, time in enumerate(record.times.tolist()):
             for name, values in blocks:
                 # Empty where a value is NaN, which spreadsheets read as text.
                 rows = ([number if number == number else "" for number in row] for row in values[frame].tolist())
-                writer.writerows([time, name, node, *row] for node, row in enumerate(rows))
+                writer.writerows([time, name, node, *row, *beyond] for node, row in enumerate(rows))
+            for name, places, turns in bodies:
+                x, y, z, w = turns[frame].tolist()
+                writer.writerow([time, "", "", *places[frame].tolist(), *[""] * 7, name, w, x, y, z])
 
 
 def _values(record: Frames, rod: Any) -> FloatArray:
@@ -66,6 +74,11 @@ def _values(record: Frames, rod: Any) -> FloatArray:
         ],
         axis=-1,
     )
+
+
+def _turns(record: Frames, body: Any) -> FloatArray:
+    """Quaternions x, y, z, w of a body, shape (frames, 4)."""
+    return quaternions(np.swapaxes(record.body_rotation(body), -1, -2)[:, None])[:, 0]
 
 
 def _at_nodes(values: FloatArray, closed: bool) -> FloatArray:

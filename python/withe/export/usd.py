@@ -1,4 +1,7 @@
-"""USD: rods as curves with widths, obstacles as shapes, with time samples. `pxr` is imported on first use."""
+"""USD: rods as curves with widths, rigid bodies as meshes, obstacles as shapes, all with time samples.
+
+`pxr` is imported on first use.
+"""
 
 from __future__ import annotations
 
@@ -10,10 +13,11 @@ import numpy.typing as npt
 
 from withe.common.extras import require
 from withe.common.frames import Frames, edges_to_nodes
-from withe.common.outlines import ObstacleOutline, RodOutline
-from withe.export.gltf import node_frames
+from withe.common.outlines import BodyOutline, ObstacleOutline, RodOutline
+from withe.export.gltf import node_frames, quaternions
 from withe.view import scenery
-from withe.view.colors import PLANE_COLOR, SOLID_COLOR, linear, rgb, rod_color
+from withe.view.bodies import body_points, shaded
+from withe.view.colors import PLANE_COLOR, SOLID_COLOR, body_color, linear, rgb, rod_color
 
 __all__ = ["write_usd"]
 
@@ -49,7 +53,9 @@ def write_usd(record: Frames, path: Path) -> None:
     taken: set[str] = set()
     for index, rod in enumerate(record.rods):
         _add_rod(stage, _path_of(rod.name, taken), record, rod, codes, rod_color(index))
-    nodes = record.positions().reshape(-1, 3)
+    for index, body in enumerate(record.bodies):
+        _add_body(stage, _path_of(body.name, taken), record, body, codes, body_color(index))
+    nodes = np.concatenate([record.positions().reshape(-1, 3), body_points(record)])
     for obstacle in record.obstacles:
         _add_obstacle(stage, _path_of(obstacle.name, taken), record, obstacle, nodes, codes)
     stage.GetRootLayer().Save()
@@ -105,6 +111,27 @@ def _add_rod(stage: Any, path: str, record: Frames, rod: RodOutline, codes: list
     for name, attribute in samples.items():
         for code, value in zip(codes, values[name].astype(np.float32), strict=True):
             attribute.Set(arrays.Vec3fArray.FromNumpy(np.ascontiguousarray(value)), code)
+
+
+def _add_body(stage: Any, path: str, record: Frames, body: BodyOutline, codes: list[float], color: FloatArray) -> None:
+    """Add a body as a mesh that moves and turns."""
+    geometry, vectors = require("pxr.UsdGeom", "export"), require("pxr.Gf", "export")
+    arrays = require("pxr.Vt", "export")
+    shape = geometry.Mesh.Define(stage, path)
+    shape.GetPrim().SetCustomDataByKey("body", body.name)
+    shape.CreatePointsAttr(arrays.Vec3fArray.FromNumpy(body.vertices.astype(np.float32)))
+    shape.CreateFaceVertexCountsAttr(arrays.IntArray.FromNumpy(np.full(len(body.triangles), 3, np.int32)))
+    shape.CreateFaceVertexIndicesAttr(arrays.IntArray.FromNumpy(body.triangles.ravel().astype(np.int32)))
+    shape.CreateNormalsAttr(arrays.Vec3fArray.FromNumpy(shaded(body)[1].astype(np.float32)))
+    shape.SetNormalsInterpolation(geometry.Tokens.faceVarying)
+    shape.CreateSubdivisionSchemeAttr(geometry.Tokens.none)
+    shape.CreateExtentAttr(geometry.PointBased.ComputeExtent(shape.GetPointsAttr().Get()))
+    _paint(shape, color)
+    move, turn = shape.AddTranslateOp(), shape.AddOrientOp()
+    turns = quaternions(np.swapaxes(record.body_rotation(body), -1, -2)[:, None])[:, 0]
+    for code, place, (x, y, z, w) in zip(codes, record.body_position(body).tolist(), turns.tolist(), strict=True):
+        move.Set(vectors.Vec3d(*place), code)
+        turn.Set(vectors.Quatf(w, x, y, z), code)
 
 
 def _add_obstacle(

@@ -17,7 +17,15 @@ import numpy.typing as npt
 from withe import io, view
 from withe.common import validation
 from withe.common.frames import ENERGIES, EnergyHistory
-from withe.common.outlines import Named, ObstacleOutline, RodOutline, SpringOutline, TendonOutline, index_of
+from withe.common.outlines import (
+    BodyOutline,
+    Named,
+    ObstacleOutline,
+    RodOutline,
+    SpringOutline,
+    TendonOutline,
+    index_of,
+)
 from withe.export import export
 
 __all__ = ["ROD_READOUTS", "EnergyHistory", "Record", "RunGradient"]
@@ -53,14 +61,15 @@ class Record:
 
     Methods and properties by purpose:
 
-    * read the scene: `times`, `rods`, `obstacles`, `springs`, `tendons`, `energy`, `keys`, `units`
+    * read the scene: `times`, `rods`, `bodies`, `obstacles`, `springs`, `tendons`, `energy`, `keys`, `units`
     * read rods: `positions`, `velocities`, `directors`, `spins`, `curvatures`, `twists`, `tensions`
-    * read parts: `obstacle_position`
+    * read parts: `body_position`, `body_rotation`, `obstacle_position`
     * read pictures: `plot`, `view`, `picture`, `animate`
     * files: `save`, `load`, `export`, `to_vtk`
     * differentiate: `gradient`
 
-    Arrays that methods return are copies, with the frame as first axis. Rods are given by handle or by name.
+    Arrays that methods return are copies, with the frame as first axis. Rods, bodies and obstacles are
+    given by handle or by name.
 
     See Also
     --------
@@ -85,11 +94,13 @@ class Record:
         springs: Iterable[SpringOutline] = (),
         tendons: Iterable[TendonOutline] = (),
         derivatives: RunGradient | None = None,
+        bodies: Iterable[BodyOutline] = (),
     ) -> None:
         self._derivatives = derivatives
         self._rods = tuple(rods)
         self._springs = tuple(springs)
         self._tendons = tuple(tendons)
+        self._bodies = tuple(bodies)
         self._obstacles = tuple(obstacles)
         self._arrays = dict(arrays)
         self._extras = tuple(extras)
@@ -186,6 +197,10 @@ class Record:
             self._array(f"rod_{index}_tensions", (frames, rod.edges))
             if f"rod_{index}_spins" in self._arrays:  # missing in old files
                 self._array(f"rod_{index}_spins", (frames, rod.edges))
+        for index, body in enumerate(self._bodies):
+            _check_body(body)
+            self._array(f"body_{index}_position", (frames, 3))
+            self._array(f"body_{index}_rotation", (frames, 3, 3))
         for index, obstacle in enumerate(self._obstacles):
             self._array(f"obstacle_{index}_place", (frames, 3))
             if obstacle.kind not in ("plane", "capsule") or obstacle.axis.shape != (3,) or not obstacle.radius >= 0.0:
@@ -230,6 +245,11 @@ class Record:
     def rods(self) -> tuple[RodOutline, ...]:
         """Return the rods, in the order of the scene."""
         return self._rods
+
+    @property
+    def bodies(self) -> tuple[BodyOutline, ...]:
+        """Rigid bodies, in the order of the scene."""
+        return self._bodies
 
     @property
     def obstacles(self) -> tuple[ObstacleOutline, ...]:
@@ -278,6 +298,54 @@ class Record:
         velocities : Velocities of the same nodes.
         """
         return self._nodal("positions", rod)
+
+    def body_position(self, body: Named) -> FloatArray:
+        """Return the positions of the origin of a rigid body's axes.
+
+        Parameters
+        ----------
+        body : Body, BodyOutline or str
+            Body to read.
+
+        Returns
+        -------
+        ndarray of shape (frames, 3) [m]
+
+        Raises
+        ------
+        ValueError
+            No body of that name.
+
+        See Also
+        --------
+        body_rotation : Orientations of a body.
+        Simulation.position : Position of a body at one moment.
+        """
+        return self._of_body("position", body)
+
+    def body_rotation(self, body: Named) -> FloatArray:
+        """Return the orientations of a rigid body: its axes as the columns of matrices.
+
+        Parameters
+        ----------
+        body : Body, BodyOutline or str
+            Body to read.
+
+        Returns
+        -------
+        ndarray of shape (frames, 3, 3)
+
+        Raises
+        ------
+        ValueError
+            No body of that name.
+
+        See Also
+        --------
+        body_position : Positions of a body.
+        Simulation.rotation : Orientation of a body at one moment.
+        """
+        return self._of_body("rotation", body)
 
     def obstacle_position(self, obstacle: Named) -> FloatArray:
         """Return the positions of an obstacle.
@@ -467,15 +535,19 @@ class Record:
     def _of_rod(self, name: str, rod: Named) -> FloatArray:
         return self._arrays[f"rod_{self._index(rod)}_{name}"].copy()
 
+    def _of_body(self, name: str, body: Named) -> FloatArray:
+        return self._arrays[f"body_{index_of(self._bodies, body, 'body')}_{name}"].copy()
+
     def _index(self, rod: Named) -> int:
         return index_of(self._rods, rod, "rod")
 
     def __repr__(self) -> str:
-        rods = ", ".join(rod.name for rod in self._rods)
+        kinds = {"rods": self._rods, "bodies": self._bodies}
+        parts = "; ".join(f"{kind} {', '.join(each.name for each in all)}" for kind, all in kinds.items() if all)
         if len(self) == 0:
-            return f"Record(no frames; rods {rods})"
+            return f"Record(no frames; {parts})"
         first, last = self._arrays["times"][[0, -1]]
-        return f"Record({len(self)} frames, {first:g}..{last:g} s; rods {rods})"
+        return f"Record({len(self)} frames, {first:g}..{last:g} s; {parts})"
 
     # Files
 
@@ -513,6 +585,7 @@ class Record:
             "units": _UNITS,
             "rods": [{"name": rod.name, "closed": rod.closed} for rod in self._rods],
             "extras": list(self._extras),
+            "bodies": [{"name": each.name} for each in self._bodies],
             "obstacles": [
                 {"name": each.name, "kind": each.kind, "axis": each.axis.tolist(), "radius": each.radius}
                 for each in self._obstacles
@@ -529,6 +602,9 @@ class Record:
             arrays[f"rod_{index}_radii"] = rod.radii
             if rod.widths is not None:
                 arrays[f"rod_{index}_widths"] = rod.widths
+        for index, body in enumerate(self._bodies):
+            arrays[f"body_{index}_vertices"] = body.vertices
+            arrays[f"body_{index}_triangles"] = body.triangles
         return io.save_arrays(path, "record", _FILE_VERSION, header, arrays)
 
     @classmethod
@@ -583,9 +659,16 @@ class Record:
                 )
                 for each in header.get("tendons", [])
             ]
+            bodies = [
+                BodyOutline(
+                    str(each["name"]), arrays.pop(f"body_{index}_vertices"), arrays.pop(f"body_{index}_triangles")
+                )
+                for index, each in enumerate(header.get("bodies", []))
+            ]
             if "energy_spring" not in arrays:  # absent in files older than springs
                 arrays["energy_spring"] = np.zeros(len(arrays["times"]))
-            return cls(rods, arrays, [str(name) for name in header["extras"]], obstacles, springs, tendons)
+            extras = [str(name) for name in header["extras"]]
+            return cls(rods, arrays, extras, obstacles, springs, tendons, bodies=bodies)
         except (KeyError, IndexError, TypeError, ValueError) as error:
             raise ValueError(f"{path} is a damaged record: {error}") from error
 
@@ -595,7 +678,7 @@ class Record:
         * ``.glb``: animated binary glTF 2.0, for programs such as Blender, three.js and the viewers of Windows
         * ``.usda`` or ``.usdc``: USD stage, as text or binary, for programs such as Omniverse and Blender
         * ``.pvd``: VTK collection for ParaView; the frames are in a folder of the same name
-        * ``.csv``: table with one row per frame and node
+        * ``.csv``: table with one row per frame and node, and per frame and body
 
         Parameters
         ----------
@@ -619,15 +702,17 @@ class Record:
         Notes
         -----
         * glTF: each rod is a skinned mesh with one joint per node, which moves and turns over time. Round rods are
-          tubes with the radii of their edges, and rectangular ones are boxes. Obstacles are meshes. Colours are those
-          of `picture`. Lengths are in metres. The root node turns the z axis up, because glTF has y up. The film begins
-          at time 0.
+          tubes with the radii of their edges, and rectangular ones are boxes. Each rigid body is a node
+          with a mesh, which moves and turns. Obstacles are meshes. Colours are those of `picture`. Lengths are in
+          metres. The root node turns the z axis up, because glTF has y up. The film begins at time 0.
         * USD: each rod is a cubic curve (BasisCurves) through its nodes, with widths, and velocities for motion blur. A
-          rectangular rod is a ribbon. Lengths are in metres (metersPerUnit 1), and z is up. The time code of a frame is
-          its time multiplied by timeCodesPerSecond.
+          rectangular rod is a ribbon. A rigid body is a mesh with a translation and an orientation. Lengths are in
+          metres (metersPerUnit 1), and z is up. The time code of a frame is its time multiplied by
+          timeCodesPerSecond.
         * VTK: see `to_vtk`.
         * Table: columns have their units in the header. A tension is the mean of both edges of a node. Cells of
-          curvature and twist are empty at the ends of open rods.
+          curvature and twist are empty at the ends of open rods. A row of a body has its name, the position of its
+          origin and a unit quaternion (w, x, y, z).
 
         Files for glTF and USD have no springs and tendons, and no obstacles that are far away or much larger than the
         rods. If the time does not advance, as in a sequence of equilibria, frames are 1/30 s apart there.
@@ -793,3 +878,14 @@ class Record:
         animate : Render a film.
         """
         return view.picture(self, path, **options)
+
+
+def _check_body(body: BodyOutline) -> None:
+    """Refuse a surface whose arrays do not fit together."""
+    vertices, triangles = body.vertices, body.triangles
+    if vertices.ndim != 2 or vertices.shape[1] != 3 or vertices.dtype != np.float64 or not len(vertices):
+        raise ValueError(f"vertices of body {body.name!r} must be floats of shape (n, 3)")
+    if triangles.ndim != 2 or triangles.shape[1] != 3 or triangles.dtype.kind != "i" or not len(triangles):
+        raise ValueError(f"triangles of body {body.name!r} must be integers of shape (n, 3)")
+    if triangles.min() < 0 or triangles.max() >= len(vertices):
+        raise ValueError(f"triangles of body {body.name!r} must lie in 0..{len(vertices) - 1}")

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from withe.common import validation
 from withe.common.frames import ENERGIES
-from withe.common.outlines import ObstacleOutline, RodOutline, SpringOutline, TendonOutline
+from withe.common.outlines import BodyOutline, ObstacleOutline, RodOutline, SpringOutline, TendonOutline
 from withe.recording.record import ROD_READOUTS, Record, RunGradient
 
 __all__ = ["Recorder", "present"]
@@ -60,6 +60,12 @@ class Moving(Protocol):
 
     def velocities(self) -> npt.NDArray[np.float64]:
         """Velocities of all nodes, shape (nodes, 3) [m/s]."""
+
+    def position(self, body: str, /) -> npt.NDArray[np.float64]:
+        """Origin of the axes of a rigid body, shape (3,) [m]."""
+
+    def rotation(self, body: str, /) -> npt.NDArray[np.float64]:
+        """Axes of a rigid body as columns, shape (3, 3)."""
 
     def obstacle_position(self, obstacle: str, /) -> npt.NDArray[np.float64]:
         """Position of an obstacle, shape (3,) [m]."""
@@ -114,6 +120,8 @@ class Recorder(Generic[S]):
         To be drawn between their nodes.
     tendons : iterable of TendonOutline
         To be drawn through their guides.
+    bodies : iterable of BodyOutline
+        Rigid bodies, whose positions and rotations to record.
 
     Raises
     ------
@@ -128,11 +136,13 @@ class Recorder(Generic[S]):
         obstacles: Iterable[ObstacleOutline] = (),
         springs: Iterable[SpringOutline] = (),
         tendons: Iterable[TendonOutline] = (),
+        bodies: Iterable[BodyOutline] = (),
     ) -> None:
         self._simulation = simulation
         self._obstacles = tuple(obstacles)
         self._springs = tuple(springs)
         self._tendons = tuple(tendons)
+        self._bodies = tuple(bodies)
         self._extra = dict(extra or {})
         for name, function in self._extra.items():
             if not isinstance(name, str):
@@ -174,6 +184,9 @@ class Recorder(Generic[S]):
                 frame[f"rod_{index}_{readout}"] = getattr(simulation, readout)(rod.name)
         for index, obstacle in enumerate(self._obstacles):
             frame[f"obstacle_{index}_place"] = simulation.obstacle_position(obstacle.name)
+        for index, body in enumerate(self._bodies):
+            frame[f"body_{index}_position"] = simulation.position(body.name)
+            frame[f"body_{index}_rotation"] = simulation.rotation(body.name)
         energy = simulation.energy()
         for name in ENERGIES:
             frame[f"energy_{name}"] = np.array(getattr(energy, name), float)
@@ -188,7 +201,16 @@ class Recorder(Generic[S]):
             arrays = {name: column.values(self._frames) for name, column in self._columns.items()}
         else:
             arrays = {name: values[None][:0].copy() for name, values in self._frame().items()}
-        return Record(self._rods, arrays, self._extra, self._obstacles, self._springs, self._tendons, self.derivatives)
+        return Record(
+            self._rods,
+            arrays,
+            self._extra,
+            self._obstacles,
+            self._springs,
+            self._tendons,
+            self.derivatives,
+            self._bodies,
+        )
 
 
 def _numbers(name: str, value: npt.ArrayLike) -> npt.NDArray[Any]:
@@ -208,9 +230,10 @@ def present(
     obstacles: Iterable[ObstacleOutline] = (),
     springs: Iterable[SpringOutline] = (),
     tendons: Iterable[TendonOutline] = (),
+    bodies: Iterable[BodyOutline] = (),
 ) -> Record:
     """A record of one frame: the present state of a simulation."""
-    recorder = Recorder(simulation, None, obstacles, springs, tendons)
+    recorder = Recorder(simulation, None, obstacles, springs, tendons, bodies)
     recorder.capture()
     return recorder.record
 

@@ -6,11 +6,21 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.outlines import BodyOutline
+from withe.parts.directory import Directory
 from withe.parts.handles import Body
 from withe.parts.kinds import BodyPart
 from withe.simulation.session import Session
+from withe.solids import Sphere
 
-__all__ = ["body_position", "body_rotation", "body_spin", "body_velocity", "set_body_velocity"]
+__all__ = [
+    "body_outlines",
+    "body_position",
+    "body_rotation",
+    "body_spin",
+    "body_velocity",
+    "set_body_velocity",
+]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -61,3 +71,30 @@ def set_body_velocity(
     base = session.world.body_base(part.index)
     arm = np.asarray(session.world.positions()[base]) - body_position(session, body)
     session.world.set_body_motion(part.index, v + np.cross(spin, arm), spin)
+
+
+def body_outlines(directory: Directory) -> list[BodyOutline]:
+    """Return the surfaces of bodies for records, each in the axes of its body."""
+    return [_outline(part) for part in directory.all(BodyPart)]
+
+
+def _outline(part: BodyPart) -> BodyOutline:
+    """Return the surface of the solid; without a solid, a ball about the centre of mass.
+
+    The radius of the ball is the radius of gyration, sqrt((J1 + J2 + J3) / (3 m)).
+    """
+    if part.solid is not None:
+        vertices, triangles = part.solid.surface()
+    else:
+        vertices, triangles = Sphere(float(np.sqrt(np.trace(part.inertia) / (3.0 * part.mass)))).surface()
+        vertices = vertices + part.rotation.T @ (part.center - part.position)
+    return BodyOutline(part.name, *_cleaned(np.array(vertices, float), np.array(triangles, np.int64)))
+
+
+def _cleaned(vertices: FloatArray, triangles: npt.NDArray[np.int64]) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+    """Merge coincident vertices, and drop triangles without area: the poles of a ball are many points."""
+    grid = np.rint(vertices / (1e-9 * np.abs(vertices).max()))
+    _, first, inverse = np.unique(grid, axis=0, return_index=True, return_inverse=True)
+    merged = inverse.reshape(-1)[triangles]
+    has_area = (merged != np.roll(merged, 1, axis=1)).all(axis=1)
+    return vertices[first], merged[has_area]

@@ -16,6 +16,7 @@ __all__ = [
     "PLANE_COLOR",
     "SOLID_COLOR",
     "ColorBy",
+    "body_color",
     "color_limits",
     "linear",
     "nice_limits",
@@ -29,6 +30,7 @@ ColorBy = Literal["rod", "tension", "curvature", "twist", "speed"]
 
 _PALETTE = style.colors("light").cycle
 PLANE_COLOR, SOLID_COLOR = "#e3e8ec", "#b4bdc5"
+_BODY_COLORS = ("#5c7186", "#8497a9", "#3f5266", "#a3b2c0")
 BARS = {
     "tension": ("tension [N]", "viridis"),
     "curvature": ("curvature [1/m]", "viridis"),
@@ -40,6 +42,11 @@ BARS = {
 def rod_color(rod: int) -> FloatArray:
     """Red, green, blue from 0 to 1 of a rod by its number."""
     return rgb(_PALETTE[rod % len(_PALETTE)])
+
+
+def body_color(body: int) -> FloatArray:
+    """Red, green, blue from 0 to 1 of a rigid body by its number: shades of slate, which no rod has."""
+    return rgb(_BODY_COLORS[body % len(_BODY_COLORS)])
 
 
 def rgb(code: str) -> FloatArray:

@@ -11,8 +11,9 @@ import numpy.typing as npt
 from withe.common.extras import require
 from withe.common.frames import Frames
 from withe.common.keywords import keyword_hints
-from withe.common.outlines import ObstacleOutline, RodOutline
+from withe.common.outlines import BodyOutline, ObstacleOutline, RodOutline
 from withe.view import scenery, style
+from withe.view.bodies import body_points, silhouette
 from withe.view.tendons import tendon_points
 
 __all__ = ["plot"]
@@ -22,7 +23,7 @@ FloatArray = npt.NDArray[np.float64]
 
 @keyword_hints
 def plot(record: Frames, *, shapes: int = 6, theme: style.Theme = "light") -> Any:
-    """Draw the shapes of the rods at several times, and the energies over time.
+    """Draw the shapes of rods and rigid bodies at several times, and the energies over time.
 
     Obstacles near the rods are drawn too: in two dimensions planes as lines, and spheres and capsules as outlines; in
     three dimensions transparent. Moving obstacles, springs and tendons are drawn at the same times as the rods, in the
@@ -40,7 +41,7 @@ def plot(record: Frames, *, shapes: int = 6, theme: style.Theme = "light") -> An
     -------
     matplotlib.figure.Figure
         Figure in two dimensions if the motion stays in a coordinate plane, to a twentieth of the thickness of the
-        thinnest rod; otherwise in three dimensions.
+        thinnest rod, and bodies turn about its normal; otherwise in three dimensions.
 
     Raises
     ------
@@ -64,7 +65,7 @@ def plot(record: Frames, *, shapes: int = 6, theme: style.Theme = "light") -> An
     with style.context(theme) as colors:
         single = len(record) == 1
         figure = pyplot.figure(figsize=(5.5, 4.6) if single else (11.0, 4.6))
-        size = np.ptp(record.positions().reshape(-1, 3), axis=0)
+        size = np.ptp(_points(record), axis=0)
         share = 0.7 if size[2] > 2.0 * max(size[:2]) else 1.1  # tall shapes need less room
         grid = figure.add_gridspec(1, 1 if single else 2, width_ratios=[1] if single else [share, 1.0])
         axes, around = _plot_shapes(figure, grid[0], record, int(shapes), colors)
@@ -89,6 +90,7 @@ _ENERGY_COLORS = {  # names of colours; energies of one colour differ in their d
     "spring": "purple",
     "total": "ink",
 }
+_LEAST_RANGE = 1e-6  # of the axis of energies, over the largest energy
 _DASHED = {"spring": "-.", "total": "--"}
 
 
@@ -98,9 +100,10 @@ def _plot_shapes(figure: Any, place: Any, record: Frames, count: int, colors: st
     cm = require("matplotlib.cm", "view")
     positions, times = record.positions(), record.times
     frames = np.unique(np.linspace(0, len(record) - 1, count).round().astype(int))
-    size = float(np.ptp(positions.reshape(-1, 3), axis=0).max())
+    nodes = _points(record)
+    size = float(np.ptp(nodes, axis=0).max())
     factor, prefix = _prefix(size, (1.0, 1e-3, 1e-6))
-    axes_shown = _plane(positions, _thinnest(record.rods))
+    axes_shown = _plane(positions, _thinnest(record.rods), [record.body_rotation(body) for body in record.bodies])
     three = axes_shown is None
     shown = list(range(3)) if axes_shown is None else axes_shown
     axes = figure.add_subplot(place, projection="3d" if three else None)
@@ -120,7 +123,12 @@ def _plot_shapes(figure: Any, place: Any, record: Frames, count: int, colors: st
             axes.plot(*(points[:, shown] * factor).T, color=scale.to_rgba(times[frame]), linewidth=0.9)
         for points in tendons:
             axes.plot(*(points[frame][:, shown] * factor).T, color=scale.to_rgba(times[frame]), linewidth=0.9)
-    nodes = positions.reshape(-1, 3)
+    for body in record.bodies:
+        poses = body.placed(record.body_position(body)[frames], record.body_rotation(body)[frames])
+        still = bool(np.all(poses == poses[0]))
+        for points, time in zip(poses[: 1 if still else None], times[frames], strict=False):
+            ink = colors.grey if still else scale.to_rgba(time)
+            _draw_body(axes, body, points, None if three else shown, factor, ink, colors)
     around = []
     for obstacle in record.obstacles:
         places = record.obstacle_position(obstacle)[frames]
@@ -140,6 +148,36 @@ def _plot_shapes(figure: Any, place: Any, record: Frames, count: int, colors: st
         bar.set_label("time [s]")
         bar.outline.set_visible(False)
     return axes, np.concatenate([nodes, *around]) * factor
+
+
+def _points(record: Frames) -> FloatArray:
+    """Nodes in all frames and points on bodies, shape (any, 3) [m]."""
+    return np.concatenate([record.positions().reshape(-1, 3), body_points(record)])
+
+
+def _draw_body(
+    axes: Any,
+    body: BodyOutline,
+    points: FloatArray,
+    shown: list[int] | None,
+    factor: float,
+    ink: Any,
+    colors: style.Colors,
+) -> None:
+    """A body by its silhouette along the coordinate that is not shown; in three dimensions by its shaded surface."""
+    if shown is None:
+        axes.plot_trisurf(*(points * factor).T, triangles=body.triangles, color=ink, alpha=0.6, linewidth=0.0)
+        return
+    towards = np.cross(np.eye(3)[shown[0]], np.eye(3)[shown[1]])
+    flat = points[:, shown] * factor
+    collections = require("matplotlib.collections", "view")
+    faces = collections.PolyCollection(flat[body.triangles], facecolor=colors.pale, edgecolor=colors.pale, zorder=1.6)
+    edges = collections.LineCollection(
+        flat[silhouette(points, body.triangles, towards)], color=ink, linewidth=1.4, capstyle="round", zorder=1.7
+    )
+    axes.add_collection(faces)
+    axes.add_collection(edges)
+    axes.update_datalim(flat)
 
 
 def _draw_section(
@@ -207,6 +245,9 @@ def _plot_energies(axes: Any, record: Frames, colors: style.Colors) -> None:
             text = "gravity, from the start" if name == "gravity" else name
             color = getattr(colors, _ENERGY_COLORS[name])
             axes.plot(times, values * factor, _DASHED.get(name, "-"), color=color, label=text)
+    low, high = axes.get_ylim()
+    if high - low < _LEAST_RANGE * largest * factor:  # constant up to rounding, which an axis would magnify
+        axes.set_ylim(min(0.0, 1.1 * low), max(0.0, 1.1 * high))
     style.label(axes, x=("time", "s"), y=("energy", f"{prefix}J"))
     axes.margins(x=0.0)
     style.legend(axes, side="top")
@@ -219,15 +260,22 @@ def _prefix(largest: float, units: tuple[float, ...]) -> tuple[float, str]:
     return 1.0 / unit, prefixes[unit]
 
 
-def _plane(positions: FloatArray, thickness: float) -> list[int] | None:
+def _plane(positions: FloatArray, thickness: float, rotations: Sequence[FloatArray] = ()) -> list[int] | None:
     """Return the two coordinates of a motion in a coordinate plane; None for any other motion.
 
     Motion out of the plane is ignored if it is far below the thickness of rods: rods on a floor sink in slightly.
+    Rotations of bodies, of shape (frames, 3, 3) each, must be about the normal of the plane.
     """
     extents = np.ptp(positions.reshape(-1, 3), axis=0)
-    flat = extents <= 1e-6 * extents.max()
+    stays = np.full(3, True)
+    for turns in rotations:
+        since = turns @ turns[0].T
+        stays &= np.abs(since - np.eye(3)).max(axis=(0, 1)) <= 1e-6
+    flat = (extents <= 1e-6 * extents.max()) & stays
     if flat.any():
         missing = 1 if flat[1] else int(np.flatnonzero(flat)[0])
+    elif not stays[extents.argmin()]:
+        return None
     elif extents.min() <= _UNSEEN * thickness:
         missing = int(extents.argmin())
     else:
@@ -237,4 +285,4 @@ def _plane(positions: FloatArray, thickness: float) -> list[int] | None:
 
 def _thinnest(rods: Sequence[RodOutline]) -> float:
     """Smallest thickness of any rod [m]."""
-    return min(float(rod.radii.min() * 2.0 if rod.widths is None else rod.widths.min()) for rod in rods)
+    return min((float(rod.radii.min() * 2.0 if rod.widths is None else rod.widths.min()) for rod in rods), default=0.0)

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from withe.common.frames import Frames
 from withe.common.keywords import keyword_hints
+from withe.view.bodies import body_points
 from withe.view.colors import ColorBy
 from withe.view.pinhole import Pinhole
 from withe.view.rendering import Stage
@@ -40,8 +41,8 @@ class LiveView:
     speed : float [-]
         Greatest speed of the run: seconds of the simulation per second. Infinity for no limit.
     size, color_by, camera, ground
-        As in `withe.view.picture`. The camera moves back if rods leave the picture. The scale of colours is that of the
-        first scene, so `color_by` needs a scene that is loaded.
+        As in `withe.view.picture`. The camera moves back if rods or bodies leave the picture. The scale of colours is
+        that of the first scene, so `color_by` needs a scene that is loaded.
 
     Attributes
     ----------
@@ -145,7 +146,7 @@ class LiveView:
         began = time.monotonic()
         record = self._present()
         if self._moves_camera:
-            self._stage.keep_in_view(record.positions()[0])
+            self._stage.keep_in_view(np.concatenate([record.positions()[0], body_points(record, [0])]))
         self._stage.show_present(record)
         self._stage.label(f"t = {record.times[0]:.3f} s")
         self._screen.refresh()

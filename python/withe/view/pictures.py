@@ -40,7 +40,7 @@ def picture(
     ground: float | None = None,
     label: str | None = None,
 ) -> Path:
-    """Render one frame into a .png file: rods as tubes, and planes, spheres and capsules.
+    """Render one frame into a .png file: rods as tubes, rigid bodies, planes, spheres and capsules.
 
     A plane is drawn around the rods, and fades into the background. Objects that are far away, or much larger than the
     rods, do not move the camera.
@@ -123,7 +123,7 @@ def animate(
     quality: Literal["draft", "high"] = "draft",
     progress: bool = True,
 ) -> Path:
-    """Render a film: rods as tubes, with planes, spheres and capsules in motion.
+    """Render a film: rods as tubes, rigid bodies, planes, spheres and capsules in motion.
 
     Parameters
     ----------

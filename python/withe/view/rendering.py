@@ -1,4 +1,4 @@
-"""Rods as tubes and obstacles on a light ground, rendered by PyVista.
+"""Rods as tubes, rigid bodies and obstacles on a light ground, rendered by PyVista.
 
 This is the stage that pictures, films and the viewer share.
 """
@@ -17,6 +17,7 @@ from withe.common.extras import require
 from withe.common.frames import Frames
 from withe.common.outlines import ObstacleOutline
 from withe.view import scenery
+from withe.view.bodies import BodySurfaces, Pose, body_points, mixed_rotations
 from withe.view.colors import (
     BARS,
     SOLID_COLOR,
@@ -116,11 +117,14 @@ class Stage:
             raise ValueError("record has no frames to show")
         if color_by != "rod" and color_by not in BARS:
             raise ValueError(f"color_by must be one of 'rod', {str(list(BARS))[1:-1]}, got {color_by!r}")
+        if color_by != "rod" and not record.rods:
+            raise ValueError(f"color_by must be 'rod' for a record without rods, got {color_by!r}")
         self.size: tuple[int, int] = _checked_size(size)
         self._margins = left, 0.0 if color_by == "rod" else _BAR_SHARE
         self._read(record, color_by)
         in_view = self._positions if frames is None else self._positions[list(frames)]
-        nodes = in_view.reshape(-1, 3)
+        seen = body_points(record, None if frames is None else list(frames))
+        nodes = np.concatenate([in_view.reshape(-1, 3), seen])
         around = [
             scenery.framing(obstacle, places if frames is None else places[list(frames)], nodes)
             for obstacle, places in zip(record.obstacles, self._places, strict=True)
@@ -157,6 +161,7 @@ class Stage:
         self._add_obstacles(pyvista, np.concatenate([nodes, self._around]))
         before = set(self.plotter.actors)
         self._add_rods(pyvista, color_by)
+        self._bodies = BodySurfaces(pyvista, self.plotter, record)
         line = self._fineness * max(1.5, self.size[1] / 300.0)  # [px]
         self._springs = SpringLines(pyvista, self.plotter, record, direction, line)
         self._tendons = TendonLines(pyvista, self.plotter, record, line)
@@ -175,7 +180,7 @@ class Stage:
         self.times: FloatArray = record.times
         self._positions = record.positions()
         self._directors = [record.directors(rod)[:, :, 0] for rod in record.rods]
-        samples = max(1, min(6, _MAX_SAMPLES // sum(len(rod.rows) for rod in record.rods)))
+        samples = max(1, min(6, _MAX_SAMPLES // max(1, sum(len(rod.rows) for rod in record.rods))))
         self._surfaces = [Surface(rod, self._positions[0, rod.rows], samples) for rod in record.rods]
         self._footprints = [
             surface.footprint(self._positions[0, rod.rows])
@@ -197,7 +202,9 @@ class Stage:
         share = frame - before
         values = None if self._values is None else mixed(self._values)
         (positions,) = mixed([self._positions])
-        self._move(positions, mixed(self._directors), mixed(self._places), mixed(self._tendons.motions), values)
+        turns = [mixed_rotations(turn[before], turn[after], share) for turn in self._bodies.rotations]
+        poses = list(zip(mixed(self._bodies.positions), turns, strict=True))
+        self._move(positions, mixed(self._directors), mixed(self._places), mixed(self._tendons.motions), poses, values)
 
     def show_present(self, record: Frames) -> None:
         """Move the rods to the first frame of another record of the same scene."""
@@ -209,6 +216,7 @@ class Stage:
             [record.directors(rod)[0, :, 0] for rod in record.rods],
             [record.obstacle_position(obstacle)[0] for obstacle in record.obstacles],
             [tendon_points(record, tendon)[0] for tendon in record.tendons],
+            [(record.body_position(body)[0], record.body_rotation(body)[0]) for body in record.bodies],
             None if self._color_by == "rod" else [nodal_values(record, rod, self._color_by)[0] for rod in record.rods],
         )
 
@@ -218,9 +226,10 @@ class Stage:
         directors: list[FloatArray],
         places: list[FloatArray],
         tendons: list[FloatArray],
+        bodies: list[Pose],
         values: list[FloatArray] | None,
     ) -> None:
-        """Move all parts in place: nodes of the scene, and for each part its directors, place, guides and colours."""
+        """Move all parts in place: nodes, and of each part its directors, place, guides, pose and colours."""
         self._obstacle_points = []
         for actor, index, normal, surface in self._obstacles:
             way = places[index] - self._places[index][0]
@@ -230,6 +239,7 @@ class Stage:
             self._obstacle_points += [surface + way] if surface is not None else []
         self._springs.show(positions)
         self._tendons.show(tendons)
+        self._bodies.show(bodies)
         meshed, areas = [], []
         for index, rod in enumerate(self._record.rods):
             points, normals = self._surfaces[index].mesh(positions[rod.rows], directors[index])
@@ -246,10 +256,12 @@ class Stage:
                 self._floor.lift(float(places[self._floor_plane][2]))
             casting = [*meshed, *self._obstacle_points, *(points for points, _ in self._ghosts)]
             areas += [*self._footprints_of_obstacles, *(area for _, area in self._ghosts)]
+            casting += [points for points, _ in self._bodies.casting]
+            areas += [area for _, area in self._bodies.casting]
             self._floor.cast(np.concatenate(casting), np.concatenate(areas))
 
     def keep_in_view(self, positions: FloatArray) -> None:
-        """Move the camera back if nodes, shape (nodes, 3) [m], leave the region in view; its direction stays."""
+        """Move the camera back if points, shape (points, 3) [m], leave the region in view; its direction stays."""
         low, high = self._seen.min(axis=0), self._seen.max(axis=0)
         if np.all(positions >= low - 1e-9 * self._extent) and np.all(positions <= high + 1e-9 * self._extent):
             return
@@ -268,7 +280,7 @@ class Stage:
 
     def image(self) -> npt.NDArray[np.uint8]:
         """Return the image of the camera, shape (height, width, 3)."""
-        return mean_of_blocks(self._layered() if self._ghosts else self._rendered(), self._fineness)
+        return mean_of_blocks(self._layered() if any(self._layers) else self._rendered(), self._fineness)
 
     def _rendered(self) -> npt.NDArray[np.uint8]:
         """Return the rendered pixels, shape (height, width, 3 or 4), of which three are colours.
@@ -342,7 +354,9 @@ class Stage:
         around = self._around
         self._seen = points
         rods = self._record.rods
-        reach = max(float(rod.radii.max() if rod.widths is None else 0.5 * rod.widths.max()) for rod in rods)
+        reach = max(
+            (float(rod.radii.max() if rod.widths is None else 0.5 * rod.widths.max()) for rod in rods), default=0.0
+        )
         everything = np.concatenate([points, around])
         low, high = everything.min(axis=0), everything.max(axis=0)
         extent = float(np.linalg.norm(high - low)) + 2.0 * reach
@@ -455,12 +469,12 @@ class Stage:
             self._footprints_of_obstacles.append(np.full(len(points), area / len(points)))
 
     def _add_ghost(self, pyvista: Any, frames: list[int], place: int) -> list[Any]:
-        """Add the rods of one frame in pale colours, at rest, where they differ from those of later frames.
+        """Add the rods and bodies of one frame in pale colours, at rest, where they differ from those of later frames.
 
         The points of their surfaces are stored, with the areas that cast shadows. Returns the actors.
         """
-        actors = []
         strength = 0.2 + 0.3 * place / max(1, len(frames) - 2)
+        actors = self._bodies.add_ghost(frames[place], frames[place + 1 :], strength)
         for index, rod in enumerate(self._record.rods):
             surface, pose = self._surfaces[index], self._positions[frames[place], rod.rows]
             away = stands_out(rod, pose, [self._positions[frame, rod.rows] for frame in frames[place + 1 :]])
