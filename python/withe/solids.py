@@ -224,10 +224,8 @@ class Mesh:
     triangles: npt.ArrayLike
 
     def __post_init__(self) -> None:
-        vertices = np.array(self.vertices, dtype=float)
+        vertices = validation.number_array(self.vertices, "vertices of the mesh", ("n", 3))
         triangles = np.array(self.triangles)
-        if vertices.ndim != 2 or vertices.shape[1:] != (3,) or not np.isfinite(vertices).all():
-            raise ValueError(f"vertices must be finite and of shape (n, 3), got shape {vertices.shape}")
         if triangles.ndim != 2 or triangles.shape[1:] != (3,) or not np.issubdtype(triangles.dtype, np.integer):
             raise ValueError(f"triangles must be whole numbers of shape (m, 3), got shape {triangles.shape}")
         if triangles.size == 0 or triangles.min() < 0 or triangles.max() >= len(vertices):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 import withe
 
@@ -40,8 +41,6 @@ class Circle:
         position = np.add(self.place, np.multiply(self.way, np.sin(30.0 * t)))
         if self.axis is None:
             return position
-        from scipy.spatial.transform import Rotation
-
         return position, Rotation.from_rotvec(np.multiply(self.axis, 0.3 * np.sin(20.0 * t))).as_matrix()
 
 
@@ -110,6 +109,61 @@ def add_rods(scene, r, flat, material, joints):
         ring = np.stack([0.1 + 0.03 * np.cos(angle), 0 * angle, 0.16 + 0.03 * np.sin(angle)], axis=1)
         scene.add_rod(points=ring, closed=True, radius=3e-3, material=material, name="ring")
     return a, b, points[-1], 0.09 if up else 0.03
+
+
+def add_tree_of_bodies(scene, number):
+    """A tree of one to four rigid bodies on the limb of a drawn scene or beside it, with joints and loads of all kinds.
+
+    The bodies have a generator of their own, so that the scenes without them stay the same.
+    """
+    r = random.Random(f"bodies {number}")
+
+    def some(size):
+        return [r.uniform(-size, size) for _ in range(3)]
+
+    def turned():
+        turn = Rotation.from_rotvec(some(2.0))
+        w, x, y, z = turn.as_quat(scalar_first=True)
+        return r.choice([None, turn, turn.as_matrix(), [w, x, y, z]])
+
+    solids = (
+        withe.solids.Sphere(0.02),
+        withe.solids.Box((0.02, 0.03, 0.05)),
+        withe.solids.Cylinder(0.01, 0.04),
+        withe.solids.Capsule(0.01, 0.03),
+        withe.solids.Mesh(
+            [[0, 0, 0], [0.04, 0, 0], [0, 0.04, 0], [0, 0, 0.04]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
+        ),
+    )
+    held = scene["hub"] if "hub" in scene._directory.parts else None
+    for i in range(r.randint(1, 4)):
+        place = np.add((0.3, 0.0, 0.2 + 0.1 * i), some(0.02))
+        kind = r.choice(["solid", "mass", "inertia"])
+        if kind == "solid":
+            body = scene.add_body(r.choice(solids), density=r.uniform(300.0, 900.0), position=place, rotation=turned())
+        elif kind == "mass":
+            body = scene.add_body(r.choice(solids), mass=0.01, position=place, rotation=turned(), name=f"body {i} b")
+        else:
+            inertia = r.choice([1e-5, (1e-5, 1.2e-5, 1.5e-5), np.diag([1e-5, 1e-5, 1.8e-5])])
+            body = scene.add_body(mass=0.02, inertia=inertia, center=some(0.01), position=place, rotation=turned())
+        if r.random() < 0.3:
+            scene.add_force(body, some(0.01), at=np.add(place, some(0.02)))
+        if r.random() < 0.2:
+            scene.add_moment(body, some(1e-4))
+        kind = r.choice(["rigid", "pinned", "revolute"])
+        turns = {"axis": some(1.0), "stiffness": 1e-3, "damping": 1e-5} if kind == "revolute" else {}
+        if held is None and r.random() < 0.7:
+            scene.join(body, scene["b"].end, kind, **turns)
+        elif held is not None:
+            if kind == "rigid":
+                scene.join(held, body, kind="pinned", at=place)
+            else:
+                scene.join(held, body, kind, at=place, **turns)
+        elif r.random() < 0.5:
+            scene.clamp(body, at=np.add(place, some(0.02)), spin=r.choice([False, (0.0, 0.6, 0.8)]))
+        else:
+            scene.pin(body, at=place)
+        held = body
 
 
 def add_supports_and_loads(scene, r, flat, a, b, varying, clamped):
@@ -184,8 +238,8 @@ def add_bodies(scene, r, flat, b, end, static):
         scene.add_spring(hub.at(np.add(end, (0, 0, 0.01))), scene.rods[0].node(1), stiffness=r.uniform(0.0, 20.0))
 
 
-def draw_scene(number: int):
-    """A scene, and what it is to be built with."""
+def draw_scene(number: int, varying: bool = True):
+    """A scene, and what it is to be built with; with functions of time only if `varying`."""
     r = random.Random(number)
     flat = r.random() < 0.6
     integrator = r.choice(INTEGRATORS)
@@ -195,7 +249,7 @@ def draw_scene(number: int):
     fourth = integrator == "fourth_order"  # goes back in time: no viscosity, no contact, no fluid
     material = ELASTIC if fourth else r.choice([SOFT, ELASTIC])
     a, b, end, floor = add_rods(scene, r, flat, material, ["rigid"] if static else JOINTS)
-    add_supports_and_loads(scene, r, flat, a, b, varying=not planar, clamped=static)
+    add_supports_and_loads(scene, r, flat, a, b, varying=varying and not planar, clamped=static)
     if not fourth:
         add_surroundings(scene, r, flat, floor)
     options = {

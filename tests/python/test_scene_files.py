@@ -12,7 +12,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import withe
-from random_scenes import draw_scene
+from random_scenes import add_tree_of_bodies, draw_scene
 from withe.__main__ import main
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -73,6 +73,90 @@ def test_a_random_scene_is_the_same_to_the_last_bit(number, tmp_path):
             scene.save(tmp_path / "scene.toml")
         return
     check_round_trip(scene, tmp_path)
+
+
+@pytest.mark.parametrize("number", range(24))
+def test_a_random_scene_with_bodies_is_the_same_to_the_last_bit(number, tmp_path):
+    scene, options = draw_scene(number, varying=False)
+    scene.build_options = {word: value for word, value in options.items() if word != "planar"}
+    add_tree_of_bodies(scene, number)
+    check_round_trip(scene, tmp_path)
+
+
+def test_the_order_of_calls_does_not_change_the_rows_of_bodies(tmp_path):
+    scenes = []
+    for joins_first in (True, False):
+        scene, arm = arm_scene()
+        body = scene.add_body(withe.solids.Box((0.02, 0.03, 0.04)), density=900.0, position=(0.31, 0, 0))
+        calls = [
+            lambda s=scene, a=arm, b=body: s.join(a.end, b),
+            lambda s=scene, b=body: s.add_force(b, (0, 0, -0.1), at=(0.32, 0, 0.01)),
+            lambda s=scene, b=body: s.add_force(b, (0, 0.1, 0), at=(0.31, 0.01, 0)),
+        ]
+        for call in calls if joins_first else calls[::-1]:
+            call()
+        scenes.append(scene)
+    first, second = (scene.build().positions() for scene in scenes)
+    np.testing.assert_array_equal(first, second)
+    check_round_trip(scenes[1], tmp_path)
+
+
+SOLIDS = {
+    "sphere": withe.solids.Sphere(0.02),
+    "box": withe.solids.Box((0.02, 0.03, 0.05)),
+    "cylinder": withe.solids.Cylinder(0.01, 0.04),
+    "capsule": withe.solids.Capsule(0.01, 0.03),
+    "mesh": withe.solids.Mesh(
+        [[0, 0, 0], [0.04, 0, 0], [0, 0.04, 0], [0, 0, 0.04]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", SOLIDS)
+def test_each_solid_is_a_table_with_its_kind(kind, tmp_path):
+    scene = withe.Scene()
+    scene.add_body(SOLIDS[kind], density=500.0, position=(0, 0.1, 0), rotation=(0.5, 0.5, -0.5, 0.5), name="block")
+    text = check_round_trip(scene, tmp_path)
+    assert f'solid = {{ kind = "{kind}", ' in text
+    assert kind in [name.lower() for name in withe.solids.__all__]
+    assert len(SOLIDS) == len(withe.solids.__all__) - 1  # Solid is the protocol
+
+
+BODY = '[[bodies]]\nname = "plug"\nposition = [0.3, 0, 0]\ndensity = 900.0\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "message"),
+    [
+        (
+            BODY + 'solid = { kind = "bx", size = [1, 1, 1] }',
+            5,
+            "kind of solid is unknown, got 'bx'; did you mean 'box'",
+        ),
+        (BODY + 'solid = { kind = "box", sise = [1, 1, 1] }', 5, "solid has no key 'sise'; did you mean 'size'"),
+        (BODY + 'solid = { kind = "ball", radius = 1 }', 5, "it is one of box, capsule, cylinder, mesh, sphere"),
+        (BODY + "solid = { radius = 0.1 }", 5, "solid must be a table with kind, one of box"),
+        (BODY + 'solid = "box"', 5, "solid must be a table with kind"),
+        (BODY + 'solid = { kind = "sphere" }', 5, "radius"),
+        (BODY + 'solid = { kind = "box", size = [1, 1, -1] }', 5, "size of the box must be positive"),
+        (BODY.replace("density", "densty"), 4, "has no key 'densty'; did you mean 'density'"),
+        (BODY.replace("900.0", '"900 kg/m^3"'), 4, "density must be a number in kg/m\\^3 without its unit"),
+        (BODY.replace("[[bodies]]", "[[bodys]]"), 1, "did you mean 'bodies'"),
+        (BODY + "mass = 1.0\ninertia = [1, 1, 5]", 4, "density of body 'plug' needs a solid"),
+        (BODY.replace("density = 900.0", "mass = 1.0\ninertia = [1, 1, 5]"), 5, "inertia of body 'plug'"),
+        (
+            BODY + 'solid = { kind = "sphere", radius = 0.1 }\n[[joints]]\nnodes = ["plugg", "arm.end"]',
+            7,
+            "did you mean 'plug'",
+        ),
+    ],
+)
+def test_errors_of_bodies_name_file_line_and_the_word_that_is_meant(text, line, message, tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text(text)
+    with pytest.raises(ValueError, match=message) as error:
+        withe.Scene.load(path)
+    assert f"{path}, line {line}: " in str(error.value)
 
 
 def test_each_method_of_a_scene_is_saved(tmp_path):

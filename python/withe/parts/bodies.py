@@ -17,6 +17,7 @@ from withe.solids import Solid
 __all__ = ["describe_bodies", "make_body"]
 
 FloatArray = npt.NDArray[np.float64]
+_OF_SOLIDS = ("volume", "center", "inertia_per_mass", "surface")
 
 
 def make_body(
@@ -35,6 +36,11 @@ def make_body(
     origin = validation.vector(position, f"position of {owner}")
     axes = np.eye(3) if rotation is None else validation.rotation_matrix(rotation, f"rotation of {owner}")
     if solid is not None:
+        if isinstance(solid, type) or not all(hasattr(solid, word) for word in _OF_SOLIDS):
+            raise ValueError(
+                f"solid of {owner} must be one of withe.solids, for example withe.solids.Box((0.1, 0.1, 0.1)), got "
+                f"{solid!r:.80}"
+            )
         if inertia is not None or center is not None:
             raise ValueError(f"inertia and center of {owner} follow from its solid: give density= or mass= alone")
         if (density is None) == (mass is None):
@@ -57,15 +63,11 @@ def make_body(
 
 def _inertia(value: npt.ArrayLike, owner: str) -> FloatArray:
     """Return a moment of inertia, (3, 3), from one number, three principal moments or a matrix."""
-    given = np.array(value, dtype=float)
-    if given.shape not in ((), (3,), (3, 3)) or not np.isfinite(given).all():
-        raise ValueError(
-            f"inertia of {owner} must be a number, three principal moments or a matrix (3, 3), got shape {given.shape}"
-        )
+    given = validation.number_array(value, f"inertia of {owner}", (), (3,), (3, 3))
     moment = given * np.eye(3) if given.ndim < 2 else given
     size = float(np.abs(moment).max())
     if np.abs(moment - moment.T).max() > 1e-9 * size:
-        raise ValueError(f"inertia of {owner} must be symmetric")
+        raise ValueError(f"inertia of {owner} must be symmetric, got {given.tolist()} kg m^2")
     moment = 0.5 * (moment + moment.T)
     principal = np.linalg.eigvalsh(moment)
     if not principal[0] > 0.0:
@@ -89,13 +91,16 @@ def describe_bodies(directory: Directory) -> list[_core.BodyDescription]:
     bodies = directory.all(BodyPart)
     places = {body: (base, carrier) for body, base, carrier in _bases(directory, bodies)}
     slid = _slid_rows(directory, bodies)
+    _check_held_once(directory, bodies, {body: base for body, (base, _) in places.items()})
     found = []
     for body in bodies:
         rows = directory.layout.rows(-1 - body.index)
         description = _core.BodyDescription()
         description.name = body.name
         description.node, description.carrier = places[body.index]
-        description.carried = [int(row) for row in rows if row != description.node and row not in slid[body.index]]
+        description.carried = sorted(
+            int(row) for row in rows if row != description.node and row not in slid[body.index]
+        )
         description.inertia = body.inertia
         found.append(description)
     return found
@@ -111,6 +116,36 @@ def _slid_rows(directory: Directory, bodies: list[BodyPart]) -> dict[int, set[in
     return rows
 
 
+def _check_held_once(directory: Directory, bodies: list[BodyPart], bases: dict[int, int]) -> None:
+    """Refuse supports at a second point of a body, and of a second body of those that joints connect."""
+    holders = {directory.row(support.node): support.name for support in directory.all(SupportPart)}
+    for body in bodies:
+        base = bases[body.index]
+        rows = directory.layout.rows(-1 - body.index).tolist()
+        other = next((holders[row] for row in rows if row != base and row in holders), None)
+        if other is None:
+            continue
+        if base in holders:
+            raise ValueError(
+                f"{holders[base]!r} and {other!r} hold two points of body {body.name!r}: remove one of the supports"
+            )
+        raise ValueError(
+            f"{other!r} holds body {body.name!r}, and joints connect this body to another one that is held. Such a "
+            "closed loop is not supported: remove one of the supports"
+        )
+
+
+def _closed(directory: Directory, first: BodyPart, second: BodyPart) -> str:
+    """Return the message about two bodies between which joints make a closed loop."""
+    points = {body.index: set(directory.layout.rows(-1 - body.index).tolist()) for body in (first, second)}
+    shared = points[first.index] & points[second.index]
+    joints = [join.name for join in directory.all(JoinPart) if directory.row(join.nodes[0]) in shared]
+    return (
+        f"joints connect bodies {first.name!r} and {second.name!r} to a closed loop, which is not supported: remove "
+        f"one of its joints, such as {joints[-1]!r}"
+    )
+
+
 def _bases(directory: Directory, bodies: list[BodyPart]) -> Iterator[tuple[int, int, int]]:
     """Yield the index of each body, the row of its base, and the body on whose hinge it is, or -1.
 
@@ -120,7 +155,7 @@ def _bases(directory: Directory, bodies: list[BodyPart]) -> Iterator[tuple[int, 
     held = {directory.row(support.node) for support in directory.all(SupportPart)}
     joined = [node for join in directory.all(JoinPart) for node in join.nodes if node[0] < 0]
     rows = {body.index: [directory.row(node) for node in joined if node[0] == -1 - body.index] for body in bodies}
-    holds = {body.index: [int(r) for r in directory.layout.rows(-1 - body.index) if r in held] for body in bodies}
+    holds = {body.index: sorted(int(r) for r in directory.layout.rows(-1 - body.index) if r in held) for body in bodies}
     owners: dict[int, list[int]] = {}
     for body, own in rows.items():
         for row in dict.fromkeys(own):
@@ -129,10 +164,7 @@ def _bases(directory: Directory, bodies: list[BodyPart]) -> Iterator[tuple[int, 
     for shared in owners.values():
         for other in shared[1:]:
             if loops.find(shared[0]) == loops.find(other):
-                names = " and ".join(repr(bodies[i].name) for i in (shared[0], other))
-                raise ValueError(
-                    f"joints connect bodies {names} to a closed loop, which is not supported: open the loop"
-                )
+                raise ValueError(_closed(directory, bodies[shared[0]], bodies[other]))
             loops.unite(shared[0], other)
     done: set[int] = set()
     hinged = {

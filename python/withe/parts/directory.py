@@ -127,8 +127,11 @@ class Directory:
         """The rod that a handle or a name stands for."""
         return self.find(handle, RodPart, what)
 
-    def node(self, handle: Handle | str, what: str = "node") -> tuple[Pass, str]:
-        """The node that a handle or a name such as "arm.end" stands for: (rod, node of the rod), its name."""
+    def node(self, handle: Handle | str, what: str = "node", or_body: bool = False) -> tuple[Pass, str]:
+        """The node that a handle or a name such as "arm.end" stands for: (rod, node of the rod), its name.
+
+        With `or_body`, errors state that a body is possible too.
+        """
         name = self._name(handle, what)
         point = parse_point(name)
         if point is not None and self.is_body(point[0]):
@@ -138,7 +141,11 @@ class Directory:
         else:
             place = parse_place(name)
         if place is None or place[1] != "node" or isinstance(handle, EdgeHandle):
-            raise ValueError(f"{what} must be a node of a rod, such as arm.end or arm.node(3), got {name!r:.80}")
+            near = near_word(name, [part.name for part in self.all(BodyPart)]) if or_body else None
+            raise ValueError(
+                f"{what} must be a node of a rod, such as arm.end or arm.node(3){', or a body' if or_body else ''}, "
+                f"got {name!r:.80}{'' if near is None else f'; did you mean {near!r}?'}"
+            )
         found = self._rod_of(place[0], name, what)
         if isinstance(handle, str) and name.endswith((".start", ".end")):
             node = found.start if place[2] == 0 else found.end
@@ -154,9 +161,10 @@ class Directory:
     def place(self, handle: Handle | str, at: npt.ArrayLike | None, what: str) -> tuple[Pass, str]:
         """The node of a rod, or the point of a body at `at` as drawn, by default its centre of mass; and its name."""
         if not self.is_body(handle):
+            found = self.node(handle, what, or_body=True)
             if at is not None:
-                raise ValueError(f"at= is a point of a body, but {what} must be a node of a rod or a body")
-            return self.node(handle, what)
+                raise ValueError(f"at= is a point of a body, but {found[1]!r} is a node of a rod")
+            return found
         body = self.find(handle, BodyPart, what)
         point = body.center if at is None else validation.vector(at, f"at of body {body.name!r}")
         near = 1e-9 * float(np.linalg.norm(point - body.center)) + 1e-12 * float(np.linalg.norm(point))

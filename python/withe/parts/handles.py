@@ -135,12 +135,14 @@ class Layout:
 
     def _number(self) -> list[npt.NDArray[np.int64]]:
         counts = [rod.nodes for rod in self.rods] + [len(points) for points in self.body_points]
+        ranks = [_ranks(points) for points in self.body_points]
         starts = np.concatenate([[0], np.cumsum(counts)]).astype(int)
         roots = UnionFind(int(starts[-1]))
 
         def place(node: tuple[int, int]) -> int:
-            owner = node[0] if node[0] >= 0 else len(self.rods) - 1 - node[0]
-            return int(starts[owner]) + node[1]
+            if node[0] >= 0:
+                return int(starts[node[0]]) + node[1]
+            return int(starts[len(self.rods) - 1 - node[0]]) + int(ranks[-1 - node[0]][node[1]])
 
         for a, b in self._merges:
             roots.unite(place(a), place(b))
@@ -149,7 +151,22 @@ class Layout:
         is_first = root == np.arange(len(root))
         row_of_root = np.cumsum(is_first) - 1
         rows = row_of_root[root]
-        return [rows[starts[i] : starts[i + 1]] for i in range(len(counts))]
+        found = [rows[starts[i] : starts[i + 1]] for i in range(len(counts))]
+        return [
+            *found[: len(self.rods)],
+            *(own[rank] for own, rank in zip(found[len(self.rods) :], ranks, strict=True)),
+        ]
+
+
+def _ranks(points: tuple[FloatArray, ...]) -> npt.NDArray[np.int64]:
+    """Order of a body's points among its rows: the centre of mass, then the others by their coordinates.
+
+    The order of calls does not matter, so a scene from a file has the rows of the scene that was saved.
+    """
+    others = np.array(points[1:]).reshape(-1, 3)
+    ranks = np.zeros(len(points), np.int64)
+    ranks[1 + np.lexsort(others.T[::-1])] = np.arange(1, len(points))
+    return ranks
 
 
 class UnionFind:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, fields
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from withe import shapes
+from withe import shapes, solids
 from withe.common.validation import meant
 from withe.parts.friction_fields import FrictionMap
 from withe.parts.materials import Material, Stiffness
@@ -19,6 +20,7 @@ from withe.parts.sections import Circle, Rectangle, Tube
 __all__ = ["decoded", "encoded", "encoded_fields", "made"]
 
 _SECTIONS: dict[str, type] = {"circle": Circle, "tube": Tube, "rectangle": Rectangle}
+_SOLIDS: dict[str, type] = {name.lower(): getattr(solids, name) for name in solids.__all__ if name != "Solid"}
 _SHAPES: dict[str, Callable[..., Any]] = {name: getattr(shapes, name) for name in shapes.__all__}
 
 
@@ -36,7 +38,7 @@ def encoded(value: Any, what: str) -> Any:
         return value.item()
     if isinstance(value, Stiffness | Solver):
         return encoded_fields(value, what)
-    if isinstance(value, Circle | Tube | Rectangle):
+    if isinstance(value, (Circle, Tube, Rectangle, *_SOLIDS.values())):
         return {"kind": type(value).__name__.lower(), **encoded_fields(value, what)}
     if isinstance(value, FrictionMap):
         return {"image": np.asarray(value.image).tolist(), "extent": list(value.extent)}
@@ -90,6 +92,8 @@ def decoded(key: str, value: Any, folder: Path, materials: Mapping[str, Material
         return _material(value, materials)
     if key == "section":
         return _chosen(value, "section", "kind", _SECTIONS)
+    if key == "solid":
+        return _chosen(value, "solid", "kind", _SOLIDS)
     if key == "stiffness" and isinstance(value, Mapping):
         return made(Stiffness, value, "stiffness")
     if key == "solver":
@@ -107,6 +111,11 @@ def made(kind: Callable[..., Any], values: Any, what: str) -> Any:
     """Return `kind` called with the values of a table as keywords; errors name `what`."""
     if not isinstance(values, Mapping):
         raise ValueError(f"{what} must be a table, got {values!r:.80}")
+    known = inspect.signature(kind).parameters
+    for word in values:
+        if word not in known:
+            hint = meant(str(word), known, f"it has {', '.join(known)}")
+            raise ValueError(f"{what} has no key {word!r}; {hint}")
     try:
         return kind(**values)
     except TypeError as error:

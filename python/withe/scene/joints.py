@@ -77,7 +77,7 @@ class JoinedNodes:
                 places.append(self._directory.find(node, BodyPart, "body to join"))
                 continue
             what = f"{_ORDINALS[i] if i < len(_ORDINALS) else 'another'} node to join"
-            places.append(self._directory.node(node, what))
+            places.append(self._directory.node(node, what, or_body=True))
         drawn = next((self._directory.point(place[0]) for place in places if not isinstance(place, BodyPart)), None)
         if all(not isinstance(place, BodyPart) for place in places):
             if point is not None:
@@ -136,6 +136,8 @@ class JoinedNodes:
         given = next((word for word in words if values[word] != 0.0), None)
         if given is not None and not has_axis:
             raise ValueError(f"{given} of joint {name!r} needs kind='revolute' or kind='sliding', got kind={kind!r}")
+        if form == "pairs" and min(node_a[0], node_b[0]) < 0:
+            raise ValueError(f"form of the joint must be 'frame' for a body, got form={form!r}")
         if form == "pairs" and kind != "rigid":
             raise ValueError(f"form of the joint must be 'frame' when kind={kind!r}")
         if node_a == node_b:

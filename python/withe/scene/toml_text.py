@@ -75,7 +75,7 @@ def _value(value: Any) -> str:
 
 def _number(value: float) -> str:
     """Return the shortest text that is read as the same number, and as no integer."""
-    plain = repr(value)
+    plain = repr(float(value))  # a number of NumPy has its type in its text
     if not math.isfinite(value):
         return plain
     exponent = f"{value:.16e}".partition("e")[2]
