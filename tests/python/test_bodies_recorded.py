@@ -239,6 +239,22 @@ def test_bodies_stand_in_the_picture_turn_and_cast_shadows(tumbling, renderer):
         rendering.Stage(tumbling, color_by="tension")
 
 
+@pytest.mark.slow
+def test_live_views_and_sliders_draw_bodies(renderer):
+    scene = withe.Scene(gravity=(0, 0, 0))
+    body = scene.add_body(withe.solids.Box((0.1, 0.06, 0.02)), density=500.0, name="block")
+    scene.pin(body, at=(0.05, 0, 0))
+    push = scene.add_moment(body, (0, 0.01, 0))
+    simulation = scene.build(time_step=5e-3)
+    with simulation.view(live=True, size=(160, 120)) as view:
+        first = view.image().astype(int)
+        simulation.step(30)
+        view.update()
+        assert np.abs(view.image() - first).max() > 40
+    view.close()
+    assert simulation.get(push, "moment")[1] == 0.01
+
+
 def test_the_camera_sees_the_surfaces_of_bodies(tumbling):
     points = body_points(tumbling)
     assert np.ptp(body_points(tumbling, [0]), axis=0) == pytest.approx((0.1, 0.06, 0.02))

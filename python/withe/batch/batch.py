@@ -51,6 +51,7 @@ class Batch(Setting, Reading):
     * run: `step`, `run`, `equilibrium`, `failed`, `failures`, `snapshot`, `restore`, `reset`, `copy`
     * read the batch: `lanes`, `workers`, `time`, `time_step`, `rods`, `get`, `energy`, `momentum`, `statistics`
     * read rods: `positions`, `velocities`, `directors`, `spins`, `curvatures`, `twists`, `tensions`
+    * read bodies: `position`, `rotation`, `velocity`, `angular_velocity`
     * read parts: `reaction`, `wrench`, `joint_angle`, `joint_rate`, `joint_torque`, `spring_tension`,
       `tendon_length`, `tendon_points`, `obstacle_position`, `contacts`
 

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.batch.lanes import Lanes, output
+from withe.parts.handles import Body as RigidBody
 from withe.parts.handles import (
     Drag,
     Fluid,
@@ -432,6 +433,98 @@ class Reading:
             Not a revolute joint of this scene.
         """
         return self._lanes.gathered(lambda s: s.joint_torque(joint))  # type: ignore[no-any-return]
+
+    def position(self, body: RigidBody | str) -> FloatArray:
+        """Return the position of the origin of the axes of a rigid body. See `Simulation.position`.
+
+        Parameters
+        ----------
+        body : Body or str
+            Body to read.
+
+        Returns
+        -------
+        ndarray of shape (n, 3) [m]
+
+        Raises
+        ------
+        ValueError
+            Not a body of this scene.
+
+        See Also
+        --------
+        rotation : Orientations of a body.
+        """
+        return self._lanes.gathered(lambda s: s.position(body))  # type: ignore[no-any-return]
+
+    def rotation(self, body: RigidBody | str) -> FloatArray:
+        """Return the axes, as columns of matrices, of a rigid body. See `Simulation.rotation`.
+
+        Parameters
+        ----------
+        body : Body or str
+            Body to read.
+
+        Returns
+        -------
+        ndarray of shape (n, 3, 3)
+
+        Raises
+        ------
+        ValueError
+            Not a body of this scene.
+
+        See Also
+        --------
+        position : Positions of a body.
+        """
+        return self._lanes.gathered(lambda s: s.rotation(body))  # type: ignore[no-any-return]
+
+    def velocity(self, body: RigidBody | str) -> FloatArray:
+        """Return the velocity of the origin of the axes of a rigid body. See `Simulation.velocity`.
+
+        Parameters
+        ----------
+        body : Body or str
+            Body to read.
+
+        Returns
+        -------
+        ndarray of shape (n, 3) [m/s]
+
+        Raises
+        ------
+        ValueError
+            Not a body of this scene.
+
+        See Also
+        --------
+        angular_velocity : Angular velocities of a body.
+        """
+        return self._lanes.gathered(lambda s: s.velocity(body))  # type: ignore[no-any-return]
+
+    def angular_velocity(self, body: RigidBody | str) -> FloatArray:
+        """Return the angular velocity of a rigid body. See `Simulation.angular_velocity`.
+
+        Parameters
+        ----------
+        body : Body or str
+            Body to read.
+
+        Returns
+        -------
+        ndarray of shape (n, 3) [rad/s]
+
+        Raises
+        ------
+        ValueError
+            Not a body of this scene.
+
+        See Also
+        --------
+        velocity : Velocities of a body.
+        """
+        return self._lanes.gathered(lambda s: s.angular_velocity(body))  # type: ignore[no-any-return]
 
     def obstacle_position(self, obstacle: Obstacle | str) -> FloatArray:
         """Return the position of an obstacle. See `Simulation.obstacle_position`.

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.errors import ConvergenceError
-from withe.parts.handles import Rod
+from withe.parts.handles import Body, Rod
 from withe.recording.record import Record
 from withe.simulation.readouts import Equilibrium
 
@@ -212,6 +212,44 @@ class BatchRecord(Sequence[Record]):
             Records with different numbers of frames, or no rod of that name.
         """
         return self._stacked([record.spins(rod) for record in self._records])
+
+    def body_position(self, body: Body | str) -> FloatArray:
+        """Return the positions of the origin of the axes of a rigid body.
+
+        Parameters
+        ----------
+        body : Body or str
+            Body to read.
+
+        Returns
+        -------
+        ndarray of shape (n, frames, 3) [m]
+
+        Raises
+        ------
+        ValueError
+            Records with different numbers of frames, or no body of that name.
+        """
+        return self._stacked([record.body_position(body) for record in self._records])
+
+    def body_rotation(self, body: Body | str) -> FloatArray:
+        """Return the axes, as columns of matrices, of a rigid body.
+
+        Parameters
+        ----------
+        body : Body or str
+            Body to read.
+
+        Returns
+        -------
+        ndarray of shape (n, frames, 3, 3)
+
+        Raises
+        ------
+        ValueError
+            Records with different numbers of frames, or no body of that name.
+        """
+        return self._stacked([record.body_rotation(body) for record in self._records])
 
     def _stacked(self, arrays: list[Any]) -> npt.NDArray[Any]:
         frames = [len(record) for record in self._records]

@@ -314,7 +314,7 @@ def quaternion_matrix(quaternion: FloatArray, what: str) -> FloatArray:
     """Return the rotation of a unit quaternion w, x, y, z."""
     size = float(np.linalg.norm(quaternion))
     if abs(size - 1.0) > 1e-6:
-        raise ValueError(f"{what} must have a quaternion qw, qx, qy, qz of length 1, got one of {size:g}")
+        raise ValueError(f"{what} must have a quaternion qw, qx, qy, qz of length 1, got one of {size:.9g}")
     w, x, y, z = quaternion / size
     return np.array(
         [
