@@ -33,6 +33,7 @@ GROUPS = {
     "statics": "Statics",
     "stability": "Stability",
     "dynamics": "Dynamics",
+    "bodies": "Rigid bodies",
     "contact": "Contact and friction",
     "knots": "Knots",
     "fluid": "Fluid",

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from withe.common import validation
 
-__all__ = ["Box", "Capsule", "Cylinder", "Mesh", "Solid", "Sphere"]
+__all__ = ["Box", "Capsule", "Cylinder", "Mesh", "Sphere"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -48,7 +48,14 @@ class Solid(Protocol):
         """Moment of inertia about the centre of mass over the mass, shape (3, 3) [m^2]."""
 
     def surface(self) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-        """Return vertices (n, 3) [m] and triangles (m, 3) of a surface for pictures."""
+        """Return the surface for pictures.
+
+        Returns
+        -------
+        vertices : ndarray of shape (n, 3) [m]
+        triangles : ndarray of int, shape (m, 3)
+            Rows of the vertices, counter-clockwise from outside.
+        """
 
 
 @dataclass(frozen=True)
@@ -58,6 +65,11 @@ class Sphere:
     Parameters
     ----------
     radius : float [m]
+
+    Raises
+    ------
+    ValueError
+        A radius that is not positive.
     """
 
     radius: float
@@ -81,7 +93,14 @@ class Sphere:
         return 0.4 * float(self.radius) ** 2 * np.eye(3)
 
     def surface(self) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-        """Return vertices (n, 3) [m] and triangles (m, 3) of a surface for pictures."""
+        """Return the surface for pictures.
+
+        Returns
+        -------
+        vertices : ndarray of shape (n, 3) [m]
+        triangles : ndarray of int, shape (m, 3)
+            Rows of the vertices, counter-clockwise from outside.
+        """
         angles = np.linspace(0.0, np.pi, 13)
         return _turned(self.radius * np.sin(angles), -self.radius * np.cos(angles))
 
@@ -94,6 +113,11 @@ class Box:
     ----------
     size : tuple of three floats [m]
         Lengths of the edges along x, y and z.
+
+    Raises
+    ------
+    ValueError
+        A length that is not positive.
     """
 
     size: tuple[float, float, float]
@@ -120,7 +144,14 @@ class Box:
         return np.diag(squares.sum() - squares) / 12.0
 
     def surface(self) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-        """Return vertices (n, 3) [m] and triangles (m, 3) of a surface for pictures."""
+        """Return the surface for pictures.
+
+        Returns
+        -------
+        vertices : ndarray of shape (n, 3) [m]
+        triangles : ndarray of int, shape (m, 3)
+            Rows of the vertices, counter-clockwise from outside.
+        """
         signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
         quads = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
         triangles = [triangle for a, b, c, d in quads for triangle in ((a, b, c), (a, c, d))]
@@ -134,6 +165,11 @@ class Cylinder:
     Parameters
     ----------
     radius, length : float [m]
+
+    Raises
+    ------
+    ValueError
+        A radius or a length that is not positive.
     """
 
     radius: float
@@ -160,7 +196,14 @@ class Cylinder:
         return np.diag([across, across, self.radius**2 / 2.0])
 
     def surface(self) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-        """Return vertices (n, 3) [m] and triangles (m, 3) of a surface for pictures."""
+        """Return the surface for pictures.
+
+        Returns
+        -------
+        vertices : ndarray of shape (n, 3) [m]
+        triangles : ndarray of int, shape (m, 3)
+            Rows of the vertices, counter-clockwise from outside.
+        """
         half = 0.5 * self.length
         return _turned(self.radius * np.array([0.0, 1.0, 1.0, 0.0]), np.array([-half, -half, half, half]))
 
@@ -173,6 +216,11 @@ class Capsule:
     ----------
     radius, length : float [m]
         `length` is that of the cylinder, without the hemispheres.
+
+    Raises
+    ------
+    ValueError
+        A radius or a length that is not positive.
     """
 
     radius: float
@@ -203,7 +251,14 @@ class Capsule:
         return np.diag([across, across, along]) / (barrel + caps)
 
     def surface(self) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-        """Return vertices (n, 3) [m] and triangles (m, 3) of a surface for pictures."""
+        """Return the surface for pictures.
+
+        Returns
+        -------
+        vertices : ndarray of shape (n, 3) [m]
+        triangles : ndarray of int, shape (m, 3)
+            Rows of the vertices, counter-clockwise from outside.
+        """
         angles = np.linspace(0.0, np.pi, 14)
         shift = np.where(angles < 0.5 * np.pi, -0.5, 0.5) * self.length
         return _turned(self.radius * np.sin(angles), shift - self.radius * np.cos(angles))
@@ -218,6 +273,11 @@ class Mesh:
     vertices : array_like of shape (n, 3) [m]
     triangles : array_like of shape (m, 3)
         Rows of `vertices`, counter-clockwise when seen from outside.
+
+    Raises
+    ------
+    ValueError
+        A surface that is not closed, triangles that face inwards, or rows that are not those of vertices.
     """
 
     vertices: npt.ArrayLike
@@ -268,7 +328,14 @@ class Mesh:
         return np.asarray(np.trace(second) * np.eye(3) - second)
 
     def surface(self) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-        """Return vertices (n, 3) [m] and triangles (m, 3) of a surface for pictures."""
+        """Return the surface for pictures.
+
+        Returns
+        -------
+        vertices : ndarray of shape (n, 3) [m]
+        triangles : ndarray of int, shape (m, 3)
+            Rows of the vertices, counter-clockwise from outside.
+        """
         return np.asarray(self.vertices), np.asarray(self.triangles)
 
 

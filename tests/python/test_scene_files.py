@@ -119,7 +119,7 @@ def test_each_solid_is_a_table_with_its_kind(kind, tmp_path):
     text = check_round_trip(scene, tmp_path)
     assert f'solid = {{ kind = "{kind}", ' in text
     assert kind in [name.lower() for name in withe.solids.__all__]
-    assert len(SOLIDS) == len(withe.solids.__all__) - 1  # Solid is the protocol
+    assert len(SOLIDS) == len(withe.solids.__all__)
 
 
 BODY = '[[bodies]]\nname = "plug"\nposition = [0.3, 0, 0]\ndensity = 900.0\n'

@@ -14,6 +14,7 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 EXAMPLES = {
     "upright_arm.py": (["--duration", "4"], r"tip at most [.\d]+ mm aside, ([.\d]+) mm in the end", 0.0, 1.0),
     "carry_rope.py": (["--step", "1e-2"], r"carries up to (\d+)% of the weight", 40.0, 110.0),
+    "crane_load.py": ([], r"theory within ([.\d]+) %", 0.0, 0.5),
     "domain_randomisation.py": (["--arms", "8"], r"feedback: ([.\d]+) mm off", 0.0, 2.0),
     "flagella.py": (["--step", "2e-3", "--duration", "6"], r"drawn together by (\d+)%", 20.0, 80.0),
     "flagella_contact.py": (
@@ -36,6 +37,7 @@ EXAMPLES = {
         12.0,
     ),
     "gripper.py": (["--duration", "4"], r"friction 0.5: \d+ contacts, nearest ([-+.\d]+) radii", -0.05, 0.1),
+    "hanging_plug.py": (["--duration", "10"], r"theory within ([.\d]+) %", 0.0, 0.1),
     "helix.py": ([], r"(\d+) um from the public code", 0.0, 100.0),
     "knot.py": (["--nodes", "201", "--points", "2", "--speed", "8e-3"], r" 200 .*?([-+.\d]+)%", -6.0, 6.0),
     "knot_limit.py": (["--points", "4"], r"at epsilon = 0: pull ([.\d]+) of the limit", 0.97, 1.03),
@@ -47,6 +49,7 @@ EXAMPLES = {
     "pull_rope.py": (["--step", "1e-2"], r"([.\d]+) cm of the rope are through the eye", 75.0, 90.0),
     "quadruped.py": (["--duration", "1.8"], r"walked ([.\d]+) body lengths", 1.0, 2.0),
     "robot.py": (["--steps", "2"], r"walked ([-.\d]+) cm", 4.0, 10.0),
+    "satellite.py": ([], r"theory within ([.\d]+) %", 0.0, 0.1),
     "servo_arm.py": ([], r"by ([.\d]+) mm where it is shaped", 0.0, 1.0),
     "snake.py": (["--periods", "3"], r"Crawls at ([.\d]+) mm/s", 27.8, 28.7),
     "soft_limb.py": ([], r"tip ([.\d]+) mm off on the mean", 0.3, 0.7),

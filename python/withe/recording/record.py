@@ -542,8 +542,8 @@ class Record:
         return index_of(self._rods, rod, "rod")
 
     def __repr__(self) -> str:
-        kinds = {"rods": self._rods, "bodies": self._bodies}
-        parts = "; ".join(f"{kind} {', '.join(each.name for each in all)}" for kind, all in kinds.items() if all)
+        kinds = {"rods": [rod.name for rod in self._rods], "bodies": [body.name for body in self._bodies]}
+        parts = "; ".join(f"{kind} {', '.join(names)}" for kind, names in kinds.items() if names)
         if len(self) == 0:
             return f"Record(no frames; {parts})"
         first, last = self._arrays["times"][[0, -1]]

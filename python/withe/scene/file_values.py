@@ -20,7 +20,7 @@ from withe.parts.sections import Circle, Rectangle, Tube
 __all__ = ["decoded", "encoded", "encoded_fields", "made"]
 
 _SECTIONS: dict[str, type] = {"circle": Circle, "tube": Tube, "rectangle": Rectangle}
-_SOLIDS: dict[str, type] = {name.lower(): getattr(solids, name) for name in solids.__all__ if name != "Solid"}
+_SOLIDS: dict[str, type] = {name.lower(): getattr(solids, name) for name in solids.__all__}
 _SHAPES: dict[str, Callable[..., Any]] = {name: getattr(shapes, name) for name in shapes.__all__}
 
 
