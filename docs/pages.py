@@ -23,6 +23,7 @@ MODULES = {
     "withe.deployment": "Laying of cables",
     "withe.knots": "Knots",
     "withe.shapes": "Shapes of centrelines",
+    "withe.solids": "Solids of rigid bodies",
     "withe.view": "Pictures and films",
     "withe.view.style": "Style of plots",
     "withe.io": "Files of poses and frames",
@@ -31,6 +32,7 @@ MODULES = {
 FOR_USERS = {"withe.io": ("load_poses", "save_poses", "write_vtk")}
 # Classes whose objects come from a function, which their docstring names. Their constructors are not for users.
 MADE_BY = {
+    "withe.Body": "Scene.add_body",
     "withe.CustomForce": "Scene.add_custom_force",
     "withe.Drag": "Scene.add_drag",
     "withe.EdgeHandle": "Rod.edge",
@@ -100,6 +102,7 @@ EXAMPLES = {
         "learn_follow",
     ),
     "Contact and friction": ("friction", "spider", "gripper", "flagella", "flagella_contact"),
+    "Rigid bodies": ("hanging_plug", "satellite", "crane_load"),
     "Hands, cables and sheets": (
         "carry_rope",
         "pull_rope",
