@@ -45,7 +45,7 @@ def schema() -> dict[str, Any]:
     }
     for kind in (withe.Circle, withe.Tube, withe.Rectangle):
         definitions[kind.__name__.lower()] = table(kind, kind=kind.__name__.lower())
-    for name in withe.solids.__all__::
+    for name in withe.solids.__all__:
         definitions[name.lower()] = table(getattr(withe.solids, name), kind=name.lower())
     properties: dict[str, Any] = {
         "version": {"const": VERSION, "description": "Version of the format."},
