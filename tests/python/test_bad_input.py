@@ -171,7 +171,7 @@ SCENES = [
     (lambda s, a, b: s.join(a.end, b.start, kind="pinned", form="pairs"), "form of the joint must be 'frame' when"),
     (
         lambda s, a, b: s.join(a, b),
-        "first node to join must be a node of a rod, such as arm.end or arm.node(3), got 'arm'",
+        "first node to join must be a node of a rod, such as arm.end or arm.node(3), or a body, got 'arm'",
     ),
     (lambda s, a, b: s.join("arm.edge(1)", b.start), "first node to join must be a node of a rod"),
     (lambda s, a, b: a.node(5), "node of rod 'arm' must lie in -5..4, got 5"),

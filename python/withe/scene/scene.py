@@ -301,12 +301,12 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
 
         Notes
         -----
-        Midpoint steps integrate the rates of turn about the axes of the body with the Cayley map [1]_.
+        Midpoint steps integrate the rates of turn about the axes of the body with the Cayley map [Simo and Wong 1991].
 
         References
         ----------
-        .. [1] J. C. Simo and K. K. Wong, Unconditionally stable algorithms for rigid body dynamics that exactly
-           preserve energy and momentum, Int. J. Numer. Methods Eng. 31 (1991) 19-52.
+        J. C. Simo and K. K. Wong, Unconditionally stable algorithms for rigid body dynamics that exactly preserve
+        energy and momentum, Int. J. Numer. Methods Eng. 31 (1991) 19-52.
 
         Examples
         --------

@@ -23,7 +23,7 @@ FloatArray = npt.NDArray[np.float64]
 
 @keyword_hints
 def plot(record: Frames, *, shapes: int = 6, theme: style.Theme = "light") -> Any:
-    """Draw the shapes of rods and rigid bodies at several times, and the energies over time.
+    """Draw the shapes of the rods and rigid bodies at several times, and the energies over time.
 
     Obstacles near the rods are drawn too: in two dimensions planes as lines, and spheres and capsules as outlines; in
     three dimensions transparent. Moving obstacles, springs and tendons are drawn at the same times as the rods, in the
