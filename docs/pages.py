@@ -44,6 +44,7 @@ MADE_BY = {
     "withe.NodeHandle": "Rod.node",
     "withe.Obstacle": "Scene.add_floor",
     "withe.Record": "Simulation.run",
+    "withe.Robot": "Scene.add_robot",
     "withe.Rod": "Scene.add_rod",
     "withe.RunningHand": "Simulation.grasp",
     "withe.Simulation": "Scene.build",

@@ -29,6 +29,7 @@ from withe.errors import (
     RingLeftWarning,
     RodCrossingWarning,
     SqueezedRodWarning,
+    UnsupportedRobotWarning,
 )
 from withe.parts.friction_fields import FrictionMap
 from withe.parts.handles import (
@@ -54,6 +55,7 @@ from withe.parts.options import Solver
 from withe.parts.sections import SectionProperties
 from withe.parts.torsion_springs import TorsionSpring
 from withe.recording.record import Record
+from withe.scene.robots import Robot
 from withe.scene.scene import Scene
 from withe.simulation.hands import Deflection, HeldPose, Passage, RunningHand
 from withe.simulation.linearisation import Linearisation
@@ -106,6 +108,7 @@ __all__ = [
     "Record",
     "Rectangle",
     "RingLeftWarning",
+    "Robot",
     "Rod",
     "RodCrossingWarning",
     "RodEnergy",
@@ -126,6 +129,7 @@ __all__ = [
     "TendonOutline",
     "TorsionSpring",
     "Tube",
+    "UnsupportedRobotWarning",
     "__version__",
     "deployment",
     "folding",

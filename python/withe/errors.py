@@ -14,6 +14,7 @@ __all__ = [
     "RingLeftWarning",
     "RodCrossingWarning",
     "SqueezedRodWarning",
+    "UnsupportedRobotWarning",
 ]
 
 
@@ -79,6 +80,7 @@ class PlausibilityWarning(UserWarning):
     - a tendon whose offset is zero or more than 50 radii of its rod,
     - a tendon whose offset is more than 8 radii of its rod and more than a quarter of the length of its rods,
     - a rest angle or roll above a full turn that is a multiple of 15, as angles in degrees are,
+    - a robot from a file that is larger than 20 m, or has a body above 10,000 kg,
     - a time step above ten of the slowest periods of the scene, without a fluid or drag,
     - a `withe.learning.Task.build` that draws random numbers without `redraw`, so that all robots are equal.
 
@@ -116,6 +118,14 @@ class SqueezedRodWarning(UserWarning):
     force. A round section resists with about Young's modulus times the length in contact times the penetration. This
     corresponds to ``Scene.enable_contact(stiffness=)`` with half of Young's modulus times the length of an edge. The
     warning is given once per simulation, within 16 steps, if the gap of the obstacles is smaller than the rod.
+    """
+
+
+class UnsupportedRobotWarning(UserWarning):
+    """Warn that the file of a robot has content that a scene lacks, such as limits of joints or actuators.
+
+    `Scene.add_robot` adds the bodies and joints without this content. The message lists the content with the names in
+    the file. The warning is given once per call.
     """
 
 

@@ -35,6 +35,7 @@ LATE = {
     "elastica",
     "gymnasium",
     "stable_baselines3",
+    "mujoco",
 }
 
 

@@ -35,6 +35,7 @@ def make_body(
     owner = f"body {name!r}"
     origin = validation.vector(position, f"position of {owner}")
     axes = np.eye(3) if rotation is None else validation.rotation_matrix(rotation, f"rotation of {owner}")
+<<<<<<< HEAD
     if solid is not None:
         if isinstance(solid, type) or not all(hasattr(solid, word) for word in _OF_SOLIDS):
             raise ValueError(
@@ -43,6 +44,11 @@ def make_body(
             )
         if inertia is not None or center is not None:
             raise ValueError(f"inertia and center of {owner} follow from its solid: give density= or mass= alone")
+=======
+    if solid is not None and inertia is None:
+        if center is not None:
+            raise ValueError(f"center of {owner} follows from its solid, unless inertia= is given too")
+>>>>>>> 96cc8e21 (Add robots from URDF and MJCF files (in progress))
         if (density is None) == (mass is None):
             raise ValueError(f"{owner} must have either density= or mass=, got {'neither' if mass is None else 'both'}")
         if mass is not None:
@@ -50,7 +56,9 @@ def make_body(
         else:
             kilograms = solid.volume * validation.positive(density, f"density of {owner}")
         moment, middle = kilograms * solid.inertia_per_mass, solid.center
-    else:
+    else:  # a solid is only drawn
+        if solid is not None and (mass is None or density is not None):
+            raise ValueError(f"inertia of {owner} needs mass= and no density=, because its solid is then only drawn")
         if density is not None:
             raise ValueError(f"density of {owner} needs a solid, for example withe.solids.Box((0.1, 0.1, 0.1))")
         if mass is None or inertia is None:

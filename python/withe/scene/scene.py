@@ -33,6 +33,7 @@ from withe.scene.files import fill, save_scene
 from withe.scene.joints import JoinedNodes
 from withe.scene.loads import Loads
 from withe.scene.options import checked_options, with_build_options
+from withe.scene.robots import Robot, add_robot
 from withe.scene.supports import Supports
 from withe.simulation.logs import log_build
 from withe.simulation.parameters import Settable
@@ -55,7 +56,8 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
 
     Methods and properties by purpose:
 
-    * describe: `add_rod`, `add_body`, `join`, `add_mass`, `add_spring`, `add_torsion_spring`, `add_tendon`, `gravity`
+    * describe: `add_rod`, `add_body`, `add_robot`, `join`, `add_mass`, `add_spring`, `add_torsion_spring`,
+      `add_tendon`, `gravity`
     * hold: `clamp`, `pin`, `grasp`
     * load: `add_force`, `add_moment`, `add_load`, `add_pressure`, `add_drag`, `add_fluid`, `add_custom_force`,
       `actuate` at given times
@@ -265,7 +267,8 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         Parameters
         ----------
         solid : Sphere, Box, Cylinder, Capsule or Mesh of withe.solids
-            Shape of uniform density, from which centre and inertia follow. Give `density` or `mass` with it.
+            Shape of uniform density, from which centre and inertia follow. Give `density` or `mass` with it. With
+            `mass` and `inertia` the solid is only drawn.
         density : float [kg/m^3]
             Density of the solid.
         mass : float [kg]
@@ -290,13 +293,15 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         Raises
         ------
         ValueError
-            A mass that is not positive, a mass and a density, or a rotation that is none. An inertia that is not
-            symmetric and positive, or that no body has because J1 + J2 < J3 for its principal moments.
+            A mass that is not positive, a mass and a density, an inertia without a mass, a centre without an inertia,
+            or a rotation that is none. An inertia that is not symmetric and positive, or that no body has because
+            J1 + J2 < J3 for its principal moments.
 
         See Also
         --------
         join : Join the body to rods and other bodies.
         add_mass : Add a point mass at a node.
+        add_robot : Add the bodies and joints of a file.
         Simulation.position : Position of a body.
 
         Notes
@@ -325,6 +330,83 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         part = make_body(name, index, solid, density, mass, inertia, center, position, rotation)
         self._directory.layout.add_body(part.center)
         return cast(Body, self._directory.add(part))
+
+    def add_robot(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        position: npt.ArrayLike = (0.0, 0.0, 0.0),
+        rotation: npt.ArrayLike | None = None,
+        name: str | None = None,
+    ) -> Robot:
+        """Add the rigid bodies and joints of a robot from a URDF or MJCF file.
+
+        The robot is drawn in the reference configuration of the file, where all joints of a URDF file are at zero.
+        Rods can be joined to its bodies. MuJoCo, of the extra ``robots``, reads the file.
+
+        Parameters
+        ----------
+        path : path-like
+            File, ending in ".urdf", or in ".xml" for MJCF. Macros of xacro must be expanded.
+        position : array_like of shape (3,) [m]
+            Where the origin of the file is.
+        rotation : array_like of shape (3, 3) or (4,), or scipy.spatial.transform.Rotation
+            Orientation of the axes of the file: a matrix whose columns are the axes, or a unit quaternion (w, x, y, z).
+            By default the axes of the world.
+        name : str
+            Name of the robot. By default that in the file. Bodies and joints have their names in the file. If the scene
+            already has such a name, the name of the robot precedes it.
+
+        Returns
+        -------
+        Robot
+            ``robot["gripper"]`` is the handle of a body or joint; `bodies`, `joints` and `points` list all of them.
+
+        Raises
+        ------
+        ValueError
+            Another suffix, a file that MuJoCo cannot read, a mesh in another format than STL and OBJ, or several joints
+            between the same two bodies.
+        FileNotFoundError
+            The file or one of its meshes does not exist.
+        ImportError
+            MuJoCo is not installed.
+
+        Warns
+        -----
+        UnsupportedRobotWarning
+            The file has content that a scene lacks: limits, armature and friction loss of joints, actuators, equality
+            constraints, tendons, contact, sensors and others. One warning lists all of it with its names.
+        PlausibilityWarning
+            The robot is larger than 20 m, or a body has more than 10,000 kg.
+
+        See Also
+        --------
+        add_body : Add a single body.
+        join : Join a rod to a body of the robot.
+        Simulation.set : Move a servo by the ``rest_angle`` of its joint.
+
+        Notes
+        -----
+        - Hinges, slides and ball joints become joints of kind "revolute", "sliding" and "pinned", with their stiffness,
+          spring reference and damping. A body with a free joint is a free body.
+        - Bodies that are fixed to each other become one body with their common mass, centre and inertia.
+        - Bodies that are fixed to the world become one clamped body, to which the joints are attached. If they have no
+          mass, the clamped body has 1e-6 of the robot's mass. Without such bodies, a joint to the world is a support
+          made by `clamp` or `pin`. A joint to the world with a spring, damper or actuator has a clamped body too.
+        - A joint may be moved along its axis if another joint of the same body is at the same point. The motion does
+          not depend on this position.
+        - Geoms are only drawn. If a body has geoms that touch nothing, these are its shape. A mesh that is not closed
+          is drawn as its convex hull.
+        - Cameras, lights, colours and textures are not read. The integrator and the time step are options of `build`.
+
+        Examples
+        --------
+        >>> robot = scene.add_robot("arm.xml", position=(0, 0, 0.5))  # doctest: +SKIP
+        >>> hold = scene.join(cable.start, robot["gripper"])  # doctest: +SKIP
+        >>> scene.build().set(robot.joints["elbow"], stiffness=20.0, rest_angle=0.5)  # doctest: +SKIP
+        """
+        return add_robot(self, path, position, rotation, name)
 
     @overload
     def join(

@@ -1,0 +1,132 @@
+"""Shapes of a robot's bodies for pictures: solids from the geoms of MuJoCo."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from withe.solids import Box, Capsule, Cylinder, Mesh, Solid, Sphere
+
+__all__ = ["drawn_geoms", "solid_of"]
+
+FloatArray = npt.NDArray[np.float64]
+Surface = tuple[FloatArray, npt.NDArray[np.int64]]
+
+# Types of geoms, mjtGeom of MuJoCo.
+_SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX, _MESH = 2, 3, 4, 5, 6, 7
+DRAWN = (_SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX, _MESH)
+
+
+def drawn_geoms(model: Any, geoms: Sequence[int]) -> tuple[list[int], list[int]]:
+    """Return the geoms that stand for a body in pictures, and those that have no picture.
+
+    Geoms that touch nothing are visual shapes. If a body has one, the others are left out.
+    """
+    known = [geom for geom in geoms if model.geom_type[geom] in DRAWN]
+    visual = [geom for geom in known if not (model.geom_contype[geom] or model.geom_conaffinity[geom])]
+    return visual or known, [geom for geom in geoms if geom not in known]
+
+
+def solid_of(
+    model: Any, data: Any, geoms: Sequence[int], position: FloatArray, rotation: FloatArray
+) -> tuple[Solid | None, list[int]]:
+    """Return the solid of some geoms in the axes of a body, and the geoms whose open mesh became its convex hull.
+
+    Parameters
+    ----------
+    model, data : mujoco.MjModel, mujoco.MjData
+    geoms : sequence of int
+    position : ndarray of shape (3,) [m]
+        Origin of the axes of the body.
+    rotation : ndarray of shape (3, 3)
+        Axes of the body, as columns.
+    """
+    hulls: list[int] = []
+    surfaces: list[Surface] = []
+    for geom in geoms:
+        place = rotation.T @ (data.geom_xpos[geom] - position)
+        turn = rotation.T @ data.geom_xmat[geom].reshape(3, 3)
+        plain = _plain(int(model.geom_type[geom]), model.geom_size[geom])
+        if (
+            len(geoms) == 1
+            and plain is not None
+            and np.abs(place).max() < 1e-12
+            and np.abs(turn - np.eye(3)).max() < 1e-9
+        ):
+            return plain, []
+        if plain is not None:
+            vertices, triangles = _welded(*plain.surface())
+        elif model.geom_type[geom] == _ELLIPSOID:
+            vertices, triangles = _welded(*Sphere(1.0).surface())
+            vertices = vertices * model.geom_size[geom]
+        else:
+            (vertices, triangles), is_hull = _closed(*_mesh(model, int(model.geom_dataid[geom])))
+            if is_hull:
+                hulls.append(geom)
+        surfaces.append((vertices @ turn.T + place, triangles))
+    if not surfaces:
+        return None, hulls
+    starts = np.cumsum([0, *(len(vertices) for vertices, _ in surfaces)])
+    rows = [triangles + start for (_, triangles), start in zip(surfaces, starts, strict=False)]
+    return Mesh(np.concatenate([vertices for vertices, _ in surfaces]), np.concatenate(rows)), hulls
+
+
+def _plain(kind: int, size: FloatArray) -> Solid | None:
+    """Return the solid of a geom about the origin; None for an ellipsoid or a mesh."""
+    a, b, c = map(float, size)
+    if kind == _SPHERE:
+        return Sphere(a)
+    if kind == _CAPSULE:
+        return Capsule(a, 2.0 * b)
+    if kind == _CYLINDER:
+        return Cylinder(a, 2.0 * b)
+    return Box((2.0 * a, 2.0 * b, 2.0 * c)) if kind == _BOX else None
+
+
+def _mesh(model: Any, mesh: int) -> Surface:
+    """Return a mesh of the model in the axes of its geom."""
+    first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
+    face, faces = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
+    vertices = np.array(model.mesh_vert[first : first + count], dtype=float)
+    return _welded(vertices, np.array(model.mesh_face[face : face + faces], dtype=np.int64))
+
+
+def _welded(vertices: FloatArray, triangles: npt.NDArray[np.int64]) -> Surface:
+    """Return a surface without repeated vertices and without triangles that have no area."""
+    scale = float(np.abs(vertices).max()) or 1.0
+    _, first, place = np.unique(np.round(vertices / scale, 7), axis=0, return_index=True, return_inverse=True)
+    rows = place.reshape(-1)[triangles]
+    distinct = (rows[:, 0] != rows[:, 1]) & (rows[:, 1] != rows[:, 2]) & (rows[:, 2] != rows[:, 0])
+    return vertices[first], rows[distinct]
+
+
+def _closed(vertices: FloatArray, triangles: npt.NDArray[np.int64]) -> tuple[Surface, bool]:
+    """Return a surface that is closed with its normals outwards, and True if it is the convex hull."""
+    for rows in (triangles, triangles[:, ::-1]):
+        try:
+            Mesh(vertices, rows)
+        except ValueError:
+            continue
+        return (vertices, rows), False
+    from scipy.spatial import ConvexHull
+
+    flat = np.linalg.matrix_rank(vertices - vertices[0], tol=1e-6 * float(np.abs(vertices).max())) < 3
+    if flat:  # a sheet gets a thickness, because a hull has a volume
+        normal = np.linalg.svd(vertices - vertices[0])[2][2] * 1e-3 * float(np.ptp(vertices, axis=0).max())
+        vertices = np.concatenate([vertices - normal, vertices + normal])
+    hull = ConvexHull(vertices)
+    rows = hull.simplices.astype(np.int64)
+    corners = vertices[rows]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    inwards = np.einsum("ij,ij->i", normals, hull.equations[:, :3]) < 0.0
+    rows[inwards] = rows[inwards, ::-1]
+    return _used(vertices, rows), True
+
+
+def _used(vertices: FloatArray, triangles: npt.NDArray[np.int64]) -> Surface:
+    """Return a surface without vertices that no triangle has."""
+    kept, rows = np.unique(triangles, return_inverse=True)
+    return vertices[kept], rows.reshape(-1, 3)

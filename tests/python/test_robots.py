@@ -1,0 +1,448 @@
+"""Robots from URDF and MJCF files: motion, mass, names, warnings and errors."""
+
+import importlib
+import struct
+import warnings
+
+import numpy as np
+import pytest
+
+import withe
+from robot_files import MJCF, motion_in_mujoco, written
+from withe.robots import read_robot
+
+mujoco = pytest.importorskip("mujoco")
+
+
+def mjcf(folder, body, rest="", name="robot.xml"):
+    path = folder / name
+    path.write_text(f'<mujoco model="robot"><worldbody>{body}</worldbody>{rest}</mujoco>')
+    return path
+
+
+def quietly(call):
+    """Return the result of a call and its warnings about robots."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        result = call()
+    return result, caught
+
+
+ARM = """<body name="link" pos="0 0 1"><joint name="hinge" axis="0 1 0"/>
+<geom name="bar" type="capsule" fromto="0 0 0 0.2 0 0" size="0.01" mass="0.1"/></body>"""
+
+
+@pytest.mark.parametrize("suffix", [".xml", ".urdf"])
+@pytest.mark.parametrize("name", ["double_pendulum", "scara", "tree"])
+def test_a_robot_moves_as_in_mujoco(name, suffix, tmp_path):
+    """The robot stands elsewhere and is turned; MuJoCo's gravity is turned instead."""
+    path = written(tmp_path, name, suffix)
+    scene = withe.Scene()
+    place = np.array([0.3, -0.2, 0.1])
+    quaternion = np.array([0.8, 0.36, 0.48, 0.0])
+    robot = scene.add_robot(path, position=place, rotation=quaternion)
+    simulation = scene.build(time_step=5e-4)
+    axes = withe.common.validation.rotation_matrix(quaternion, "rotation")
+    bodies = motion_in_mujoco(path, 0.3, axes.T @ scene.gravity)
+    simulation.step(600)
+    assert len(bodies) == {"double_pendulum": 2, "scara": 3, "tree": 4 if suffix == ".xml" else 3}[name]
+    for body, (position, rotation) in bodies.items():
+        np.testing.assert_allclose(simulation.position(robot[body]), place + axes @ position, atol=1e-4)
+        np.testing.assert_allclose(simulation.rotation(robot[body]), axes @ rotation, atol=1e-4)
+
+
+def test_bodies_that_are_fixed_to_each_other_have_a_common_mass_centre_and_inertia(tmp_path):
+    """Two boxes side by side are a box of twice the length."""
+    half = '<geom type="box" pos="0.1 0 0" size="0.1 0.05 0.02" mass="1.5"/>'
+    path = mjcf(
+        tmp_path,
+        f'<body name="a" pos="1 2 3" euler="20 0 30"><freejoint/>{half}'
+        f'<body name="b" pos="0.4 0 0" euler="0 0 180">{half}</body></body>',
+    )
+    robot = read_robot(path)
+    (body,) = robot.bodies
+    whole = withe.solids.Box((0.4, 0.1, 0.04))
+    assert body.names == ("a", "b")
+    assert body.mass == pytest.approx(3.0)
+    np.testing.assert_allclose(body.center, (0.2, 0, 0), atol=1e-12)
+    np.testing.assert_allclose(body.inertia, 3.0 * whole.inertia_per_mass, atol=1e-12)
+    np.testing.assert_allclose(body.position, (1, 2, 3))
+    assert body.solid.volume == pytest.approx(whole.volume)
+
+
+def test_masses_of_a_urdf_tree_equal_those_of_mujoco(tmp_path):
+    """MuJoCo fuses fixed links by itself."""
+    path = written(tmp_path, "tree", ".urdf")
+    model = mujoco.MjModel.from_xml_path(str(path))
+    found = {body.names[0]: body for body in read_robot(path).bodies}
+    for name in ("left", "right", "hand"):
+        body = model.body(name)
+        assert found[name].mass == pytest.approx(body.mass[0])
+        np.testing.assert_allclose(found[name].center, body.ipos, atol=1e-9)
+        np.testing.assert_allclose(np.linalg.eigvalsh(found[name].inertia), np.sort(body.inertia), rtol=1e-6)
+
+
+def test_what_is_fixed_to_the_world_is_one_clamped_body(tmp_path):
+    scene = withe.Scene()
+    robot = scene.add_robot(written(tmp_path, "scara", ".xml"))
+    assert isinstance(robot["column"], withe.Body)
+    assert isinstance(robot.joints["first"], withe.Joint)
+    simulation = scene.build(time_step=1e-3)
+    simulation.step(50)
+    np.testing.assert_allclose(simulation.position(robot["column"]), (0, 0, 0.1), atol=1e-12)
+
+
+def test_joints_to_the_world_are_supports_unless_they_have_a_spring_or_a_motor(tmp_path):
+    scene = withe.Scene()
+    plain = scene.add_robot(mjcf(tmp_path, ARM))
+    assert isinstance(plain["hinge"], withe.Support)
+    assert list(plain.bodies) == ["link"]
+    sprung = scene.add_robot(mjcf(tmp_path, ARM.replace('axis="0 1 0"', 'axis="0 1 0" stiffness="2"')), name="other")
+    assert isinstance(sprung["hinge"], withe.Joint)
+    assert list(sprung.bodies) == ["base", "link"]
+    motor = '<actuator><motor name="motor" joint="hinge"/></actuator>'
+    driven, _ = quietly(lambda: scene.add_robot(mjcf(tmp_path, ARM, motor), name="third"))
+    assert isinstance(driven["hinge"], withe.Joint)
+
+
+def test_a_ball_joint_to_the_world_is_a_pin(tmp_path):
+    path = mjcf(tmp_path, ARM.replace('axis="0 1 0"', 'type="ball"'))
+    scene = withe.Scene()
+    robot = scene.add_robot(path)
+    simulation = scene.build(time_step=5e-4)
+    simulation.step(400)
+    (position, rotation) = motion_in_mujoco(path, 0.2, scene.gravity)["link"]
+    np.testing.assert_allclose(simulation.position(robot["link"]), position, atol=1e-9)
+    np.testing.assert_allclose(simulation.rotation(robot["link"]), rotation, atol=1e-4)
+
+
+def test_a_slide_to_the_world_falls_along_its_axis(tmp_path):
+    path = mjcf(tmp_path, ARM.replace('axis="0 1 0"', 'type="slide" axis="1 0 1"'))
+    scene = withe.Scene()
+    robot = scene.add_robot(path)
+    simulation = scene.build(time_step=1e-3)
+    simulation.step(200)
+    fall = 0.5 * 9.81 * np.sqrt(0.5) * 0.2**2
+    np.testing.assert_allclose(
+        simulation.position(robot["link"]), np.array([0, 0, 1]) - fall * np.sqrt(0.5) * np.array([1, 0, 1]), atol=1e-9
+    )
+    np.testing.assert_allclose(simulation.rotation(robot["link"]), np.eye(3), atol=1e-9)
+
+
+def test_a_wrist_whose_axes_meet_moves_as_in_mujoco(tmp_path):
+    """Three hinges at one point, and two arms on one axis."""
+    wrist = """<body name="a" pos="0 0 1"><joint name="ja" axis="0 0 1"/><geom type="sphere" size="0.03" mass="0.2"
+ pos="0.05 0 0"/><body name="b"><joint name="jb" axis="0 1 0"/><geom type="sphere" size="0.03" mass="0.2"
+ pos="0 0 0.05"/><body name="c"><joint name="jc" axis="1 0 0"/><geom type="sphere" size="0.03" mass="0.3" pos="0.02 0.05 -0.1"/></body>
+ <body name="d"><joint name="jd" axis="0 1 0"/><geom type="sphere" size="0.03" mass="0.1" pos="-0.1 0 0"/></body>
+ </body></body>"""
+    path = mjcf(tmp_path, wrist)
+    scene = withe.Scene(gravity=(1.0, 2.0, -9.0))
+    robot, _ = quietly(lambda: scene.add_robot(path))
+    simulation = scene.build(time_step=5e-4)
+    simulation.step(400)
+    for body, (position, rotation) in motion_in_mujoco(path, 0.2, scene.gravity).items():
+        np.testing.assert_allclose(simulation.position(robot[body]), position, atol=1e-4)
+        np.testing.assert_allclose(simulation.rotation(robot[body]), rotation, atol=2e-4)
+
+
+def test_a_servo_turns_a_joint_of_the_robot(tmp_path):
+    motor = '<actuator><motor name="motor" joint="hinge"/></actuator>'
+    scene = withe.Scene()
+    robot, _ = quietly(lambda: scene.add_robot(mjcf(tmp_path, ARM, motor)))
+    simulation = scene.build(integrator="backward_euler", time_step=5e-3)
+    simulation.set(robot.joints["hinge"], stiffness=50.0, damping=2.0)
+    simulation.set(robot.joints["hinge"], rest_angle=-0.5, over=0.5)
+    simulation.step(400)
+    # The weight turns the servo by m g l cos(angle) / stiffness.
+    sag = 0.1 * 9.81 * 0.1 * np.cos(0.5) / 50.0
+    assert simulation.joint_angle(robot["hinge"]) == pytest.approx(-0.5 + sag, abs=1e-4)
+
+
+def test_a_rod_is_joined_to_a_body_of_the_robot(tmp_path):
+    scene = withe.Scene()
+    robot = scene.add_robot(written(tmp_path, "scara", ".xml"))
+    tip = robot.points["tip"]
+    rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+    end = np.add(tip.position, (0, 0, -0.2))
+    cable = scene.add_rod(start=tip.position, end=end, nodes=11, radius=3e-3, material=rubber)
+    scene.join(cable.start, robot["quill"])
+    simulation = scene.build(time_step=2e-3)
+    simulation.step(50)
+    quill = simulation.position(robot["quill"]) + simulation.rotation(robot["quill"]) @ (0, 0, -0.08)
+    np.testing.assert_allclose(simulation.positions(cable)[0], quill, atol=1e-12)
+
+
+def test_names_are_those_of_the_file_with_the_robot_in_front_where_they_clash(tmp_path):
+    scene = withe.Scene()
+    path = mjcf(tmp_path, ARM.replace('"hinge"', '"link"'))
+    first, second, third = (scene.add_robot(path, position=(0, y, 0)) for y in range(3))
+    assert first.bodies["link"].name == "link"
+    assert first.joints["link"].name == "robot link"
+    names = [robot[kind].name for robot in (second, third) for kind in ("link",)]
+    assert len({"link", "robot link", *names}) == 4
+    named = scene.add_robot(path, position=(0, 4, 0), name="left")
+    assert named["link"].name == "left link"
+    assert scene["left link"] == named["link"]
+    with pytest.raises(ValueError, match=r"robot 'left' has no 'lnk'; did you mean 'link'\?"):
+        named["lnk"]
+
+
+def test_fixed_bodies_and_sites_have_names_and_points(tmp_path):
+    scene = withe.Scene()
+    robot = scene.add_robot(written(tmp_path, "tree", ".urdf"), position=(1, 0, 0))
+    assert robot["foot"] == robot["sole"] == robot["left"]
+    assert set(robot.points) == {"base", "left", "foot", "sole", "right", "hand"}
+    np.testing.assert_allclose(robot.points["left"].position, (1, 0.1, 0), atol=1e-12)
+    assert robot.points["sole"].rod == "left"
+
+
+ALL = """<mujoco model="all"><option gravity="0 0 -1.6" density="1000"/><asset>
+<hfield name="hill" nrow="2" ncol="2" size="1 1 1 1"/></asset><worldbody><geom name="floor" type="plane" size="1 1 1"/>
+<body name="one" pos="0 0 1" gravcomp="1"><joint name="j1" axis="0 1 0" range="-10 10" armature="0.1"
+ frictionloss="0.2"/><geom size="0.1" mass="1"/><site name="s1"/>
+<body name="two" pos="0 0 -0.3"><joint name="j2" axis="0 1 0" actuatorfrcrange="-1 1"/><geom size="0.1" mass="1"/></body>
+</body><body name="three" pos="0.1 0 1"><joint name="j3" type="ball" damping="0.1"/><geom name="g3" size="0.1" mass="1"/>
+</body></worldbody>
+<actuator><motor name="m1" joint="j1"/></actuator><sensor><jointpos name="p1" joint="j1"/></sensor>
+<equality><weld name="w1" body1="two" body2="three"/><joint joint1="j1" joint2="j2"/></equality>
+<tendon><fixed name="t1"><joint joint="j1" coef="1"/></fixed></tendon>
+<contact><pair name="c1" geom1="floor" geom2="g3"/></contact><keyframe><key name="home"/></keyframe></mujoco>"""
+
+
+def test_one_warning_names_all_that_is_not_supported(tmp_path):
+    path = tmp_path / "all.xml"
+    path.write_text(ALL)
+    _, caught = quietly(lambda: withe.Scene().add_robot(path))
+    (found,) = [each for each in caught if each.category is withe.UnsupportedRobotWarning]
+    for line in (
+        "limits of joints 'j1'",
+        "force limits of joints 'j2'",
+        "armature of joints 'j1'",
+        "friction loss of joints 'j1'",
+        "damping of ball and free joints 'j3'",
+        "equality constraints of type weld 'w1'",
+        "equality constraints of type joint 'j1'",
+        "actuators 'm1'",
+        "tendons 't1'",
+        "sensors 'p1'",
+        "keyframes 'home'",
+        "contact pairs 'c1'",
+        "gravity compensation of bodies 'one'",
+        "geoms of the world 'floor'",
+        "density of the surrounding medium",
+        "contact of bodies, such as",
+        "gravity (0.0, 0.0, -1.6) m/s^2",
+    ):
+        assert f"- {line}" in str(found.message), line
+    assert str(found.message).splitlines()[0].endswith("without:")
+    assert __file__ == found.filename
+
+
+@pytest.mark.parametrize("suffix", [".xml", ".urdf"])
+@pytest.mark.parametrize("name", ["double_pendulum", "scara"])
+def test_a_robot_that_is_supported_gives_no_warning(name, suffix, tmp_path):
+    _, caught = quietly(lambda: withe.Scene().add_robot(written(tmp_path, name, suffix)))
+    assert [str(each.message) for each in caught] == []
+
+
+def test_a_loop_that_an_equality_closes_is_a_warning(tmp_path):
+    loop = '<equality><connect name="loop" body1="link" anchor="0.2 0 0"/></equality>'
+    _, caught = quietly(lambda: withe.Scene().add_robot(mjcf(tmp_path, ARM, loop)))
+    assert any("equality constraints of type connect 'loop'" in str(each.message) for each in caught)
+
+
+def test_elements_of_urdf_that_mujoco_does_not_read_are_named(tmp_path):
+    path = written(tmp_path, "double_pendulum", ".urdf")
+    limit = (
+        '<limit lower="-1" upper="1" effort="3" velocity="2"/><mimic joint="shoulder"/></joint><transmission/></robot>'
+    )
+    text = path.read_text().replace('"continuous"><parent link="upper"', '"revolute"><parent link="upper"')
+    path.write_text(text.replace("</joint></robot>", limit))
+    _, caught = quietly(lambda: withe.Scene().add_robot(path))
+    (found,) = caught
+    for line in (
+        "elements <transmission> (1)",
+        "velocity limits of joints 'elbow'",
+        "limits of joints 'elbow'",
+        "force limits of joints 'elbow'",
+        "equality constraints of type joint 'elbow', which the mimic of URDF is too",
+    ):
+        assert f"- {line}" in str(found.message), line
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "word"),
+    [('mass="0.1"', 'mass="2e4"', "has the body 'link' of 2e+04 kg"), ("0.2 0 0", "200 0 0", "has a size of 20")],
+)
+def test_units_that_are_not_si_are_a_warning(old, new, word, tmp_path):
+    _, caught = quietly(lambda: withe.Scene().add_robot(mjcf(tmp_path, ARM.replace(old, new))))
+    (found,) = [each for each in caught if each.category is withe.PlausibilityWarning]
+    assert word in str(found.message)
+    assert "m, kg and s" in str(found.message)
+
+
+def stl(path, triangles):
+    """Write a binary STL file."""
+    rows = b"".join(struct.pack("<12fH", 0, 0, 0, *np.ravel(triangle), 0) for triangle in triangles)
+    path.write_bytes(bytes(80) + struct.pack("<I", len(triangles)) + rows)
+
+
+def test_meshes_of_a_package_are_found_and_drawn(tmp_path):
+    """The visual mesh is drawn, and the collision shape is not."""
+    solid = withe.solids.Box((0.1, 0.2, 0.3))
+    vertices, triangles = solid.surface()
+    (tmp_path / "arm_description" / "meshes").mkdir(parents=True)
+    (tmp_path / "arm_description" / "urdf").mkdir()
+    stl(tmp_path / "arm_description" / "meshes" / "box.stl", vertices[triangles] + (0.5, 0, 0))
+    path = written(tmp_path / "arm_description" / "urdf", "double_pendulum", ".urdf")
+    shape = (
+        '<visual><geometry><mesh filename="package://arm_description/meshes/box.stl"/></geometry></visual>'
+        '<collision><geometry><sphere radius="1"/></geometry></collision></link>'
+    )
+    path.write_text(path.read_text().replace("</visual></link>", f"</visual>{shape}", 1))
+    robot, _ = quietly(lambda: read_robot(path))
+    upper = next(body for body in robot.bodies if body.names == ("upper",))
+    assert upper.solid.volume == pytest.approx(0.04 * 0.04 * 0.2 + 0.1 * 0.2 * 0.3, rel=1e-5)
+    corners = upper.solid.surface()[0]
+    np.testing.assert_allclose(corners.max(axis=0), (0.55, 0.1, 0.15), atol=1e-6)
+
+
+def test_an_open_mesh_is_drawn_as_its_hull_and_named(tmp_path):
+    vertices, triangles = withe.solids.Box((0.1, 0.2, 0.3)).surface()
+    stl(tmp_path / "open.stl", vertices[triangles[:-1]])
+    asset = '<asset><mesh name="shell" file="open.stl" inertia="convex"/></asset>'
+    body = '<body name="link"><freejoint/><geom type="mesh" mesh="shell" mass="1"/></body>'
+    (path, scene) = (mjcf(tmp_path, body, asset), withe.Scene())
+    _, caught = quietly(lambda: scene.add_robot(path))
+    assert "drawn as convex hulls, of meshes 'shell'" in str(caught[0].message)
+    assert read_robot(path).bodies[0].solid.volume == pytest.approx(6e-3, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("shape", "kind"),
+    [
+        ('type="sphere" size="0.1"', withe.solids.Sphere),
+        ('type="box" size="0.1 0.2 0.3"', withe.solids.Box),
+        ('type="capsule" size="0.1 0.2"', withe.solids.Capsule),
+        ('type="cylinder" size="0.1 0.2"', withe.solids.Cylinder),
+        ('type="ellipsoid" size="0.1 0.2 0.3"', withe.solids.Mesh),
+    ],
+)
+def test_a_shape_has_the_volume_of_its_geom(shape, kind, tmp_path):
+    """MuJoCo gives a geom the mass of its density times its volume; polyhedra have a little less."""
+    for pose in ("", 'pos="0.1 0 0.2" euler="10 20 30"'):
+        path = mjcf(tmp_path, f'<body name="link"><freejoint/><geom density="1" {shape} {pose}/></body>')
+        (body,) = read_robot(path).bodies
+        assert isinstance(body.solid, withe.solids.Mesh if pose else kind)
+        assert body.solid.volume == pytest.approx(body.mass, rel=0.03 if pose or kind is withe.solids.Mesh else 1e-9)
+        np.testing.assert_allclose(body.solid.center, body.center, atol=1e-9)
+
+
+def test_a_robot_is_saved_as_bodies_and_joints(tmp_path):
+    scene = withe.Scene()
+    scene.add_robot(written(tmp_path, "double_pendulum", ".urdf"))
+    calls = [call.method for call in scene._declarations]
+    assert calls == ["add_body", "add_body", "add_body", "clamp", "join", "join"]
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "message"),
+    [
+        (lambda path: path.with_name("none.xml"), FileNotFoundError, r"does not exist: .*none\.xml"),
+        (lambda path: path.rename(path.with_suffix(".txt")), ValueError, r"must end in \.urdf or \.xml"),
+        (lambda path: path.rename(path.with_suffix(".xacro")), ValueError, "xacro robot.xacro > robot.urdf"),
+        (lambda path: edited(path, "</worldbody>", ""), ValueError, "is not XML"),
+        (lambda path: edited(path, "mujoco", "sdf"), ValueError, "root element robot .* got 'sdf'"),
+        (lambda path: edited(path, 'mass="0.1"', 'mass="0"'), ValueError, "MuJoCo cannot read the robot: .*mass"),
+        (lambda path: edited(path, ARM, ""), ValueError, "must have a body, got none"),
+        (
+            lambda path: edited(path, "<geom", '<joint name="twist" axis="1 0 0"/><geom'),
+            ValueError,
+            "joints 'hinge', 'twist' connect body 'link' to its parent, which must be one joint. Give each joint",
+        ),
+        (
+            lambda path: edited(path, "<worldbody>", '<asset><mesh name="m" file="lost.stl"/></asset><worldbody>'),
+            FileNotFoundError,
+            r"lost\.stl",
+        ),
+    ],
+)
+def test_files_that_are_no_robot_are_refused(change, error, message, tmp_path):
+    path = change(mjcf(tmp_path, ARM))
+    scene = withe.Scene()
+    with pytest.raises(error, match=message):
+        scene.add_robot(path)
+    assert repr(scene) == "Scene()"
+
+
+def edited(path, old, new):
+    path.write_text(path.read_text().replace(old, new))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("file", "error", "message"),
+    [
+        ("package://arm/lost.stl", FileNotFoundError, "mesh 'package://arm/lost.stl' is missing; looked for"),
+        ("lost.stl", FileNotFoundError, "mesh 'lost.stl' is missing"),
+        ("shape.dae", ValueError, r"mesh 'shape.dae' must be a file \.stl or \.obj"),
+    ],
+)
+def test_meshes_of_urdf_that_cannot_be_read_are_refused(file, error, message, tmp_path):
+    (tmp_path / "shape.dae").write_text("")
+    path = written(tmp_path, "double_pendulum", ".urdf")
+    edited(path, '<box size="0.04 0.04 0.2"/>', f'<mesh filename="{file}"/>')
+    with pytest.raises(error, match=message):
+        withe.Scene().add_robot(path)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ({"position": (0, 0)}, "position of the robot"),
+        ({"rotation": (0, 0, 0, 2)}, "rotation of the robot"),
+        ({"name": ""}, "name of the robot"),
+    ],
+)
+def test_arguments_are_checked_before_anything_is_added(words, message, tmp_path):
+    scene = withe.Scene()
+    with pytest.raises(ValueError, match=message):
+        scene.add_robot(mjcf(tmp_path, ARM), **words)
+    assert repr(scene) == "Scene()"
+
+
+def test_without_mujoco_the_error_names_the_extra(tmp_path, monkeypatch):
+    real = importlib.import_module
+
+    def missing(name, *arguments):
+        if name == "mujoco":
+            raise ModuleNotFoundError("No module named 'mujoco'", name="mujoco")
+        return real(name, *arguments)
+
+    monkeypatch.setattr(importlib, "import_module", missing)
+    with pytest.raises(ImportError, match=r"needs the package mujoco, .*\[robots\]"):
+        withe.Scene().add_robot(mjcf(tmp_path, ARM))
+
+
+def test_a_solid_beside_an_inertia_is_only_drawn():
+    scene = withe.Scene()
+    box = withe.solids.Box((0.1, 0.1, 0.1))
+    body = scene.add_body(box, mass=2.0, inertia=(0.1, 0.2, 0.25), center=(0, 0, 0.3))
+    part = scene._directory.parts[body.name]
+    np.testing.assert_allclose(np.diag(part.inertia), (0.1, 0.2, 0.25))
+    np.testing.assert_allclose(part.center, (0, 0, 0.3))
+    assert part.solid is box
+    for words, message in (
+        ({"density": 1.0, "inertia": 1.0}, "needs mass= and no density="),
+        ({"inertia": 1.0}, "needs mass= and no density="),
+        ({"mass": 1.0, "center": (0, 0, 1)}, "follows from its solid"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            scene.add_body(box, **words)
+
+
+def test_the_files_of_these_tests_are_read_by_mujoco():
+    """A fault of the files would otherwise look like one of the reader."""
+    for text in MJCF.values():
+        mujoco.MjModel.from_xml_string(text)
