@@ -1,10 +1,9 @@
 """A robot arm from an MJCF file carries a soft cable by its gripper.
 
-The file describes a base, a turret, an upper arm, a forearm and a gripper. Springs and dampers of the hinges are servos:
-the angle at which a spring is free of stress is moved to the goal. At rest the torque of each servo must balance the
-weights behind its hinge: the links, and the cable by the force and moment at the gripper. The balance is checked by the
-sum of the weights times their levers, from the positions of all bodies and nodes. The example fails if a torque is wrong
-by more than 0.1 % of the greatest one.
+The file describes a base, a turret, an upper arm, a forearm and a gripper. Springs and dampers of the hinges are
+servos: the rest angle of each spring moves to its goal. At rest the torque of each servo must balance the moment of
+the weights behind its hinge, which are those of the links and of the cable. The moment is the sum of all weights times
+their levers. The example fails if a torque is wrong by more than 0.1 % of the greatest one.
 
 Writes out/arm.xml and out/arm_with_cable.png.
 """

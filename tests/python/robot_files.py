@@ -10,11 +10,11 @@ MJCF = {
     "double_pendulum": """<mujoco model="double pendulum"><compiler angle="radian"/><worldbody>
 <body name="upper" pos="0 0 0.5" euler="0 0.4 0.3">
  <joint name="shoulder" type="hinge" axis="0 1 0" ref="0.2" springref="0.7" stiffness="0.4" damping="0.01"/>
- <inertial pos="0.01 0.02 -0.1" mass="0.4" fullinertia="2e-3 3e-3 1e-3 2e-4 -1e-4 3e-4"/>
+ <inertial pos="0.01 0.02 -0.1" mass="0.4" fullinertia="2e-3 3e-3 2e-3 2e-4 -1e-4 3e-4"/>
  <body name="lower" pos="0 0 -0.3"><joint name="elbow" axis="1 1 0" pos="0 0 0.01"/>
   <geom name="bar" type="capsule" fromto="0 0 0 0.1 0 -0.2" size="0.02" mass="0.3"/></body>
 </body></worldbody></mujoco>""",
-    "scara": """<mujoco model="scara"><worldbody>
+    "scara": """<mujoco model="scara"><default><geom contype="0" conaffinity="0"/></default><worldbody>
 <body name="column" pos="0 0 0.1"><geom type="cylinder" size="0.05 0.1" mass="4"/>
  <body name="inner" pos="0 0 0.1"><joint name="first" axis="0 0 1" damping="0.02"/>
   <geom type="box" pos="0.1 0 0" size="0.1 0.02 0.01" mass="0.8"/>
@@ -24,7 +24,7 @@ MJCF = {
     <geom type="capsule" size="0.01 0.05" pos="0.01 0 -0.02" mass="0.2"/>
     <site name="tip" pos="0 0 -0.08"/></body></body></body></body>
 </worldbody></mujoco>""",
-    "tree": """<mujoco model="tree"><worldbody>
+    "tree": """<mujoco model="tree"><default><geom contype="0" conaffinity="0"/></default><worldbody>
 <body name="trunk" pos="0 0 1" euler="10 20 0"><freejoint name="floating"/>
  <geom type="box" size="0.1 0.05 0.03" mass="2"/>
  <body name="sensor" pos="0.08 0.03 0.05" euler="0 0 30"><geom type="box" size="0.02 0.01 0.02" mass="0.3"/>
@@ -97,13 +97,14 @@ def written(folder: Path, name: str, suffix: str) -> Path:
 
 
 def motion_in_mujoco(path: Path, duration: float, gravity: np.ndarray, step: float = 2e-5) -> dict[str, tuple]:
-    """Return the position and the axes of each body that moves, after a motion from rest by RK4."""
+    """Return the position and the axes of each body that moves, after a motion from rest by RK4, without contact."""
     import mujoco
 
     model = mujoco.MjModel.from_xml_path(str(path))
     model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
     model.opt.timestep = step
     model.opt.gravity = gravity
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
     data = mujoco.MjData(model)
     for _ in range(round(duration / step)):
         mujoco.mj_step(model, data)

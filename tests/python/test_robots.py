@@ -133,7 +133,8 @@ def test_a_wrist_whose_axes_meet_moves_as_in_mujoco(tmp_path):
     """Three hinges at one point, and two arms on one axis."""
     wrist = """<body name="a" pos="0 0 1"><joint name="ja" axis="0 0 1"/><geom type="sphere" size="0.03" mass="0.2"
  pos="0.05 0 0"/><body name="b"><joint name="jb" axis="0 1 0"/><geom type="sphere" size="0.03" mass="0.2"
- pos="0 0 0.05"/><body name="c"><joint name="jc" axis="1 0 0"/><geom type="sphere" size="0.03" mass="0.3" pos="0.02 0.05 -0.1"/></body>
+ pos="0 0 0.05"/><body name="c"><joint name="jc" axis="1 0 0"/>
+ <geom type="sphere" size="0.03" mass="0.3" pos="0.02 0.05 -0.1"/></body>
  <body name="d"><joint name="jd" axis="0 1 0"/><geom type="sphere" size="0.03" mass="0.1" pos="-0.1 0 0"/></body>
  </body></body>"""
     path = mjcf(tmp_path, wrist)
@@ -201,8 +202,10 @@ ALL = """<mujoco model="all"><option gravity="0 0 -1.6" density="1000"/><asset>
 <hfield name="hill" nrow="2" ncol="2" size="1 1 1 1"/></asset><worldbody><geom name="floor" type="plane" size="1 1 1"/>
 <body name="one" pos="0 0 1" gravcomp="1"><joint name="j1" axis="0 1 0" range="-10 10" armature="0.1"
  frictionloss="0.2"/><geom size="0.1" mass="1"/><site name="s1"/>
-<body name="two" pos="0 0 -0.3"><joint name="j2" axis="0 1 0" actuatorfrcrange="-1 1"/><geom size="0.1" mass="1"/></body>
-</body><body name="three" pos="0.1 0 1"><joint name="j3" type="ball" damping="0.1"/><geom name="g3" size="0.1" mass="1"/>
+<body name="two" pos="0 0 -0.3"><joint name="j2" axis="0 1 0" actuatorfrcrange="-1 1"/>
+<geom size="0.1" mass="1"/></body>
+</body><body name="three" pos="0.1 0 1"><joint name="j3" type="ball" damping="0.1"/>
+<geom name="g3" size="0.1" mass="1"/>
 </body></worldbody>
 <actuator><motor name="m1" joint="j1"/></actuator><sensor><jointpos name="p1" joint="j1"/></sensor>
 <equality><weld name="w1" body1="two" body2="three"/><joint joint1="j1" joint2="j2"/></equality>
@@ -273,7 +276,7 @@ def test_elements_of_urdf_that_mujoco_does_not_read_are_named(tmp_path):
 
 @pytest.mark.parametrize(
     ("old", "new", "word"),
-    [('mass="0.1"', 'mass="2e4"', "has the body 'link' of 2e+04 kg"), ("0.2 0 0", "200 0 0", "has a size of 20")],
+    [('mass="0.1"', 'mass="2e4"', "has the body 'link' of 2e+04 kg"), ("0.2 0 0", "200 0 0", "has a size of 227 m")],
 )
 def test_units_that_are_not_si_are_a_warning(old, new, word, tmp_path):
     _, caught = quietly(lambda: withe.Scene().add_robot(mjcf(tmp_path, ARM.replace(old, new))))

@@ -116,7 +116,10 @@ def _of_options(model: Any) -> Iterator[str]:
 
 
 def _touching(model: Any) -> tuple[str, str] | None:
-    """Return the names of two bodies that may touch in MuJoCo; bodies that a joint connects do not."""
+    """Return the names of two bodies that may touch in MuJoCo.
+
+    Bodies that a joint connects do not touch, unless one of them is fixed to the world.
+    """
     weld = np.asarray(model.body_weldid, dtype=int)
     own = np.asarray(model.geom_bodyid, dtype=int)
     group = weld[own]
@@ -126,9 +129,8 @@ def _touching(model: Any) -> tuple[str, str] | None:
     for i in range(model.ngeom):
         can = ((kinds[i] & others) | (kinds & others[i])) != 0
         can &= group != group[i]
-        # MuJoCo lets all that is fixed to the world touch. Here only geoms of the world itself are named.
         joined = (parent == group[i]) | (parent[i] == group)
-        can &= ~joined | (own == 0) | (own[i] == 0)
+        can &= ~joined | (group == 0) | (group[i] == 0)
         for j in np.nonzero(can)[0].tolist():
             first, second = sorted((int(own[i]), int(own[j])))
             if (first << 16) + second not in excluded:
