@@ -94,7 +94,15 @@ BENCHMARKS = {
 }
 EXAMPLES = {
     "Start": ("cantilever", "helix", "robot", "quadruped", "soft_limb"),
-    "Actuation and control": ("servo_arm", "tendon_arm", "upright_arm", "throwing_tip", "tapered_arm", "snake"),
+    "Actuation and control": (
+        "servo_arm",
+        "arm_with_cable",
+        "tendon_arm",
+        "upright_arm",
+        "throwing_tip",
+        "tapered_arm",
+        "snake",
+    ),
     "Many robots and learning": (
         "stiffness_sweep",
         "domain_randomisation",

@@ -55,8 +55,8 @@ CENTERS = {
     "forearm": (0.8, (0.175, 0.0, 0.0)),
     "hand": (0.35, ((0.25 * 0.03 + 0.1 * 0.09) / 0.35, 0.0, 0.0)),
 }
-GOAL = {"waist": 1.0, "shoulder": 0.5, "elbow": -0.1, "wrist": 0.3}  # [rad]
-LENGTH, RADIUS, NODES = 0.6, 8e-3, 41  # of the cable [m]
+GOAL = {"waist": -1.1, "shoulder": 0.45, "elbow": -0.6, "wrist": 0.7}  # [rad]
+LENGTH, RADIUS, NODES = 0.45, 7e-3, 41  # of the cable [m]
 RISE, UNTIL = 1.5, 4.0  # [s]
 TIME_STEP = 5e-3  # [s]
 TORQUE_ERROR = 1e-3  # allowed error over the greatest torque
@@ -118,7 +118,7 @@ def main() -> None:
     for name, (torque, moment) in found.items():
         print(f"{name}: torque {torque:.4f} N m, moment of the weights {moment:.4f} N m")
     picture = arguments.out / "arm_with_cable.png"
-    record.picture(picture, ghosts=(0, 12, 20), camera=(-0.4, -1.0, 0.35), ground=0.0)
+    record.picture(picture, ghosts=(0, 15), camera=(0.5, -1.0, 0.4), ground=0.0)
     print(f"Wrote {picture}.")
     if error > TORQUE_ERROR:
         sys.exit("The torques of the servos do not balance the weights.")
