@@ -69,6 +69,19 @@ def fingers_curl(names):
     assert np.all(last < 0.5 * first)
 
 
+@before("docs/how_to/robots_from_files.md")
+def mujoco_reads_robots():
+    pytest.importorskip("mujoco")
+    return {}
+
+
+@after("docs/how_to/robots_from_files.md")
+def an_elbow_turns(names):
+    arm, simulation = names["arm"], names["simulation"]
+    assert simulation.joint_angle(arm["elbow"]) == pytest.approx(-0.8, abs=0.1)
+    assert arm["gripper"] == arm["forearm"]
+
+
 @after("docs/how_to/touch.md")
 def a_knot_is_pulled_tight(names):
     contacts, pull = names["simulation"].contacts(), names["simulation"].reaction(names["grips"][1]).force[0]

@@ -13,6 +13,7 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 # Options of each example, the number that it prints, and between what that number must lie.
 EXAMPLES = {
     "upright_arm.py": (["--duration", "4"], r"tip at most [.\d]+ mm aside, ([.\d]+) mm in the end", 0.0, 1.0),
+    "arm_with_cable.py": ([], r"shoulder: torque -([.\d]+) N m", 6.0, 7.0),
     "carry_rope.py": (["--step", "1e-2"], r"carries up to (\d+)% of the weight", 40.0, 110.0),
     "crane_load.py": ([], r"theory within ([.\d]+) %", 0.0, 0.5),
     "domain_randomisation.py": (["--arms", "8"], r"feedback: ([.\d]+) mm off", 0.0, 2.0),

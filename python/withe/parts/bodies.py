@@ -35,20 +35,14 @@ def make_body(
     owner = f"body {name!r}"
     origin = validation.vector(position, f"position of {owner}")
     axes = np.eye(3) if rotation is None else validation.rotation_matrix(rotation, f"rotation of {owner}")
-<<<<<<< HEAD
-    if solid is not None:
-        if isinstance(solid, type) or not all(hasattr(solid, word) for word in _OF_SOLIDS):
-            raise ValueError(
-                f"solid of {owner} must be one of withe.solids, for example withe.solids.Box((0.1, 0.1, 0.1)), got "
-                f"{solid!r:.80}"
-            )
-        if inertia is not None or center is not None:
-            raise ValueError(f"inertia and center of {owner} follow from its solid: give density= or mass= alone")
-=======
+    if solid is not None and (isinstance(solid, type) or not all(hasattr(solid, word) for word in _OF_SOLIDS)):
+        raise ValueError(
+            f"solid of {owner} must be one of withe.solids, for example withe.solids.Box((0.1, 0.1, 0.1)), got "
+            f"{solid!r:.80}"
+        )
     if solid is not None and inertia is None:
         if center is not None:
             raise ValueError(f"center of {owner} follows from its solid, unless inertia= is given too")
->>>>>>> 96cc8e21 (Add robots from URDF and MJCF files (in progress))
         if (density is None) == (mass is None):
             raise ValueError(f"{owner} must have either density= or mass=, got {'neither' if mass is None else 'both'}")
         if mass is not None:
