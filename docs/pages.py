@@ -33,6 +33,7 @@ FOR_USERS = {"withe.io": ("load_poses", "save_poses", "write_vtk")}
 # Classes whose objects come from a function, which their docstring names. Their constructors are not for users.
 MADE_BY = {
     "withe.Body": "Scene.add_body",
+    "withe.BodyPoint": "Body.at",
     "withe.CustomForce": "Scene.add_custom_force",
     "withe.Drag": "Scene.add_drag",
     "withe.EdgeHandle": "Rod.edge",

@@ -8,12 +8,13 @@ import re
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
 from withe.common import validation
 from withe.io import written_beside
+from withe.parts.kinds import JoinKind
 from withe.parts.materials import Material
 from withe.scene.declarations import Declaration
 from withe.scene.file_format import SECTIONS, VERSION, Section
@@ -60,7 +61,7 @@ def _rows(scene: Any, section: Section, call: Declaration) -> Iterator[dict[str,
     given = dict(call.arguments)
     if call.method == "join":
         others = [given.pop("a"), given.pop("b"), *given.pop("others", ())]
-        if others[-1] in ("rigid", "pinned", "revolute"):
+        if others[-1] in get_args(JoinKind):
             given["kind"] = others.pop()
         pairs = [scene._directory.parts[name].node_names for name in call.names]
     # Keys in the order of the documentation; those of `actuate` that are not in its signature come last.
