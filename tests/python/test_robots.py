@@ -1,6 +1,7 @@
 """Robots from URDF and MJCF files: motion, mass, names, warnings and errors."""
 
 import importlib
+import re
 import struct
 import warnings
 
@@ -349,6 +350,22 @@ def test_a_robot_is_saved_as_bodies_and_joints(tmp_path):
     assert calls == ["add_body", "add_body", "add_body", "clamp", "join", "join"]
 
 
+def test_a_saved_robot_moves_as_the_first_one(tmp_path):
+    """Joints keep their kinds in scene files, sliding ones too."""
+    path = written(tmp_path, "scara", ".urdf")
+    path.write_text(re.sub("<visual>.*?</visual>", "", path.read_text()))
+    scene = withe.Scene(gravity=(1.0, 0.5, -9.0))
+    scene.add_robot(path)
+    scene.save(tmp_path / "scene.toml")
+    places = []
+    for each in (scene, withe.Scene.load(tmp_path / "scene.toml")):
+        simulation = each.build(time_step=2e-3)
+        simulation.step(50)
+        places.append(simulation.position("quill"))
+    np.testing.assert_allclose(places[0], places[1], atol=1e-9)
+    assert np.linalg.norm(places[0] - scene._directory.parts["quill"].position) > 1e-3
+
+
 @pytest.mark.parametrize(
     ("change", "error", "message"),
     [
@@ -397,6 +414,27 @@ def test_meshes_of_urdf_that_cannot_be_read_are_refused(file, error, message, tm
     path = written(tmp_path, "double_pendulum", ".urdf")
     edited(path, '<box size="0.04 0.04 0.2"/>', f'<mesh filename="{file}"/>')
     with pytest.raises(error, match=message):
+        withe.Scene().add_robot(path)
+
+
+@pytest.mark.parametrize(
+    ("parent", "message"),
+    [
+        ("lower", "connect links 'upper', 'lower' to a cycle: remove one"),
+        ("upper", "connect links 'upper' to a cycle: remove one"),
+    ],
+)
+def test_a_cycle_of_urdf_is_refused(parent, message, tmp_path):
+    path = written(tmp_path, "double_pendulum", ".urdf")
+    edited(path, '<parent link="base"', f'<parent link="{parent}"')
+    with pytest.raises(ValueError, match=message):
+        withe.Scene().add_robot(path)
+
+
+def test_a_link_with_two_parents_is_refused(tmp_path):
+    path = written(tmp_path, "double_pendulum", ".urdf")
+    edited(path, '<child link="lower"', '<child link="upper"')
+    with pytest.raises(ValueError, match="link 'upper' must have one parent, got 'base' and 'upper'"):
         withe.Scene().add_robot(path)
 
 

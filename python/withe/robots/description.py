@@ -92,8 +92,8 @@ class RobotDescription:
         Index of the body and position of each site, and of the origin of each body of the file.
     size : float [m]
         Diagonal of the box around the origins, joints and shapes of the robot.
-    gravity : ndarray of shape (3,) [m/s^2]
-        Acceleration of free fall in the file.
+    gravity : ndarray of shape (3,) [m/s^2], or None
+        Acceleration of free fall in the file; None for URDF, which has none.
     unsupported : tuple of str
         Content of the file that the description lacks.
     """
@@ -103,5 +103,5 @@ class RobotDescription:
     joints: tuple[RobotJoint, ...]
     points: Mapping[str, tuple[int, FloatArray]]
     size: float
-    gravity: FloatArray
+    gravity: FloatArray | None
     unsupported: tuple[str, ...]

@@ -25,11 +25,14 @@ class CompiledRobot:
     model : mujoco.MjModel
     ignored : tuple of str
         Content that MuJoCo does not read.
+    has_gravity : bool
+        True if the format of the file states gravity.
     """
 
     name: str
     model: Any
     ignored: tuple[str, ...]
+    has_gravity: bool
 
 
 def compiled(path: Path) -> CompiledRobot:
@@ -72,13 +75,14 @@ def compiled(path: Path) -> CompiledRobot:
             raise FileNotFoundError(f"{path}: a mesh or another file is missing: {message}") from None
         raise ValueError(f"{path}: MuJoCo cannot read the robot: {message}") from None
     name = root.get("name") or root.get("model") or path.stem
-    return CompiledRobot(name, model, ignored)
+    return CompiledRobot(name, model, ignored, root.tag == "mujoco")
 
 
 def _prepare_urdf(root: ElementTree.Element, path: Path) -> None:
     """Write absolute paths of meshes, and the options by which MuJoCo keeps fixed links and visual shapes."""
     if any("www.ros.org/wiki/xacro" in element.tag for element in root.iter()):
         raise ValueError(f"{path} has macros: expand them first, for example xacro robot.xacro > robot.urdf")
+    _check_tree(root, path)
     for mesh in root.iter("mesh"):
         mesh.set("filename", str(_mesh_file(mesh.get("filename", ""), path)))
     extension = root.find("mujoco")
@@ -88,6 +92,26 @@ def _prepare_urdf(root: ElementTree.Element, path: Path) -> None:
     for word in ("fusestatic", "discardvisual", "strippath"):
         compiler.set(word, "false")
     compiler.attrib.pop("meshdir", None)
+
+
+def _check_tree(root: ElementTree.Element, path: Path) -> None:
+    """Refuse joints that connect links to a cycle."""
+    parents: dict[str, str] = {}
+    for joint in root.findall("joint"):
+        ends = [joint.find(word) for word in ("parent", "child")]
+        above, below = ("" if end is None else end.get("link", "") for end in ends)
+        if below in parents:
+            raise ValueError(
+                f"{path}: link {below!r} must have one parent, got {parents[below]!r} and {above!r}: remove a joint"
+            )
+        parents[below] = above
+    for link in parents:
+        way = [link]
+        while (above := parents.get(way[-1], "")) and above not in way:
+            way.append(above)
+        if above:
+            cycle = ", ".join(map(repr, way[way.index(above) :]))
+            raise ValueError(f"{path}: joints connect links {cycle} to a cycle: remove one of the joints")
 
 
 def _mesh_file(name: str, path: Path) -> Path:

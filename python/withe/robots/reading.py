@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from withe.common.extras import require
 from withe.robots.description import RobotBody, RobotDescription, RobotJoint
-from withe.robots.files import compiled
+from withe.robots.files import CompiledRobot, compiled
 from withe.robots.names import name_of
 from withe.robots.shapes import drawn_geoms, solid_of
 from withe.robots.unsupported import listed, unsupported_content
@@ -50,18 +50,19 @@ def read_robot(path: str | os.PathLike[str]) -> RobotDescription:
     model, data = robot.model, mujoco.MjData(robot.model)
     data.qpos[:] = model.qpos0
     mujoco.mj_forward(model, data)
-    return _Reader(robot.name, model, data, Path(path)).description(robot.ignored)
+    return _Reader(robot, data, Path(path)).description()
 
 
 class _Reader:
     """Reader of one model in its reference configuration."""
 
-    def __init__(self, name: str, model: Any, data: Any, path: Path) -> None:
-        self._name, self._model, self._data, self._path = name, model, data, path
-        self._weld = np.asarray(model.body_weldid, dtype=int)
+    def __init__(self, robot: CompiledRobot, data: Any, path: Path) -> None:
+        self._robot, self._model, self._data, self._path = robot, robot.model, data, path
+        self._weld = np.asarray(robot.model.body_weldid, dtype=int)
         self._unsupported: list[str] = []
 
-    def description(self, ignored: Sequence[str]) -> RobotDescription:
+    def description(self) -> RobotDescription:
+        """Return the bodies, joints and points, and the content that they lack."""
         self._check_single_joints()
         model = self._model
         self._unsupported += unsupported_content(model)
@@ -82,9 +83,9 @@ class _Reader:
             top = int(self._weld[model.site_bodyid[site]])
             if top in numbers:
                 points[name_of(model, "site", site)] = (numbers[top], np.array(self._data.site_xpos[site]))
-        gravity = np.array(model.opt.gravity, dtype=float)
-        unsupported = (*self._unsupported, *ignored)
-        return RobotDescription(self._name, bodies, joints, points, self._size, gravity, unsupported)
+        gravity = np.array(model.opt.gravity, dtype=float) if self._robot.has_gravity else None
+        unsupported = (*self._unsupported, *self._robot.ignored)
+        return RobotDescription(self._robot.name, bodies, joints, points, self._size, gravity, unsupported)
 
     def _check_single_joints(self) -> None:
         model = self._model

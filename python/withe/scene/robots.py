@@ -160,9 +160,9 @@ def _warn(scene: Any, path: str | os.PathLike[str], description: RobotDescriptio
             "size of a robot",
         )
     unsupported = list(description.unsupported)
-    difference = np.abs(description.gravity - scene.gravity).max()
-    if difference > 1e-9:
-        unsupported.append(f"gravity {tuple(description.gravity.tolist())} m/s^2, because that of the scene is used")
+    gravity = description.gravity
+    if gravity is not None and np.abs(gravity - scene.gravity).max() > 1e-9:
+        unsupported.append(f"gravity {tuple(gravity.tolist())} m/s^2, because that of the scene is used")
     if unsupported:
         content = "".join(f"\n- {each}" for each in unsupported)
         warn(
