@@ -93,7 +93,7 @@ def describe_bodies(directory: Directory) -> list[_core.BodyDescription]:
     bodies = directory.all(BodyPart)
     places = {body: (base, carrier) for body, base, carrier in _bases(directory, bodies)}
     slid = _slid_rows(directory, bodies)
-    _check_held_once(directory, bodies, {body: base for body, (base, _) in places.items()})
+    _check_held_once(directory, bodies, {body: base for body, (base, _) in places.items()}, slid)
     found = []
     for body in bodies:
         rows = directory.layout.rows(-1 - body.index)
@@ -118,13 +118,16 @@ def _slid_rows(directory: Directory, bodies: list[BodyPart]) -> dict[int, set[in
     return rows
 
 
-def _check_held_once(directory: Directory, bodies: list[BodyPart], bases: dict[int, int]) -> None:
+def _check_held_once(
+    directory: Directory, bodies: list[BodyPart], bases: dict[int, int], slid: dict[int, set[int]]
+) -> None:
     """Refuse supports at a second point of a body, and of a second body of those that joints connect."""
-    holders = {directory.row(support.node): support.name for support in directory.all(SupportPart)}
+    supports = [support for support in directory.all(SupportPart) if support.grasp is None]
+    holders = {directory.row(support.node): support.name for support in supports}
     for body in bodies:
         base = bases[body.index]
-        rows = directory.layout.rows(-1 - body.index).tolist()
-        other = next((holders[row] for row in rows if row != base and row in holders), None)
+        rows = set(directory.layout.rows(-1 - body.index).tolist()) - slid[body.index] - {base}
+        other = next((holders[row] for row in sorted(rows) if row in holders), None)
         if other is None:
             continue
         if base in holders:
