@@ -211,6 +211,12 @@ void find_end_velocity(const Equations& equations, const StepPlan& plan, const S
   if (plan.rule != StepRule::backward_euler) set_body_velocities(equations.model(), state.v, work.change, plan.dt, v1);
   balance_bodies(equations.problem(), work.newton.data, v1);
   equations.assembler().set_held_part(work.held_velocity, v1);
+  work.follow_gain = 0.0;
+  if (plan.rule == StepRule::backward_euler) return;
+  const double before =
+      equations.model().carried.empty() ? 0.0 : kinetic_energy(equations.model(), equations.mass(), v1);
+  if (follow_held_bodies(equations.problem(), work.z, v1))
+    work.follow_gain = kinetic_energy(equations.model(), equations.mass(), v1) - before;
 }
 
 /// Accounts for the forces and the dissipated energy; full residuals become minus the reactions. Returns the energy
@@ -231,6 +237,7 @@ double account(Equations& equations, const Parameters& parameters, const StepPla
   }
   if (!equations.model().constraints.empty()) {
     work.assumed = data.inertia;
+    result.support_work += work.follow_gain;
     if (conserves) result.support_work += finite_turn_work(equations.problem(), data, work.change, work.working);
     add_support_work(equations, state.v, work.velocity, plan.dt, held_time(plan, state), work, result);
   }

@@ -32,6 +32,7 @@ struct StepResult {
 /// Scratch of a step; owned by the world, so that a step does not allocate.
 struct StepWorkspace {
   NewtonWorkspace newton;
+  double follow_gain = 0;  ///< kinetic energy that nodes of held bodies get from the velocities of supports [J]
   VectorX z, move, change, working, mean, velocity, held_velocity, held_acceleration, assumed, difference,
       whole_acceleration;
   PressureGains pressure;  ///< energy gains of a backward Euler step under `adaptive`

@@ -217,6 +217,13 @@ void add_constraints(Model& model) {
     if (!support.is_hand()) holder.hold(support);
   for (Support& support : model.supports)
     if (support.is_hand()) holder.hold(support);
+  const auto holds = [&](int first) {
+    return std::any_of(model.constraints.begin(), model.constraints.end(),
+                       [&](const Constraint& c) { return c.first == first && c.free.isZero(); });
+  };
+  for (CarriedPart& part : model.carried)
+    part.is_held = part.is_node() && part.slide < 0 && holds(model.node_dof[at(part.base)]) &&
+                   holds(model.frame_dof[at(part.frame)]);
   const auto held = [&](int node) { return holder.nodes()[at(node)]; };
   model.edge_lumped.clear();
   model.edge_held.clear();

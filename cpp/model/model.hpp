@@ -71,6 +71,7 @@ struct CarriedPart {
   // Unknowns: its own, and those of the body (base, frame and slide, or frame and hinge).
   int own_dof = -1, own_size = 0;
   std::vector<int> body_dofs;
+  bool is_held = false;  ///< true of a node whose body a support holds in every direction
 
   bool is_node() const { return node >= 0; }
 };

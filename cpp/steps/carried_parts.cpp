@@ -3,6 +3,8 @@
 #include <cmath>
 
 #include "common/dual.hpp"
+#include "common/hypotenuse.hpp"
+#include "geometry/rotation.hpp"
 
 namespace withe {
 namespace {
@@ -110,7 +112,7 @@ struct PlaneNode {
   void bound(const double (&force)[kOwn], double (&rows)[kBody]) const {
     rows[0] = force[0];
     rows[1] = force[1];
-    rows[2] = std::hypot(arm[0], arm[1]) * (force[0] + force[1]);
+    rows[2] = hypotenuse(arm[0], arm[1]) * (force[0] + force[1]);
   }
 };
 
@@ -266,7 +268,7 @@ struct PlaneSlider {
   void bound(const double (&force)[kOwn], double (&rows)[kBody]) const {
     rows[0] = force[0];
     rows[1] = force[1];
-    rows[2] = (std::hypot(arm[0], arm[1]) + std::abs(start)) * (force[0] + force[1]);
+    rows[2] = (hypotenuse(arm[0], arm[1]) + std::abs(start)) * (force[0] + force[1]);
     rows[3] = force[0] + force[1];
   }
 };
@@ -416,6 +418,27 @@ void expand_step(const StepProblem& problem, const VectorX& z, VectorX& step) {
       kind.place(body, own);
       for (int k = 0; k < Kind::kOwn; ++k) step[part.own_dof + k] = own[k].slope[0];
     });
+}
+
+bool follow_held_bodies(const StepProblem& problem, const VectorX& z, VectorX& velocity) {
+  const Model& model = problem.model;
+  bool any = false;
+  for (const CarriedPart& part : model.carried) {
+    if (!part.is_held) continue;
+    any = true;
+    const int base = part.body_dofs.front(), frame = model.frame_dof[at(part.frame)];
+    if (model.planar()) {
+      const double angle = 2.0 * z[frame] - problem.start->q[frame], c = std::cos(angle), s = std::sin(angle);
+      const double x = part.arm.dot(model.plane->first), y = part.arm.dot(model.plane->second);
+      velocity.segment<2>(part.own_dof) =
+          velocity.segment<2>(base) + velocity[frame] * Vector2(-(s * x + c * y), c * x - s * y);
+    } else {
+      const Vector3 arm = cayley(2.0 * z.segment<3>(frame)) * (problem.start->frame[at(part.frame)] * part.arm);
+      const Vector3 spin = velocity.segment<3>(frame);
+      velocity.segment<3>(part.own_dof) = velocity.segment<3>(base) + spin.cross(arm);
+    }
+  }
+  return any;
 }
 
 }  // namespace withe

@@ -33,4 +33,8 @@ void fold_rows(const StepProblem& problem, const VectorX& z, VectorX& rows, Vect
 /// Sets the displacements of carried parts in a step from z by those of their bodies.
 void expand_step(const StepProblem& problem, const VectorX& z, VectorX& step);
 
+/// Sets the velocities at the end of a midpoint step of nodes whose bodies are held. They have no dynamics of their
+/// own, and the midpoint formula would oscillate for ever. `velocity`: of all unknowns; true if any has changed.
+bool follow_held_bodies(const StepProblem& problem, const VectorX& z, VectorX& velocity);
+
 }  // namespace withe

@@ -482,3 +482,50 @@ def test_small_oscillations_of_a_compound_pendulum() -> None:
     found = scene.build(integrator="static").linearise().frequencies(1)[0]
     expected = np.sqrt(mass * G * arm / (inertia + mass * arm**2)) / (2.0 * np.pi)
     assert found == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("planar", [True, False])
+def test_a_held_body_does_not_ring(planar: bool) -> None:
+    """After a clamp has moved and stopped, its body is at rest, and the reaction is that of a clamp of the rod."""
+    forces, tips = [], []
+    for offset in (None, 0.05):
+        scene = withe.Scene(gravity=(0, 0, 0))
+        rubber = withe.Material(youngs_modulus=1e7, density=1000.0)
+        arm = scene.add_rod(start=(0, 0, 0), end=(0.3, 0, 0), nodes=16, radius=5e-3, material=rubber, normal=(0, 1, 0))
+        if offset is None:
+            hold = scene.clamp(arm.start)
+        else:
+            hub = scene.add_body(mass=0.2, inertia=1e-4, position=(-offset, 0, 0.02))
+            scene.join(arm.start, hub)
+            hold = scene.clamp(hub, at=(0, 0, 0))
+        simulation = scene.build(time_step=1e-3, planar=planar)
+        simulation.move(hold, position=(0.05, 0, 0.02), rotation=(np.cos(0.4), 0, -np.sin(0.4), 0), over=0.05)
+        start = simulation.energy()
+        simulation.step(100)
+        end = simulation.energy()
+        balance = (end.total - end.work + end.dissipated) - (start.total - start.work + start.dissipated)
+        assert abs(balance) < 1e-6 * abs(end.work)
+        if offset is not None:
+            np.testing.assert_allclose(simulation.velocity(hub), 0.0, atol=1e-12)
+        forces.append(simulation.reaction(hold).force)
+        tips.append(simulation.positions(arm)[-1])
+    np.testing.assert_allclose(tips[0], tips[1], atol=1e-8)
+    np.testing.assert_allclose(forces[0], forces[1], atol=1e-6 * np.linalg.norm(forces[0]))
+
+
+def test_a_free_body_is_caught_by_a_clamp() -> None:
+    """A clamp that is put on during a run brings the body to rest, and lets it go again."""
+    scene = withe.Scene()
+    body = scene.add_body(mass=0.2, inertia=1e-4, center=(0, 0, -0.1))
+    hinge = scene.clamp(body, at=(0, 0, 0), spin=(0, 1, 0))
+    simulation = scene.build(time_step=1e-3)
+    simulation.set_velocity(body, angular=(0, 2.0, 0))
+    simulation.step(20)
+    simulation.release(hinge)
+    simulation.step(20)
+    simulation.clamp(body)
+    simulation.step(5)
+    held = simulation.position(body)
+    simulation.step(5)
+    np.testing.assert_allclose(simulation.position(body), held, atol=1e-12)
+    np.testing.assert_allclose(simulation.velocity(body), 0.0, atol=1e-12)

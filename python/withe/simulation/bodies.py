@@ -34,6 +34,16 @@ def _center(session: Session, part: BodyPart) -> int:
     return session.directory.row((-1 - part.index, 0))
 
 
+def base_point(session: Session, node: object) -> FloatArray | None:
+    """Return the point, as drawn, at which a support holds a body of a running scene; None for nodes of rods."""
+    if not isinstance(node, Body | str) or not session.directory.is_body(node):
+        return None
+    part = _find(session, node)
+    rows = session.directory.layout.rows(-1 - part.index)
+    place = int(np.flatnonzero(rows == session.world.body_base(part.index))[0])
+    return session.directory.layout.body_points[part.index][place]
+
+
 def body_rotation(session: Session, body: Body | str) -> FloatArray:
     """Return the axes of a body, (3, 3); see `Simulation.rotation`."""
     part = _find(session, body)

@@ -12,7 +12,7 @@ from withe.parts.friction import Friction
 from withe.parts.handles import Body, NodeHandle, Obstacle, Rod, Support
 from withe.parts.hands import Sliding, make_hand
 from withe.parts.supports import make_clamp, make_pin
-from withe.simulation.bodies import set_body_velocity
+from withe.simulation.bodies import base_point, set_body_velocity
 from withe.simulation.hands import RunningHand, feed_ring, find_hand
 from withe.simulation.motion import PathLike, RotationLike
 from withe.simulation.obstacles import find_obstacle, move_obstacle
@@ -33,26 +33,27 @@ class Placement:
 
     def clamp(
         self,
-        node: NodeHandle | str,
+        node: NodeHandle | Body | str,
         *,
         hold: Literal["frame", "edge"] = "frame",
         free: npt.ArrayLike | None = None,
-        spin: bool = False,
+        spin: bool | npt.ArrayLike = False,
         name: str | None = None,
     ) -> Support:
         """Clamp a node in its present position and direction. See `Scene.clamp`.
 
         Parameters
         ----------
-        node : NodeHandle or str
-            Node to clamp.
+        node : NodeHandle, Body or str
+            Node to clamp, or body, which is held at its base.
         hold : {"frame", "edge"}
             "frame" clamps the rod at the node, as a wall does. "edge" holds the end edge: both of its nodes and its
             angle.
         free : array_like of shape (3,) or (2, 3)
             Directions along which the clamp may slide.
-        spin : bool
-            True if the rod may spin about its tangent, whose direction stays held.
+        spin : bool, or array_like of shape (3,)
+            True if the rod may spin about its tangent, whose direction stays held. For a body the axis about which it
+            may turn, as drawn.
         name : str
             Name of the support. By default "clamp 1", ...
 
@@ -71,15 +72,20 @@ class Placement:
         move : Move the clamp.
         release : Remove the clamp.
         """
-        return put_on(self._session, make_clamp(self._session.directory, node, hold, free, spin, name))
+        return put_on(
+            self._session,
+            make_clamp(self._session.directory, node, hold, free, spin, name, base_point(self._session, node)),
+        )
 
-    def pin(self, node: NodeHandle | str, *, free: npt.ArrayLike | None = None, name: str | None = None) -> Support:
+    def pin(
+        self, node: NodeHandle | Body | str, *, free: npt.ArrayLike | None = None, name: str | None = None
+    ) -> Support:
         """Pin a node in its present position. See `Scene.pin`.
 
         Parameters
         ----------
-        node : NodeHandle or str
-            Node to pin.
+        node : NodeHandle, Body or str
+            Node to pin, or body, which is held at its base.
         free : array_like of shape (3,) or (2, 3)
             Directions along which the pin may slide.
         name : str
@@ -99,7 +105,9 @@ class Placement:
         clamp : Hold the direction of the rod too.
         release : Remove the pin.
         """
-        return put_on(self._session, make_pin(self._session.directory, node, free, name))
+        return put_on(
+            self._session, make_pin(self._session.directory, node, free, name, base_point(self._session, node))
+        )
 
     def grasp(
         self,
