@@ -179,11 +179,13 @@ struct Ground {
 struct Evidence {
   std::vector<std::uint8_t> certain;  ///< by colour, brightness, or darkness that no shadow has
   std::vector<std::uint8_t> dark;     ///< by darkness that a shadow may have
+  BitImage black;                     ///< darker than any shadow
 };
 
 Evidence evidence(const Smoothed& image, const Ground& ground, const std::array<float, 256>& table, int contrast) {
   const std::size_t count = static_cast<std::size_t>(image.height()) * static_cast<std::size_t>(image.width());
-  Evidence score{std::vector<std::uint8_t>(count), std::vector<std::uint8_t>(count)};
+  Evidence score{std::vector<std::uint8_t>(count), std::vector<std::uint8_t>(count),
+                 BitImage(image.height(), image.width())};
   const auto fixed = [](float value) {
     return static_cast<std::uint8_t>(std::clamp(value * static_cast<float>(kStrong), 0.0F, 255.0F));
   };
@@ -191,6 +193,8 @@ Evidence evidence(const Smoothed& image, const Ground& ground, const std::array<
   const auto by_tone = static_cast<float>(1.0 / std::max(kLeastBrightness, kDeviations * ground.brightness));
   const auto by_levels = 1.0F / static_cast<float>(std::max(contrast, 1));
   const auto shadow = static_cast<float>(std::log(kDarkestShadow));
+  // Darker than the darkest shadow on the darkest grain of the ground.
+  const auto black = static_cast<float>(1.0 + kDeviations * ground.brightness / std::abs(std::log(kDarkestShadow)));
   constexpr auto dark = static_cast<float>(kDarkLevel);
   const Surface& s = ground.surface;
   for (int y = 0; y < image.height(); ++y) {
@@ -232,6 +236,7 @@ Evidence evidence(const Smoothed& image, const Ground& ground, const std::array<
       if (tone < 0.5F * shadow) {  // perhaps darker than a shadow: compare levels without kDarkLevel
         const float darker = std::log((here / 3.0F + kBlack) / (std::max(there, 0.0F) / 3.0F + kBlack)) / shadow;
         if (darker > kNearlyDark) found = std::max(found, darker);
+        if (darker > black && difference > static_cast<float>(contrast)) score.black.set(x, y);
       }
       const float limit = difference * by_levels;
       score.certain[first + static_cast<std::size_t>(x)] = fixed(std::min(found, limit));
@@ -266,9 +271,17 @@ std::vector<std::uint8_t> greatest_nearby(const std::vector<std::uint8_t>& score
   return result;
 }
 
+/// Adds the pixels of one image to another one.
+void unite(BitImage& image, const BitImage& more) {
+  for (int y = 0; y < image.height(); ++y) {
+    for (int w = 0; w < image.words(); ++w) image.row(y)[w] |= more.row(y)[w];
+  }
+}
+
 /// Adds the regions of weak pixels with enough strong pixels in them, except where `is_wanted` refuses a region.
 template <class IsWanted>
-void add_regions(const std::vector<std::uint8_t>& score, BitImage& mask, const IsWanted& is_wanted) {
+void add_regions(const std::vector<std::uint8_t>& score, const BitImage& black, BitImage& mask,
+                 const IsWanted& is_wanted) {
   const std::vector<std::uint8_t> nearby = greatest_nearby(score, mask.height(), mask.width());
   std::vector<std::uint8_t> weak(score.size());
   for (std::size_t i = 0; i < score.size(); ++i) {
@@ -279,7 +292,9 @@ void add_regions(const std::vector<std::uint8_t>& score, BitImage& mask, const I
     return score[static_cast<std::size_t>(pixel.y) * static_cast<std::size_t>(mask.width()) +
                  static_cast<std::size_t>(pixel.x)] > kStrong;
   };
-  const BitImage regions = pack(weak.data(), mask.height(), mask.width(), mask.width());
+  BitImage regions = pack(weak.data(), mask.height(), mask.width(), mask.width());
+  // A blurred edge lies between the cable and the ground: black pixels beside a brighter cable are no edge of it.
+  unite(regions, black);
   for_each_region(regions, [&](const std::vector<Pixel>& region) {
     const auto strong = std::count_if(region.begin(), region.end(), is_strong);
     if (strong < kStrongPixels || region.size() < kPixels || !is_wanted(region)) return;
@@ -291,7 +306,7 @@ void add_regions(const std::vector<std::uint8_t>& score, BitImage& mask, const I
 void add_dark_lines(const std::vector<std::uint8_t>& dark, BitImage& mask) {
   BitImage beside = mask;
   for (int i = 0; i < kShadowReach; ++i) beside = dilate(beside);
-  add_regions(dark, mask, [&beside](const std::vector<Pixel>& region) {
+  add_regions(dark, BitImage(mask.height(), mask.width()), mask, [&beside](const std::vector<Pixel>& region) {
     const auto near = std::count_if(region.begin(), region.end(), [&](Pixel p) { return beside.at(p.x, p.y); });
     return static_cast<double>(near) < kShadowShare * static_cast<double>(region.size());
   });
@@ -322,12 +337,16 @@ double line_width(const BitImage& mask) {
 /// fits into a line in any direction, because kThin is less than 1 / sqrt(2).
 constexpr double kThin = 0.65;
 
+/// Regions shorter than this are grain or seams, not cables [widths of most lines].
+constexpr double kShortest = 4.0;
+
 BitImage without_thin_lines(BitImage mask) {
   mask = erode(dilate(mask));
-  const int radius = std::max(1, static_cast<int>(0.5 * (kThin * line_width(mask) - 1.0)));
+  const double width = line_width(mask);
+  const int radius = std::max(1, static_cast<int>(0.5 * (kThin * width - 1.0)));
   for (int i = 0; i < radius; ++i) mask = erode(mask);
   for (int i = 0; i < radius; ++i) mask = dilate(mask);
-  return mask;
+  return without_specks(mask, static_cast<std::size_t>(kShortest * width * width));
 }
 
 }  // namespace
@@ -343,7 +362,7 @@ void ground_mask(const ColorImage& image, int contrast, std::uint8_t* mask) {
   const Ground ground(smoothed, table);
   const Evidence found = evidence(smoothed, ground, table, contrast);
   BitImage cables(image.height, image.width);
-  add_regions(found.certain, cables, [](const std::vector<Pixel>&) { return true; });
+  add_regions(found.certain, found.black, cables, [](const std::vector<Pixel>&) { return true; });
   add_dark_lines(found.dark, cables);
   if (cables.count() > 0) cables = without_thin_lines(std::move(cables));
   unpack(cables, mask);
