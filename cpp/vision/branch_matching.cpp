@@ -43,8 +43,7 @@ class PairSearch {
     double width = 0;
     for (const Branch& branch : branches) width = std::max(width, 2 * branch.half_width);
     touching_ = touching_weight(width > 0 ? 2 * waist / width : 0);
-    // Half of the energy of a turn of 90 degrees within a width.
-    single_ = 0.25 * std::pow(0.5 * std::numbers::pi, 2) / std::max(width, 1.0);
+    single_ = single_energy(width);
     for (int i = 0; i < count_; ++i) {
       for (int j = i + 1; j < count_; ++j) {
         const double energy = pair_energy(branches[static_cast<std::size_t>(i)], branches[static_cast<std::size_t>(j)]);
@@ -56,12 +55,8 @@ class PairSearch {
 
   Matching run() {
     best_.energy = best_.second = best_.plain = best_.second_plain = kForbidden;
-    if (count_ > 10) {
-      run_greedy();
-    } else {
-      used_.assign(static_cast<std::size_t>(count_), 0);
-      descend(0, 0);
-    }
+    used_.assign(static_cast<std::size_t>(count_), 0);
+    descend(0, 0);
     return best_;
   }
 
@@ -112,24 +107,6 @@ class PairSearch {
     return (turn(pairs_[1].first) < end) != (turn(pairs_[1].second) < end);
   }
 
-  void run_greedy() {
-    std::vector<std::pair<double, std::pair<int, int>>> candidates;
-    for (int i = 0; i < count_; ++i) {
-      for (int j = i + 1; j < count_; ++j) {
-        if (energy(i, j) < 2 * single_) candidates.push_back({energy(i, j), {i, j}});
-      }
-    }
-    std::sort(candidates.begin(), candidates.end());
-    std::vector<char> used(static_cast<std::size_t>(count_), 0);
-    for (const auto& [energy, pair] : candidates) {
-      char& a = used[static_cast<std::size_t>(pair.first)];
-      char& b = used[static_cast<std::size_t>(pair.second)];
-      if (a || b) continue;
-      a = b = 1;
-      best_.pairs.push_back(pair);
-    }
-  }
-
   const std::vector<Branch>& branches_;
   int count_;
   double single_ = 0;
@@ -140,7 +117,108 @@ class PairSearch {
   Matching best_;
 };
 
+/// Depth-first search for the pairs of least energy, with a lower bound for the ends that are still open.
+class EndSearch {
+ public:
+  EndSearch(const std::vector<double>& singles, const std::vector<std::vector<std::pair<double, int>>>& partners)
+      : singles_(singles), partners_(partners), partner_(singles.size(), -1), used_(singles.size(), 0) {}
+
+  /// Adds the pairs of one group of ends to `pairs`.
+  void run(const std::vector<int>& group, std::vector<std::pair<int, int>>& pairs) {
+    group_ = group;
+    // Each end costs at least as much as alone, or half of its cheapest pair.
+    rest_.assign(group.size() + 1, 0.0);
+    for (std::size_t i = group.size(); i-- > 0;) {
+      double least = singles_[at(group[i])];
+      if (!partners_[at(group[i])].empty()) least = std::min(least, 0.5 * partners_[at(group[i])].front().first);
+      rest_[i] = rest_[i + 1] + least;
+    }
+    bound_.assign(singles_.size(), 0.0);
+    for (std::size_t i = 0; i < group.size(); ++i) bound_[at(group[i])] = rest_[i] - rest_[i + 1];
+    best_ = kForbidden;
+    steps_ = 0;
+    double open = rest_.front();
+    descend(0, 0, open);
+    for (const int a : group) {
+      if (best_partner_[at(a)] > a) pairs.emplace_back(a, best_partner_[at(a)]);
+    }
+  }
+
+ private:
+  void descend(std::size_t next, double sum, double open) {
+    constexpr int most_steps = 50'000;  // the best pairs come first, so that what is found until then is good
+    if (sum + open >= best_ || (++steps_ > most_steps && best_ < kForbidden)) return;
+    while (next < group_.size() && used_[at(group_[next])]) ++next;
+    if (next == group_.size()) {
+      best_ = sum;
+      best_partner_ = partner_;
+      return;
+    }
+    const int a = group_[next];
+    used_[at(a)] = 1;
+    const double without = open - bound_[at(a)];
+    bool alone = false;
+    const auto stay_alone = [&] {
+      alone = true;
+      descend(next + 1, sum + singles_[at(a)], without);
+    };
+    for (const auto& [energy, b] : partners_[at(a)]) {
+      if (used_[at(b)]) continue;
+      if (!alone && energy > singles_[at(a)] + singles_[at(b)]) stay_alone();
+      used_[at(b)] = 1;
+      partner_[at(a)] = b;
+      partner_[at(b)] = a;
+      descend(next + 1, sum + energy, without - bound_[at(b)]);
+      partner_[at(a)] = partner_[at(b)] = -1;
+      used_[at(b)] = 0;
+    }
+    if (!alone) stay_alone();
+    used_[at(a)] = 0;
+  }
+
+  const std::vector<double>& singles_;
+  const std::vector<std::vector<std::pair<double, int>>>& partners_;
+  std::vector<int> group_;
+  std::vector<double> rest_, bound_;
+  std::vector<int> partner_, best_partner_;
+  std::vector<char> used_;
+  double best_ = kForbidden;
+  int steps_ = 0;
+};
+
 }  // namespace
+
+double single_energy(double width) { return 0.25 * std::pow(0.5 * std::numbers::pi, 2) / std::max(width, 1.0); }
+
+std::vector<std::pair<int, int>> pair_ends(const std::vector<double>& singles, std::vector<PairCandidate> candidates) {
+  constexpr std::size_t most_partners = 6;
+  std::sort(candidates.begin(), candidates.end(),
+            [](const PairCandidate& a, const PairCandidate& b) { return a.energy < b.energy; });
+  std::vector<std::vector<std::pair<double, int>>> partners(singles.size());
+  for (const PairCandidate& pair : candidates) {
+    auto &of_a = partners[at(pair.a)], &of_b = partners[at(pair.b)];
+    if (of_a.size() >= most_partners || of_b.size() >= most_partners) continue;
+    of_a.emplace_back(pair.energy, pair.b);
+    of_b.emplace_back(pair.energy, pair.a);
+  }
+  std::vector<std::pair<int, int>> pairs;
+  std::vector<char> seen(singles.size(), 0);
+  EndSearch search(singles, partners);
+  for (std::size_t start = 0; start < singles.size(); ++start) {
+    if (seen[start] || partners[start].empty()) continue;
+    std::vector<int> group{static_cast<int>(start)};
+    seen[start] = 1;
+    for (std::size_t i = 0; i < group.size(); ++i) {
+      for (const auto& [energy, other] : partners[at(group[i])]) {
+        if (seen[at(other)]) continue;
+        seen[at(other)] = 1;
+        group.push_back(other);
+      }
+    }
+    search.run(group, pairs);
+  }
+  return pairs;
+}
 
 double bending_energy(const Branch& from, const Branch& to) {
   const Vector2 chord = to.point - from.point;
@@ -163,6 +241,32 @@ double bending_energy(const Branch& from, const Branch& to) {
   return 0.25 * straight + 0.75 * scale * (c * c + c * d + d * d);
 }
 
-Matching match_branches(const std::vector<Branch>& branches, double waist) { return PairSearch(branches, waist).run(); }
+Matching match_branches(const std::vector<Branch>& branches, double waist) {
+  constexpr std::size_t most_branches = 10;  // the second best matching costs all combinations
+  if (branches.size() <= most_branches) return PairSearch(branches, waist).run();
+  Matching matching;
+  matching.energy = matching.second = matching.plain = matching.second_plain = kForbidden;
+  matching.pairs = match_ends(branches).pairs;
+  return matching;
+}
+
+EndMatching match_ends(const std::vector<Branch>& branches) {
+  double width = 0;
+  for (const Branch& branch : branches) width = std::max(width, 2 * branch.half_width);
+  const std::vector<double> singles(branches.size(), single_energy(width));
+  std::vector<PairCandidate> candidates;
+  for (std::size_t i = 0; i < branches.size(); ++i) {
+    for (std::size_t j = i + 1; j < branches.size(); ++j) {
+      const double energy = pair_energy(branches[i], branches[j]);
+      if (energy < 2 * singles[i]) candidates.push_back({static_cast<int>(i), static_cast<int>(j), energy});
+    }
+  }
+  EndMatching result;
+  result.pairs = pair_ends(singles, candidates);
+  const auto count = static_cast<double>(branches.size() - 2 * result.pairs.size());
+  result.energy = count * single_energy(width);
+  for (const auto& [a, b] : result.pairs) result.energy += pair_energy(branches[at(a)], branches[at(b)]);
+  return result;
+}
 
 }  // namespace withe

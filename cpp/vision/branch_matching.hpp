@@ -27,4 +27,24 @@ struct Matching {
 /// as much as a sharp turn. `waist` is the half width of the mask at its narrowest place between the branches [px].
 Matching match_branches(const std::vector<Branch>& branches, double waist);
 
+/// Energy of an end without partner: half of that of a turn of 90 degrees within a width [1/px].
+double single_energy(double width);
+
+struct PairCandidate {
+  int a = -1;
+  int b = -1;
+  double energy = 0;
+};
+
+/// Pairs ends so that the sum of the energies of all pairs and of all single ends is least. `singles` holds the energy
+/// of each end without partner. Only the six best candidates of each end are considered.
+std::vector<std::pair<int, int>> pair_ends(const std::vector<double>& singles, std::vector<PairCandidate> candidates);
+
+/// Pairs branches by least energy, without the assumptions about touching cables.
+struct EndMatching {
+  std::vector<std::pair<int, int>> pairs;
+  double energy = 0;  ///< with the energy of single ends [1/px]
+};
+EndMatching match_ends(const std::vector<Branch>& branches);
+
 }  // namespace withe

@@ -9,6 +9,7 @@
 
 #include "vision/branch_matching.hpp"
 #include "vision/parallel_strands.hpp"
+#include "vision/zone_growth.hpp"
 
 namespace withe {
 
@@ -384,6 +385,19 @@ std::vector<Branch> measure_branches(const SkeletonGraph& graph, const ZoneOptio
   return branches;
 }
 
+Branch measure_tip(const SkeletonGraph& graph, HalfEdge tip, const ZoneOptions& options) {
+  const SkeletonEdge& edge = graph.edges[at(edge_of(tip))];
+  const int end = end_of(tip);
+  const int n = static_cast<int>(edge.points.size());
+  const double half_width = inner_half_width(edge);
+  constexpr double narrow = 0.87;
+  int skip = std::min(n / 3, static_cast<int>(half_width));
+  while (skip < n / 2 && edge.points[at(end == 0 ? skip : n - 1 - skip)].half_width < narrow * half_width) ++skip;
+  const int other_node = edge.nodes[at(1 - end)];
+  const int skip_other = distorted_pixels(edge, 1 - end, graph.nodes[at(other_node)]);
+  return measure_branch(graph, edge, end, skip, std::min(skip_other, n - 1 - skip), options.tangent_length);
+}
+
 Continuations find_continuations(const SkeletonGraph& graph, const ZoneOptions& options, const ColorImage* image) {
   const std::vector<Branch> branches = measure_branches(graph, options);
   std::vector<char> known_links(graph.edges.size(), 0);
@@ -397,7 +411,9 @@ Continuations find_continuations(const SkeletonGraph& graph, const ZoneOptions& 
     ZoneFinder(graph, options, result).run(known_links);
     for (const Zone& zone : result.zones) match_zone(zone, options, result);
     for (const SideBySide& strands : result.side_by_side) split_side_by_side(graph, strands, image, result);
-    if (!find_split_crossings(graph, options, result, known_links)) return result;
+    if (!find_split_crossings(graph, options, result, known_links) && !grow_zones(graph, result, known_links)) {
+      return result;
+    }
   }
 }
 

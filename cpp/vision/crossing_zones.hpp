@@ -39,7 +39,7 @@ struct SideBySide {
 };
 
 /// Reason why a result is uncertain.
-enum class Doubt { similar_energies, parallel_strands };
+enum class Doubt { similar_energies, parallel_strands, different_colors };
 
 struct DoubtfulZone {
   Vector2 point = Vector2::Zero();
@@ -68,6 +68,9 @@ struct Continuations {
 
 /// Point and direction of both ends of every edge.
 std::vector<Branch> measure_branches(const SkeletonGraph& graph, const ZoneOptions& options);
+
+/// A tip without the part where it is narrower than its edge: an oblique cut shortens it and pulls its skeleton aside.
+Branch measure_tip(const SkeletonGraph& graph, HalfEdge tip, const ZoneOptions& options);
 
 /// The picture, if there is one, is used to distinguish strands that lie side by side.
 Continuations find_continuations(const SkeletonGraph& graph, const ZoneOptions& options,
