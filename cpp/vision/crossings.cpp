@@ -85,9 +85,39 @@ std::vector<Crossing> meetings(const std::vector<Cable>& cables, const Reach& a,
   return found;
 }
 
+/// Crossings of a hidden stretch with all cables, unless they are known.
+void cross_beneath(const std::vector<Cable>& cables, const Reach& bridge, std::vector<Crossing>& crossings) {
+  const auto own = static_cast<std::size_t>(bridge.stretch.cable);
+  const double width = cables[own].widths[at(wrap(cables[own], bridge.stretch.first))];
+  const auto cross_rows = [&](std::size_t c, int first, int last) {
+    if (last <= first) return;
+    const Reach whole{{-1, static_cast<int>(c), first, last}, {bridge.box.low, bridge.box.high}};
+    const std::vector<Crossing> found = meetings(cables, whole, bridge);
+    if (found.size() % 2 == 0) return;
+    const Crossing& middle = found[found.size() / 2];
+    const auto is_known = [&](const Crossing& other) {
+      const bool pair = (other.over.cable == middle.over.cable && other.under.cable == middle.under.cable) ||
+                        (other.over.cable == middle.under.cable && other.under.cable == middle.over.cable);
+      return pair && (other.point - middle.point).norm() < 2 * width;
+    };
+    if (std::none_of(crossings.begin(), crossings.end(), is_known)) crossings.push_back(middle);
+  };
+  for (std::size_t c = 0; c < cables.size(); ++c) {
+    const int n = static_cast<int>(cables[c].centreline.rows());
+    if (c != own) {
+      cross_rows(c, 0, cables[c].closed ? n : n - 1);
+    } else if (!cables[c].closed) {  // the rows beside the stretch belong to it
+      const int beside = static_cast<int>(width);
+      cross_rows(c, 0, bridge.stretch.first - beside);
+      cross_rows(c, bridge.stretch.last + beside, n - 1);
+    }
+  }
+}
+
 }  // namespace
 
-std::vector<Crossing> find_crossings(const std::vector<Cable>& cables, const std::vector<HiddenStretch>& stretches) {
+std::vector<Crossing> find_crossings(const std::vector<Cable>& cables, const std::vector<HiddenStretch>& stretches,
+                                     int first_bridge) {
   std::vector<HiddenStretch> sorted = stretches;
   std::stable_sort(sorted.begin(), sorted.end(),
                    [](const HiddenStretch& a, const HiddenStretch& b) { return a.zone < b.zone; });
@@ -105,6 +135,9 @@ std::vector<Crossing> find_crossings(const std::vector<Cable>& cables, const std
       const std::vector<Crossing> found = meetings(cables, reaches[i], reaches[j]);
       if (found.size() % 2 == 1) crossings.push_back(found[found.size() / 2]);
     }
+  }
+  for (const Reach& bridge : reaches) {
+    if (bridge.stretch.zone >= first_bridge) cross_beneath(cables, bridge, crossings);
   }
   return crossings;
 }

@@ -9,7 +9,9 @@
 namespace withe {
 
 /// Crossings of cables inside zones. Two cables that meet an even number of times within one zone only touch there.
-std::vector<Crossing> find_crossings(const std::vector<Cable>& cables, const std::vector<HiddenStretch>& stretches);
+/// From zone `first_bridge` on, a zone is a stretch of one cable beneath others, which are visible there.
+std::vector<Crossing> find_crossings(const std::vector<Cable>& cables, const std::vector<HiddenStretch>& stretches,
+                                     int first_bridge);
 
 /// First hit of a ray on one of the stretches; `row` is -1 where it meets none within `longest`.
 struct RayHit {

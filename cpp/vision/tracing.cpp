@@ -2,12 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "vision/cable_ends.hpp"
 #include "vision/cable_fit.hpp"
 #include "vision/cable_paths.hpp"
 #include "vision/crossings.hpp"
+#include "vision/hidden_bridges.hpp"
 #include "vision/skeleton_graph.hpp"
+#include "vision/strand_classes.hpp"
 #include "vision/strand_seams.hpp"
 #include "vision/thinning.hpp"
 
@@ -106,6 +109,39 @@ std::vector<std::vector<Vector2>> grow_tips(const BitImage& mask, SkeletonGraph&
     }
   }
   return ends;
+}
+
+SkeletonGraph find_graph(const BitImage& mask, const TraceOptions& options) {
+  SkeletonGraph graph = build_graph(thin(mask), mask, 200);
+  prune_spurs(graph, options.spur_ratio);
+  return graph;
+}
+
+/// Pieces of a cable that are shorter have no direction [widths].
+constexpr double kShortestPiece = 2.2;
+
+/// At a straight cut the skeleton forks to both corners, which are sqrt(2) half widths away, and ends a pixel or two
+/// before them or behind the fork [half widths].
+constexpr double kSpurRatioOfPieces = 2.2;
+
+/// Shortest cable in a mask that is cut between colours [widths].
+constexpr double kShortestOfColors = 6;
+
+/// The skeleton with a single pixel, in the middle, of each region of the mask up to an area [px^2].
+BitImage shrink_pieces(BitImage skeleton, const BitImage& mask, double area) {
+  for_each_region(mask, [&](const std::vector<Pixel>& region) {
+    if (static_cast<double>(region.size()) > area) return;
+    Vector2 middle = Vector2::Zero();
+    for (const Pixel p : region) middle += Vector2(p.x, p.y);
+    middle /= static_cast<double>(region.size());
+    Pixel nearest = region.front();
+    for (const Pixel p : region) {
+      skeleton.clear(p.x, p.y);
+      if ((Vector2(p.x, p.y) - middle).norm() < (Vector2(nearest.x, nearest.y) - middle).norm()) nearest = p;
+    }
+    skeleton.set(nearest.x, nearest.y);
+  });
+  return skeleton;
 }
 
 struct CableEnd {
@@ -211,32 +247,58 @@ Tracing trace_lines(const BitImage& mask, const TraceOptions& options, const Col
   Stopwatch watch(tracing.timings);
   if (!has_width(mask)) return tracing;
   BitImage smoothed = smooth(mask);
+  BitImage lines = smoothed;
+  const BitImage smooth_mask = image != nullptr ? smoothed : BitImage();
   watch.lap("smooth");
-  BitImage skeleton = thin(smoothed);
+  BitImage skeleton = thin(lines);
   watch.lap("thin");
-  SkeletonGraph graph = build_graph(skeleton, smoothed, 200);
+  SkeletonGraph graph = build_graph(skeleton, lines, 200);
   prune_spurs(graph, options.spur_ratio);
   watch.lap("graph");
-  if (cut_seams(graph, options.zones, image, smoothed, tracing.doubts)) {
-    skeleton = thin(smoothed);
-    graph = build_graph(skeleton, smoothed, 200);
-    prune_spurs(graph, options.spur_ratio);
+  if (cut_seams(graph, options.zones, image, lines, tracing.doubts)) {
+    graph = find_graph(lines, options);
+    smoothed = lines;
   }
   watch.lap("strands");
   Continuations links = find_continuations(graph, options.zones, image);
-  tracing.doubts.insert(tracing.doubts.end(), links.doubts.begin(), links.doubts.end());
   watch.lap("cross");
+  int first_bridge = static_cast<int>(links.zones.size());
+  std::optional<StrandClasses> classes;
+  if (image != nullptr && contradicts_colors(*image, graph, links)) {
+    classes.emplace(*image, graph, smooth_mask);
+    if (classes->cut(lines)) {
+      classes->cut(smoothed);
+      const double width = 2 * typical_half_width(graph);
+      skeleton = shrink_pieces(thin(lines), lines, kShortestPiece * width * width);
+      graph = build_graph(skeleton, lines, 200);
+      prune_spurs(graph, kSpurRatioOfPieces);
+      links = find_continuations(graph, options.zones, image);
+      first_bridge = static_cast<int>(links.zones.size());
+      bridge_hidden(graph, smooth_mask, *image, *classes, options.zones, links);
+    }
+    watch.lap("colours");
+  }
+  tracing.doubts.insert(tracing.doubts.end(), links.doubts.begin(), links.doubts.end());
 
-  const double shortest = std::max(options.shortest_cable * 2 * typical_half_width(graph), options.shortest_line);
-  const auto ends = grow_tips(smoothed, graph, links, shortest);
+  // A shadow in the mask has a colour of its own too: a short piece that continues no other is not a cable.
+  const double widths = classes ? kShortestOfColors : options.shortest_cable;
+  const double shortest = std::max(widths * 2 * typical_half_width(graph), options.shortest_line);
+  auto ends = grow_tips(smoothed, graph, links, shortest);
   bridge_gaps(links, ends, options.gaps);
+  if (classes) {
+    for (std::size_t h = 0; h < ends.size(); ++h) {
+      if (links.zone_of[h] < 0 && links.partner[h] < 0) {
+        extend_beneath(smooth_mask, *classes, links.branches[h].half_width, ends[h]);
+      }
+    }
+  }
   const std::vector<CablePath> paths = collect_paths(graph, links);
   watch.lap("paths");
 
   const Found found{smoothed, options, graph, links};
   Outlines outlines = outline_cables(found, paths, ends, shortest, tracing.cables);
   join_flanks(found, outlines, tracing);
-  tracing.crossings = find_crossings(tracing.cables, outlines.stretches);
+  tracing.crossings = find_crossings(tracing.cables, outlines.stretches, first_bridge);
   watch.lap("fit");
   return tracing;
 }

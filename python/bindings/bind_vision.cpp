@@ -49,6 +49,18 @@ py::array_t<double> points_array(const MatrixX2& points) {
 
 py::tuple row_tuple(const CableRow& row) { return py::make_tuple(row.cable, row.row); }
 
+const char* reason_of(Doubt doubt) {
+  switch (doubt) {
+    case Doubt::similar_energies:
+      return "similar energies";
+    case Doubt::parallel_strands:
+      return "parallel strands";
+    case Doubt::different_colors:
+      return "different colors";
+  }
+  return "unknown";
+}
+
 /// Plain Python objects: the Python layer makes its own of them.
 py::dict to_python(const Tracing& tracing, const py::array_t<std::int32_t>& labels) {
   py::list centrelines, widths, closed, crossings, joints, doubts;
@@ -65,7 +77,7 @@ py::dict to_python(const Tracing& tracing, const py::array_t<std::int32_t>& labe
     joints.append(py::make_tuple(joint.point.x(), joint.point.y(), row_tuple(joint.end), row_tuple(joint.through)));
   }
   for (const DoubtfulZone& doubt : tracing.doubts) {
-    const char* reason = doubt.reason == Doubt::similar_energies ? "similar energies" : "parallel strands";
+    const char* reason = reason_of(doubt.reason);
     doubts.append(py::make_tuple(doubt.point.x(), doubt.point.y(), reason));
   }
   py::dict timings;

@@ -62,6 +62,8 @@ class Ambiguity:
     ----------
     point : ndarray of shape (2,) [px]
     reason : str
+        "similar energies": another way to pair the branches bends the cables hardly more. "parallel strands": cables
+        lie side by side. "different colors": a cable continues in a clearly different colour.
     """
 
     point: Array
