@@ -138,6 +138,19 @@ TEST(TraceLines, AStrandContinuesBeneathTwoOthersAndCrossesBoth) {
   EXPECT_EQ(tracing.crossings.size(), 2);
 }
 
+TEST(TraceLines, WavesOnTheBorderAddNoCable) {
+  BitImage mask(200, 300);
+  for (int x = 30; x < 270; ++x) {
+    const double up = 1.5 * std::sin(0.9 * x) + std::sin(2.3 * x + 1),
+                 down = 1.5 * std::cos(0.8 * x) + std::sin(2.7 * x);
+    for (int y = 0; y < 200; ++y) {
+      if (y > 95 + up && y < 105 + down) mask.set(x, y);
+      if (x > 50 && x < 250 && std::abs(x - 150 - 0.2 * (y - 100)) < 5 + 0.5 * (up - down)) mask.set(x, y);
+    }
+  }
+  EXPECT_EQ(trace_lines(mask, {}).cables.size(), 2);
+}
+
 /// Least energy of all pairings, by trying every partner of the first open end.
 double least_energy(const std::vector<double>& singles, const std::vector<PairCandidate>& candidates,
                     std::vector<char>& used) {
