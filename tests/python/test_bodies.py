@@ -220,7 +220,7 @@ P = {"at": (0.25, 0, 0)}
         (
             ("arm.end", "palm", "welded"),
             {},
-            "kind of the joint must be 'rigid' or 'pinned' or 'revolute', got 'welded'",
+            "kind of the joint must be 'rigid' or 'pinned' or 'revolute' or 'sliding', got 'welded'",
         ),
     ],
 )

@@ -61,7 +61,7 @@ def _rows(scene: Any, section: Section, call: Declaration) -> Iterator[dict[str,
     given = dict(call.arguments)
     if call.method == "join":
         others = [given.pop("a"), given.pop("b"), *given.pop("others", ())]
-        if others[-1] in get_args(JoinKind):
+        if others[-1] in get_args(JoinKind) and others[-1] not in scene._directory.parts:
             given["kind"] = others.pop()
         pairs = [scene._directory.parts[name].node_names for name in call.names]
     # Keys in the order of the documentation; those of `actuate` that are not in its signature come last.
