@@ -133,17 +133,25 @@ void Equations::evaluate(const VectorX& z, bool with_matrix, const double* axial
     std::fill(values.begin(), values.end(), 0.0);
   }
   for (const std::unique_ptr<Term>& term : terms_.all) term->add(problem_, data, assembler_, values);
-  if (!model().carried.empty()) {
-    if (with_matrix)
-      fold_rows(problem_, data.z, data.gradient, data.row_magnitude, data.carrying);
-    else
-      fold_rows(problem_, data.z, data.gradient, data.row_magnitude);
-    if (with_matrix) assembler_.fold_carried(data.carrying);
-  }
+  if (!model().carried.empty()) fold(data, values);
   finish(data);
   if (with_matrix && !problem_.exact) assembler_.project_matrix();
   data.axial_force = nullptr;
   data.contact = nullptr;
+}
+
+/// Adds the rows of parts that bodies carry to those of the bodies, and their derivatives where there is a matrix.
+void Equations::fold(StepData& data, std::span<double> values) {
+  // Like discrete gradients, these are moments: in a plane they do their work over the finite turn of a step.
+  const bool moments = problem_.conserves_energy() && model().planar();
+  if (moments) data.elastic_rows -= data.gradient.head(model().dof_count);
+  if (values.empty()) {
+    fold_rows(problem_, data.z, data.gradient, data.row_magnitude);
+  } else {
+    fold_rows(problem_, data.z, data.gradient, data.row_magnitude, data.carrying);
+    assembler_.fold_carried(data.carrying);
+  }
+  if (moments) data.elastic_rows += data.gradient.head(model().dof_count);
 }
 
 void Equations::finish(StepData& data) const {

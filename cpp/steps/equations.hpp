@@ -124,6 +124,7 @@ class Equations {
   void set_parameters(const Parameters& parameters);
   void clear(const VectorX& z, StepData& data) const;
   void find(StepData& data, bool with_matrix);
+  void fold(StepData& data, std::span<double> values);
   void finish(StepData& data) const;
   void order_for_contacts();
   void remember(EquationsMemory& out, bool with_matrix) const;
