@@ -142,7 +142,7 @@ OK = {"mass": 1.0, "inertia": 1.0}
         ({"mass": 1.0}, "body 'b' must have mass= and inertia="),
         ({"solid": Sphere(1.0), "mass": 1.0, "density": 1.0}, "either density= or mass=, got both"),
         ({"solid": Sphere(1.0)}, "either density= or mass=, got neither"),
-        ({"solid": Sphere(1.0), "mass": 1.0, "inertia": 1.0}, "follow from its solid"),
+        ({"solid": Sphere(1.0), "mass": 1.0, "center": (0, 0, 1)}, "center of body .b. follows from its solid"),
         ({"solid": Sphere(1.0), "density": 0.0}, "density of body 'b' must be positive, got 0"),
         ({"density": 1.0, **OK}, "density of body 'b' needs a solid"),
         ({"solid": (1, 2, 3), "density": 1.0}, "solid of body 'b' must be one of withe.solids, .* got \\(1, 2, 3\\)"),
