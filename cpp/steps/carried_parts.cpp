@@ -4,6 +4,7 @@
 
 #include "common/dual.hpp"
 #include "common/hypotenuse.hpp"
+#include "elasticity/discrete_elements.hpp"
 #include "geometry/rotation.hpp"
 
 namespace withe {
@@ -143,17 +144,18 @@ struct HingedFrame {
     const Vec3<Scalar> out = Scalar(1.0 / rate) * whole(w, turn(body[3]));
     for (int i = 0; i < 3; ++i) own[i] = out[i];
   }
-  /// Change of the Cayley vector by the turn about the hinge, over this turn.
+  /// Change of the Cayley vector by the turn about the hinge, over this turn, with the derivatives of `hinge_arm`.
   template <class Scalar>
   Vec3<Scalar> arm(const Vec3<Scalar>& w, const Scalar& turn) const {
-    const double v = value_of(turn), t = std::tan(0.5 * v);
-    const bool little = std::abs(v) < 1e-4;
-    const Scalar tangent = chain(turn, t, 0.5 * (1.0 + t * t));
-    const Scalar factor = chain(turn, little ? 1.0 + v * v / 12.0 : 2.0 * t / v,
-                                little ? v / 6.0 : ((1.0 + t * t) * v - 2.0 * t) / (v * v));
-    const Vec3<Scalar> n = constant<Scalar>(axis), x = Scalar(0.5) * w;
-    const Scalar along = dot(x, n);
-    return (factor / (1.0 - along * tangent)) * (n + cross(x, n) + along * x);
+    const Vector3 at(value_of(w.x), value_of(w.y), value_of(w.z));
+    const HingeArm h = hinge_arm(at, to_eigen(axis), value_of(turn));
+    const Vec3<Scalar> apart = w - constant<Scalar>(to_vec3(at));
+    const Scalar turned_on = turn - value_of(turn);
+    const auto component = [&](int i) -> Scalar {
+      return h.arm(i) + h.by_frame(i, 0) * apart.x + h.by_frame(i, 1) * apart.y + h.by_frame(i, 2) * apart.z +
+             h.by_angle(i) * turned_on;
+    };
+    return {component(0), component(1), component(2)};
   }
   template <class Scalar>
   void act(const Scalar (&body)[kBody], const double (&force)[kOwn], Scalar (&rows)[kBody]) const {
