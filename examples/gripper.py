@@ -3,8 +3,8 @@
 Limbs of silicone get a random natural curvature each, which grows over ten seconds; from then on they hold each other.
 The scene is that of section 6.4.1.2 of Choi's dissertation, with friction and without, except for the curvature. The
 dissertation draws it for each stencil alone, which kinks the limbs; here it is drawn at twelve points of a limb and
-interpolated. The example fails when limbs overlap by more than a twentieth of their radius, when the energy grows, or
-when a second run gives other bits.
+interpolated. The example fails when limbs overlap by more than a twentieth of their radius, when energy is gained
+beyond the work, or when a second run gives other bits.
 
 Writes out/gripper.png.
 """

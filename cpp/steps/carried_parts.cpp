@@ -1,5 +1,6 @@
 #include "steps/carried_parts.hpp"
 
+#include <array>
 #include <cmath>
 
 #include "common/dual.hpp"
@@ -41,81 +42,6 @@ template <class Scalar>
 Vec3<Scalar> moment_of_row(const Vec3<Scalar>& w, const Vec3<Scalar>& row) {
   return row + Scalar(0.5) * cross(w, row) + (Scalar(0.25) * dot(w, row)) * w;
 }
-
-/// A node of a body in space, by the base and by w at z. `start`: its arm at the start of the step.
-struct SpaceNode {
-  static constexpr int kOwn = 3, kBody = 6;
-  BodyRule rule;
-  Vec3d start;
-
-  template <class Scalar>
-  Vec3<Scalar> lever(const Vec3<Scalar>& w) const {
-    const Vec3<Scalar> a = constant<Scalar>(start);
-    if (!rule.in_middle) return turned(w, a);
-    return Scalar(0.5) * (a + turned(Scalar(2.0) * w, a));
-  }
-  template <class Scalar>
-  void place(const Scalar (&body)[kBody], Scalar (&own)[kOwn]) const {
-    const Vec3<Scalar> arm = lever(Vec3<Scalar>{body[3], body[4], body[5]});
-    for (int i = 0; i < 3; ++i) own[i] = body[i] + arm[i];
-  }
-  template <class Scalar>
-  void act(const Scalar (&body)[kBody], const double (&force)[kOwn], Scalar (&rows)[kBody]) const {
-    const Vec3<Scalar> w{body[3], body[4], body[5]};
-    const Vec3<Scalar> moment = cross(lever(w), constant<Scalar>({force[0], force[1], force[2]}));
-    const Vec3<Scalar> row = rule.are_moments ? moment : row_of_moment(w, moment);
-    for (int i = 0; i < 3; ++i) {
-      rows[i] = Scalar(force[i]);
-      rows[3 + i] = row[i];
-    }
-  }
-  /// Bounds on the rows by those of the forces.
-  void bound(const double (&force)[kOwn], double (&rows)[kBody]) const {
-    const double length = std::sqrt(dot(start, start));
-    const double moment = length * (force[0] + force[1] + force[2]);
-    for (int i = 0; i < 3; ++i) {
-      rows[i] = force[i];
-      rows[3 + i] = moment;
-    }
-  }
-};
-
-/// The same in a plane, by the base and the angle at z.
-struct PlaneNode {
-  static constexpr int kOwn = 2, kBody = 3;
-  BodyRule rule;
-  double arm[2], start_angle;
-
-  template <class Scalar>
-  Vec3<Scalar> turned_arm(const Scalar& angle) const {
-    const double c = std::cos(value_of(angle)), s = std::sin(value_of(angle));
-    const Scalar cosine = chain(angle, c, -s), sine = chain(angle, s, c);
-    return {arm[0] * cosine - arm[1] * sine, arm[0] * sine + arm[1] * cosine, Scalar(0.0)};
-  }
-  template <class Scalar>
-  Vec3<Scalar> lever(const Scalar& angle) const {
-    if (!rule.in_middle) return turned_arm(angle);
-    return Scalar(0.5) * (turned_arm(Scalar(start_angle)) + turned_arm(Scalar(2.0 * angle - start_angle)));
-  }
-  template <class Scalar>
-  void place(const Scalar (&body)[kBody], Scalar (&own)[kOwn]) const {
-    const Vec3<Scalar> at = lever(body[2]);
-    own[0] = body[0] + at.x;
-    own[1] = body[1] + at.y;
-  }
-  template <class Scalar>
-  void act(const Scalar (&body)[kBody], const double (&force)[kOwn], Scalar (&rows)[kBody]) const {
-    const Vec3<Scalar> at = lever(body[2]);
-    rows[0] = Scalar(force[0]);
-    rows[1] = Scalar(force[1]);
-    rows[2] = at.x * force[1] - at.y * force[0];
-  }
-  void bound(const double (&force)[kOwn], double (&rows)[kBody]) const {
-    rows[0] = force[0];
-    rows[1] = force[1];
-    rows[2] = hypotenuse(arm[0], arm[1]) * (force[0] + force[1]);
-  }
-};
 
 /// The frame of a body on a hinge, by the frame that carries it and the angle at z. `axis`: at the start of the step.
 struct HingedFrame {
@@ -178,38 +104,47 @@ struct HingedFrame {
   }
 };
 
-/// A node on a slide of a body in space, by the base, w and the coordinate s of the slide at z. With L the mean of its
+/// A node of a body in space, by the base, w and, if it is on a slide, its coordinate s at z. With L the mean of its
 /// levers R (a + s n) at both ends, a step changes its lever exactly by
 ///   R1 (a + s1 n) - R0 (a + s0 n) = w x L + (n0 + w x n0 / 2) (s1 - s0),    n0 = R0 n.
-struct SpaceSlider {
-  static constexpr int kOwn = 3, kBody = 7;
+template <bool slides>
+struct SpaceNode {
+  static constexpr int kOwn = 3, kBody = slides ? 7 : 6;
   BodyRule rule;
   Vec3d arm, axis;  ///< turned to the start of the step
   double start;     ///< coordinate at the start
 
   template <class Scalar>
-  Vec3<Scalar> lever(const Vec3<Scalar>& w, const Scalar& s) const {
-    const Vec3<Scalar> a = constant<Scalar>(arm), n = constant<Scalar>(axis);
-    if (!rule.in_middle) return turned(w, a + s * n);
-    const Vec3<Scalar> end = turned(Scalar(2.0) * w, a + Scalar(2.0 * s - start) * n);
-    return Scalar(0.5) * (a + Scalar(start) * n + end);
+  Vec3<Scalar> arm_at(const Scalar& s) const {
+    return slides ? constant<Scalar>(arm) + s * constant<Scalar>(axis) : constant<Scalar>(arm);
+  }
+  template <class Scalar>
+  Vec3<Scalar> lever(const Scalar (&body)[kBody]) const {
+    const Vec3<Scalar> w{body[3], body[4], body[5]};
+    const Scalar& s = body[kBody - 1];  // not used without a slide
+    if (!rule.in_middle) return turned(w, arm_at(s));
+    const Vec3<Scalar> end = turned(Scalar(2.0) * w, arm_at(Scalar(2.0 * s - start)));
+    return Scalar(0.5) * (arm_at(Scalar(start)) + end);
   }
   template <class Scalar>
   void place(const Scalar (&body)[kBody], Scalar (&own)[kOwn]) const {
-    const Vec3<Scalar> at = lever(Vec3<Scalar>{body[3], body[4], body[5]}, body[6]);
+    const Vec3<Scalar> at = lever(body);
     for (int i = 0; i < 3; ++i) own[i] = body[i] + at[i];
   }
   template <class Scalar>
   void act(const Scalar (&body)[kBody], const double (&force)[kOwn], Scalar (&rows)[kBody]) const {
-    const Vec3<Scalar> w{body[3], body[4], body[5]}, n = constant<Scalar>(axis);
+    const Vec3<Scalar> w{body[3], body[4], body[5]};
     const Vec3<Scalar> f = constant<Scalar>({force[0], force[1], force[2]});
-    const Vec3<Scalar> moment = cross(lever(w, body[6]), f);
+    const Vec3<Scalar> moment = cross(lever(body), f);
     const Vec3<Scalar> row = rule.are_moments ? moment : row_of_moment(w, moment);
     for (int i = 0; i < 3; ++i) {
       rows[i] = Scalar(force[i]);
       rows[3 + i] = row[i];
     }
-    rows[6] = dot(rule.in_middle ? n + cross(w, n) : turned(w, n), f);
+    if constexpr (slides) {
+      const Vec3<Scalar> n = constant<Scalar>(axis);
+      rows[6] = dot(rule.in_middle ? n + cross(w, n) : turned(w, n), f);
+    }
   }
   void bound(const double (&force)[kOwn], double (&rows)[kBody]) const {
     const double sum = force[0] + force[1] + force[2];
@@ -218,15 +153,17 @@ struct SpaceSlider {
       rows[i] = force[i];
       rows[3 + i] = length * sum;
     }
-    rows[6] = sum;
+    if constexpr (slides) rows[6] = sum;
   }
 };
 
-/// The same in a plane, by the base, the angle and the coordinate of the slide at z.
-struct PlaneSlider {
-  static constexpr int kOwn = 2, kBody = 4;
+/// The same in a plane, by the base, the angle and, on a slide, its coordinate at z.
+template <bool slides>
+struct PlaneNode {
+  static constexpr int kOwn = 2, kBody = slides ? 4 : 3;
   BodyRule rule;
-  double arm[2], axis[2], start_angle, start;
+  std::array<double, 2> arm, axis;
+  double start_angle, start;
 
   template <class Scalar>
   Vec3<Scalar> turned_by(const Scalar& angle, const Scalar& x, const Scalar& y) const {
@@ -236,42 +173,46 @@ struct PlaneSlider {
   }
   template <class Scalar>
   Vec3<Scalar> arm_at(const Scalar& angle, const Scalar& s) const {
+    if constexpr (!slides) return turned_by(angle, Scalar(arm[0]), Scalar(arm[1]));
     return turned_by(angle, Scalar(arm[0] + s * axis[0]), Scalar(arm[1] + s * axis[1]));
   }
   template <class Scalar>
-  Vec3<Scalar> lever(const Scalar& angle, const Scalar& s) const {
+  Vec3<Scalar> lever(const Scalar (&body)[kBody]) const {
+    const Scalar &angle = body[2], &s = body[kBody - 1];  // the second is not used without a slide
     if (!rule.in_middle) return arm_at(angle, s);
     return Scalar(0.5) * (arm_at(Scalar(start_angle), Scalar(start)) +
                           arm_at(Scalar(2.0 * angle - start_angle), Scalar(2.0 * s - start)));
   }
   template <class Scalar>
   void place(const Scalar (&body)[kBody], Scalar (&own)[kOwn]) const {
-    const Vec3<Scalar> at = lever(body[2], body[3]);
+    const Vec3<Scalar> at = lever(body);
     own[0] = body[0] + at.x;
     own[1] = body[1] + at.y;
   }
   template <class Scalar>
   void act(const Scalar (&body)[kBody], const double (&force)[kOwn], Scalar (&rows)[kBody]) const {
-    const Vec3<Scalar> at = lever(body[2], body[3]);
-    Vec3<Scalar> along =
-        turned_by(Scalar(rule.in_middle ? Scalar(start_angle) : body[2]), Scalar(axis[0]), Scalar(axis[1]));
-    if (rule.in_middle) {
-      // Half of the Cayley vector of the turn by 2 (angle - start).
-      const Scalar half = body[2] - start_angle;
-      const double t = std::tan(value_of(half));
-      const Scalar tangent = chain(half, t, 1.0 + t * t);
-      along = {along.x - tangent * along.y, along.y + tangent * along.x, Scalar(0.0)};
-    }
+    const Vec3<Scalar> at = lever(body);
     rows[0] = Scalar(force[0]);
     rows[1] = Scalar(force[1]);
     rows[2] = at.x * force[1] - at.y * force[0];
-    rows[3] = along.x * force[0] + along.y * force[1];
+    if constexpr (slides) {
+      Vec3<Scalar> along =
+          turned_by(Scalar(rule.in_middle ? Scalar(start_angle) : body[2]), Scalar(axis[0]), Scalar(axis[1]));
+      if (rule.in_middle) {
+        // Half of the Cayley vector of the turn by 2 (angle - start).
+        const Scalar half = body[2] - start_angle;
+        const double t = std::tan(value_of(half));
+        const Scalar tangent = chain(half, t, 1.0 + t * t);
+        along = {along.x - tangent * along.y, along.y + tangent * along.x, Scalar(0.0)};
+      }
+      rows[3] = along.x * force[0] + along.y * force[1];
+    }
   }
   void bound(const double (&force)[kOwn], double (&rows)[kBody]) const {
     rows[0] = force[0];
     rows[1] = force[1];
     rows[2] = (hypotenuse(arm[0], arm[1]) + std::abs(start)) * (force[0] + force[1]);
-    rows[3] = force[0] + force[1];
+    if constexpr (slides) rows[3] = force[0] + force[1];
   }
 };
 
@@ -304,23 +245,21 @@ void with_kind(const StepProblem& problem, const CarriedPart& part, const Use& u
         HingedFrame{rule, to_vec3(problem.start->frame[at(part.frame)] * hinge.axis), problem.start->q[hinge.dof]});
   }
   if (!part.is_node()) return model.planar() ? use(SlidFrame<1>{}) : use(SlidFrame<3>{});
-  if (part.slide >= 0) {
-    const Slide& slide = model.slides[at(part.slide)];
-    const double start = problem.start->q[slide.dof];
-    if (model.planar())
-      return use(PlaneSlider{rule,
-                             {part.arm.dot(model.plane->first), part.arm.dot(model.plane->second)},
-                             {slide.axis.dot(model.plane->first), slide.axis.dot(model.plane->second)},
-                             problem.start->q[model.frame_dof[at(part.frame)]],
-                             start});
-    const Matrix3& frame = problem.start->frame[at(part.frame)];
-    return use(SpaceSlider{rule, to_vec3(frame * part.arm), to_vec3(frame * slide.axis), start});
+  const auto in_plane = [&](const Vector3& v) {
+    return std::array{v.dot(model.plane->first), v.dot(model.plane->second)};
+  };
+  const Slide* slide = part.slide < 0 ? nullptr : &model.slides[at(part.slide)];
+  const double start = slide ? problem.start->q[slide->dof] : 0.0;
+  const Vector3 axis = slide ? slide->axis : Vector3(Vector3::Zero());
+  if (model.planar()) {
+    const double angle = problem.start->q[model.frame_dof[at(part.frame)]];
+    if (slide) return use(PlaneNode<true>{rule, in_plane(part.arm), in_plane(axis), angle, start});
+    return use(PlaneNode<false>{rule, in_plane(part.arm), in_plane(axis), angle, start});
   }
-  if (model.planar())
-    return use(PlaneNode{rule,
-                         {part.arm.dot(model.plane->first), part.arm.dot(model.plane->second)},
-                         problem.start->q[model.frame_dof[at(part.frame)]]});
-  use(SpaceNode{rule, to_vec3(problem.start->frame[at(part.frame)] * part.arm)});
+  const Matrix3& frame = problem.start->frame[at(part.frame)];
+  const Vec3d arm = to_vec3(frame * part.arm);
+  if (slide) return use(SpaceNode<true>{rule, arm, to_vec3(frame * axis), start});
+  use(SpaceNode<false>{rule, arm, to_vec3(axis), start});
 }
 
 template <int size>
