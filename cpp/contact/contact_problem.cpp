@@ -9,6 +9,17 @@ namespace {
 // Bending force of a rod, EI / L^2, for a length L of this number of radii.
 constexpr double kSlender = 100.0;
 
+/// A surface has the mass of its body, without bound where this is held.
+void set_body_masses(const Model& model, const Parameters& parameters, VectorX& edge_mass) {
+  for (const CarriedPart& surface : model.carried) {
+    if (surface.edge < 0) continue;
+    double mass = parameters.added_mass(surface.base);
+    for (const CarriedPart& part : model.carried)
+      if (part.is_node() && part.frame == surface.frame && part.slide < 0) mass += parameters.added_mass(part.node);
+    edge_mass(surface.edge) = surface.is_held ? INFINITY : mass;
+  }
+}
+
 bool by_bodies(const BodyOffset& a, const BodyOffset& b) { return a.rod != b.rod ? a.rod < b.rod : a.other < b.other; }
 
 }  // namespace
@@ -22,10 +33,11 @@ ContactParameters::ContactParameters(const Surfaces& surfaces, const Parameters&
   least_stiffness.setConstant(static_cast<Eigen::Index>(model.description.rods.size()), given);
   firm_stiffness.setZero(least_stiffness.size());
   edge_mass = parameters.edge_density.cwiseProduct(model.edge_arc);
+  set_body_masses(model, parameters, edge_mass);
   for (int e = 0; e < model.edge_count && !(given > 0.0); ++e) {
     const double r = surfaces.radius(e);
-    if (!(r > 0.0)) continue;
-    const double weight = parameters.edge_density(e) * model.edge_arc(e) * parameters.gravity.norm();
+    if (!(r > 0.0) || !std::isfinite(edge_mass(e))) continue;
+    const double weight = edge_mass(e) * parameters.gravity.norm();
     const double bends = parameters.edge_bend.row(e).minCoeff() / (kSlender * kSlender * r * r);
     double& firm = firm_stiffness(model.edge_rod[at(e)]);
     firm = std::max(firm, (weight / (light * light) + bends) / (2.0 * kDepth * r));

@@ -93,6 +93,17 @@ inline constexpr CurveWeights kCurveLast{.nodes = 2,
                                          .low = -0.5,
                                          .value_by = {0.0, 1.0, 0.0},
                                          .slope_by = {}};
+/// A ball, whose edge is too short to show.
+inline constexpr CurveWeights kCurveMiddle{.nodes = 2,
+                                           .edges = 1,
+                                           .middle = {0.5, 0.5, 0.0},
+                                           .slope = {},
+                                           .bend = {},
+                                           .share = {1.0, 0.0},
+                                           .share_slope = {},
+                                           .low = -0.5,
+                                           .value_by = {0.0, 1.0, 0.0},
+                                           .slope_by = {}};
 
 /// One piece; its second node and edge are the next ones along the rod.
 struct CurvePiece {

@@ -25,6 +25,11 @@ double parallel_weight(double length, double radii) {
   return kParallelWeight * size * size;
 }
 
+// Length of the edge of a ball over its radius, at most.
+constexpr double kBall = 1e-2;
+// Weight of the middle of a ball over the squared sum of radii: its closest point is the middle.
+constexpr double kMiddleWeight = 100.0;
+
 }  // namespace
 
 bool comes_before(const ContactKey& a, const ContactKey& b) {
@@ -40,6 +45,9 @@ Surfaces::Surfaces(const Model& model) : model_(model) {
   for (const RodDescription& rod : model.description.rods)
     for (Eigen::Index e = 0; e < rod.rest_lengths.size(); ++e)
       radius_.push_back(rod.contact_radius.size() > 0 ? rod.contact_radius(e) : 0.0);
+  held_.resize(at(model.edge_count));
+  for (const CarriedPart& part : model.carried)
+    if (part.edge >= 0) held_[at(part.edge)] = part.is_held;
   if (contact.rods) {
     for (int e = 0; e < model.edge_count; ++e)
       if (radius(e) > 0.0) edges_.push_back(e);
@@ -54,7 +62,10 @@ Surfaces::Surfaces(const Model& model) : model_(model) {
 void Surfaces::note_frictional() {
   const bool rods = model_.description.contact.rods;
   const SurfaceParameters& p = parameters_;
-  frictional_ = rods && (p.friction > 0.0 || (p.pair_friction.col(0).array() > 0.0).any());
+  const auto& bodies = model_.description.rods;
+  frictional_ =
+      rods && (p.friction > 0.0 || (p.pair_friction.col(0).array() > 0.0).any() ||
+               std::any_of(bodies.begin(), bodies.end(), [](const auto& body) { return body.friction > 0.0; }));
   int rod = -1, other = 0;
   for (const ContactPair& pair : obstacle_pairs_) {
     if (frictional_) return;
@@ -76,8 +87,10 @@ bool Surfaces::set_parameters(const SurfaceParameters& parameters) {
 
 Surfaces::BodyFriction Surfaces::friction_of(int rod, int other) const {
   const SurfaceParameters& p = parameters_;
-  BodyFriction f{Eigen::RowVector3d::Constant(p.friction), -1};
-  if (other < 0) f.coefficients = p.obstacle_friction.row(-1 - other);
+  const auto& bodies = model_.description.rods;
+  const double own = std::max(bodies[at(rod)].friction, other < 0 ? -1.0 : bodies[at(other)].friction);
+  BodyFriction f{Eigen::RowVector3d::Constant(own < 0.0 ? p.friction : own), -1};
+  if (other < 0) f.coefficients = p.obstacle_friction.row(-1 - other).cwiseMax(own);
   const auto& pairs = model_.description.contact.pairs;
   for (Eigen::Index i = 0; i < p.pair_friction.rows(); ++i) {
     if (!pairs[static_cast<std::size_t>(i)].is_of(rod, other)) continue;
@@ -106,6 +119,9 @@ void Surfaces::set_parameters(ContactPair& pair) const {
   pair.set_friction(friction(0), friction(1), friction(2));
   pair.rolling = obstacle ? p.obstacle_rolling(-1 - other) : 0.0;
   pair.restitution = obstacle ? p.obstacle_restitution(-1 - other) : p.restitution;
+  for (int body : {pair.rod_a, pair.rod_b})
+    if (const double own = body < 0 ? -1.0 : model_.description.rods[at(body)].restitution; own >= 0.0)
+      pair.restitution = std::min(pair.restitution, own);
   pair.stiffness = 0.0;
   const auto& pairs = model_.description.contact.pairs;
   for (Eigen::Index i = 0; i < p.pair_restitution.size(); ++i) {
@@ -145,6 +161,26 @@ bool Surfaces::may_meet(int first, int second) const {
   return last == pairs.rend() || !last->ignored;
 }
 
+std::vector<std::vector<NearSurface>> Surfaces::surfaces_at_nodes() const {
+  if (!model_.has_bodies()) return {};
+  std::vector<std::vector<NearSurface>> near(at(model_.node_count));
+  for (const CarriedPart& surface : model_.carried) {
+    if (surface.edge < 0) continue;
+    const auto place = [&](int node) { return local_position(model_, model_.initial_q, node); };
+    const Vec3d tail = place(model_.edge_tail[at(surface.edge)]),
+                way = place(model_.edge_head[at(surface.edge)]) - tail;
+    const auto add = [&](int node) {
+      const Vec3d apart = place(node) - tail;
+      const double s = std::clamp(dot(apart, way) / dot(way, way), 0.0, 1.0);
+      near[at(node)].push_back({surface.edge, std::max(0.0, norm(apart - s * way) - radius(surface.edge))});
+    };
+    add(surface.base);
+    for (const CarriedPart& part : model_.carried)
+      if (part.is_node() && part.frame == surface.frame) add(part.node);
+  }
+  return near;
+}
+
 /// Edges that a walk along rods, through joints too, reaches before it has gone too far for a rod to touch itself.
 void Surfaces::find_neighbours() {
   std::vector<std::vector<int>> edges_at(at(model_.node_count));
@@ -153,6 +189,7 @@ void Surfaces::find_neighbours() {
     edges_at[at(model_.edge_head[at(e)])].push_back(e);
   }
   neighbours_.resize(at(model_.edge_count));
+  const std::vector<std::vector<NearSurface>> surfaces = surfaces_at_nodes();
   std::vector<double> distance(at(model_.node_count), INFINITY);
   using Visit = std::pair<double, int>;
   for (int e : edges_) {
@@ -167,11 +204,17 @@ void Surfaces::find_neighbours() {
     };
     reach(model_.edge_tail[at(e)], 0.0);
     reach(model_.edge_head[at(e)], 0.0);
+    for (int node = 0; node < static_cast<int>(surfaces.size()) && model_.is_surface(e); ++node)
+      for (const NearSurface& surface : surfaces[at(node)])
+        if (surface.edge == e) reach(node, surface.distance);
     std::vector<int>& found = neighbours_[at(e)];
     while (!queue.empty()) {
       const auto [d, node] = queue.top();
       queue.pop();
       if (d > distance[at(node)]) continue;
+      if (!surfaces.empty())
+        for (const NearSurface& surface : surfaces[at(node)])
+          if (d + surface.distance < limit) found.push_back(surface.edge);
       for (int other : edges_at[at(node)]) {
         found.push_back(other);
         reach(model_.edge_tail[at(other)], d + model_.edge_length(other));
@@ -188,7 +231,16 @@ bool Surfaces::may_touch(int a, int b) const {
   if (a == b || std::binary_search(neighbours_[at(a)].begin(), neighbours_[at(a)].end(), b) ||
       std::binary_search(neighbours_[at(b)].begin(), neighbours_[at(b)].end(), a))
     return false;
+  if (held(a) && held(b)) return false;
   return may_meet(model_.edge_rod[at(a)], model_.edge_rod[at(b)]);
+}
+
+bool Surfaces::ball(int edge) const {
+  return model_.is_surface(edge) && model_.edge_length(edge) < kBall * radius(edge);
+}
+
+double Surfaces::weight(int edge, double radii) const {
+  return ball(edge) ? kMiddleWeight * radii * radii : parallel_weight(model_.edge_length(edge), radii);
 }
 
 ContactPair Surfaces::pair(int a, int b) const {
@@ -199,8 +251,9 @@ ContactPair Surfaces::pair(int a, int b) const {
   p.radius_a = radius(a);
   p.radius_b = radius(b);
   p.tolerance = std::min(tolerance(a), tolerance(b));
-  p.weight_a = parallel_weight(model_.edge_length(a), p.radii());
-  p.weight_b = parallel_weight(model_.edge_length(b), p.radii());
+  p.of_body = model_.is_surface(a) || model_.is_surface(b);
+  p.weight_a = weight(a, p.radii());
+  p.weight_b = weight(b, p.radii());
   set_parameters(p);
   return p;
 }
@@ -216,7 +269,8 @@ void Surfaces::add_obstacles() {
     p.radius_b = d.radius;
     for (int rod = 0; rod < static_cast<int>(model_.description.rods.size()); ++rod) {
       p.rod_a = rod;
-      if (!may_meet(rod, p.key.b)) continue;
+      p.of_body = model_.description.rods[at(rod)].is_surface();
+      if (!may_meet(rod, p.key.b) || held(model_.rod_first_edge[at(rod)])) continue;
       add_edges(p, obstacles_.back());
       add_pieces(p, obstacles_.back(), rod);
     }
@@ -275,8 +329,8 @@ void Surfaces::unknowns_of_edges(const ContactKey& key, int (&dofs)[kContactUnkn
 
 /// The distance from a point to a smaller one is no parabola along an edge.
 bool Surfaces::smooth(const Obstacle& obstacle, int edge) const {
-  return radius(edge) > 0.0 &&
-         (obstacle.kind == ObstacleKind::plane || obstacle.radius + radius(edge) >= model_.edge_length(edge));
+  return radius(edge) > 0.0 && (ball(edge) || obstacle.kind == ObstacleKind::plane ||
+                                obstacle.radius + radius(edge) >= model_.edge_length(edge));
 }
 
 void Surfaces::add_edges(const ContactPair& prototype, const Obstacle& obstacle) {
@@ -306,7 +360,9 @@ void Surfaces::add_pieces(const ContactPair& prototype, const Obstacle& obstacle
                {model_.edge_tail[at(before)], model_.edge_head[at(before)], -1},
                {before, -1},
                12.0 * kDepth * std::min(p.radius_a, model_.edge_length(before))};
-    if (before == behind) {  // half as long
+    if (&weights == &kCurveMiddle) {
+      p.share = 1.0;
+    } else if (before == behind) {  // half as long
       p.share = 0.5;
       p.piece.least_bend *= 0.25;
     } else {
@@ -327,6 +383,10 @@ void Surfaces::add_pieces(const ContactPair& prototype, const Obstacle& obstacle
   const bool flat = obstacle.kind == ObstacleKind::plane;
   for (int e = first; e < end; ++e) {
     if (!smooth(obstacle, e)) continue;
+    if (ball(e)) {
+      add(kCurveMiddle, e, e, 0);
+      continue;
+    }
     const int before = neighbour(e, false), behind = neighbour(e, true);
     if (before < 0 || !smooth(obstacle, before)) add(flat ? kCurveFirst : kCurveStart, e, e, 0);
     if (behind < 0 || !smooth(obstacle, behind))

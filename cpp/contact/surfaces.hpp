@@ -30,6 +30,12 @@ inline constexpr int kContactUnknowns = 14;
 /// Unknowns of a piece of a planar curve: its nodes (2 each).
 inline constexpr int kPlaneUnknowns = 6;
 
+/// A surface of a body that a walk along rods and joints may reach from one of its nodes.
+struct NearSurface {
+  int edge;
+  double distance;  ///< from the node, as drawn [m]
+};
+
 /// Two surfaces that may touch, and their data that do not change during contact.
 struct ContactPair {
   ContactKey key;    ///< for a piece of a curve: the edge before its node (at the first node: after it), and its end
@@ -45,10 +51,12 @@ struct ContactPair {
   double rolling = 0;                 ///< coefficient of rolling friction, over the radius of a [-]
   double stiffness = 0;               ///< given for this pair [N/m]; 0: none
   double restitution = 1;             ///< [-]
+  bool of_body = false;               ///< true if one of both is the surface of a rigid body
 
   double radii() const { return radius_a + radius_b; }
   double reach() const { return radii() + tolerance; }
-  double nearest() const { return kMinDistance * radii(); }
+  /// A ball that came as near as rods may would pass between two rods.
+  double nearest() const { return of_body ? radii() - kMinDistance * small_radius() : kMinDistance * radii(); }
   double small_radius() const { return rod_b < 0 || radius_a < radius_b ? radius_a : radius_b; }
   bool curve() const { return piece.weights != nullptr; }
   bool isotropic() const { return forward == across && backward == across; }
@@ -90,7 +98,8 @@ class Surfaces {
   const std::vector<int>& edges() const { return edges_; }
   double radius(int edge) const { return radius_[static_cast<std::size_t>(edge)]; }
   double tolerance(int edge) const;
-  /// True if two edges may touch: not neighbours along the rod nearer than (pi / 2) (2 h + delta), not ignored.
+  /// True if two edges may touch: not neighbours along rods and joints nearer than (pi / 2) (2 h + delta), not ignored,
+  /// not surfaces of one body or of held bodies.
   bool may_touch(int a, int b) const;
   ContactPair pair(int a, int b) const;
   double greatest_reach() const { return greatest_reach_; }
@@ -130,10 +139,19 @@ class Surfaces {
   Eigen::Index place_along(const ContactPair& pair) const;
   /// True if two bodies may touch.
   bool may_meet(int first, int second) const;
+  /// True of a ball: the edge of its surface only shows how it turns, and its middle touches.
+  bool ball(int edge) const;
+  /// Weight of an edge for `closest_points` [m^2].
+  double weight(int edge, double radii) const;
+  /// True of the surface of a held body.
+  bool held(int edge) const { return held_[static_cast<std::size_t>(edge)]; }
+  /// Surfaces of bodies at their nodes; empty without bodies.
+  std::vector<std::vector<NearSurface>> surfaces_at_nodes() const;
   void unknowns_of_edges(const ContactKey& key, int (&dofs)[kContactUnknowns]) const;
 
   const Model& model_;
   std::vector<double> radius_;
+  std::vector<bool> held_;  ///< per edge
   std::vector<int> edges_;
   std::vector<std::vector<int>> neighbours_;  ///< per edge, sorted
   std::vector<Obstacle> obstacles_;

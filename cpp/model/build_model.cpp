@@ -52,7 +52,7 @@ class Builder {
     add_edges();
     find_clusters();
     add_bodies();
-    model_.shortest_length = model_.edge_count > 0 ? model_.edge_length.minCoeff() : model_.length_scale;
+    model_.shortest_length = shortest_length();
     add_frames();
     add_stencils();
     resolve_supports();
@@ -118,6 +118,14 @@ class Builder {
       const Vector3& n = model_.plane->normal;
       model_.planar_components.emplace_back(f.col(1).dot(n), -f.col(0).dot(n));
     }
+  }
+
+  /// Of edges of rods, else the length scale.
+  double shortest_length() const {
+    double shortest = INFINITY;
+    for (int e = 0; e < model_.edge_count; ++e)
+      if (!model_.is_surface(e)) shortest = std::min(shortest, model_.edge_length(e));
+    return std::isfinite(shortest) ? shortest : model_.length_scale;
   }
 
   /// Half of both edges of every stencil of a rod.
@@ -315,6 +323,15 @@ class Builder {
       model_.carried.push_back(part);
       model_.length_scale = std::max(model_.length_scale, part.arm.norm());
       mass += scene_.added_mass(node);
+    }
+    for (int e = 0; e < model_.edge_count && !model_.planar(); ++e) {
+      const RodDescription& surface = scene_.rods[at(model_.edge_rod[at(e)])];
+      if (!surface.is_surface() || &scene_.bodies[at(surface.body)] != &body) continue;
+      CarriedPart part;
+      part.frame = frame;
+      part.base = body.node;
+      part.edge = e;
+      model_.carried.push_back(part);
     }
     if (mass > 0.0) model_.length_scale = std::max(model_.length_scale, std::sqrt(body.inertia.trace() / mass));
   }

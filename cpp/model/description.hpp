@@ -32,6 +32,12 @@ struct RodDescription {
   VectorX natural_twist;       ///< per stencil [rad/m]
   VectorX contact_radius;      ///< radius of the round contact surface [m]; empty: no contact
   VectorX fluid_radius;        ///< radius in the fluid [m]
+  // Of the surface of a rigid body, which carries its nodes and its angle: it has no mass and no stiffness of its own.
+  int body = -1;            ///< that body; -1: a rod
+  double friction = -1;     ///< coefficient [-]; negative: that of the scene
+  double restitution = -1;  ///< coefficient [-]; negative: that of the scene
+
+  bool is_surface() const { return body >= 0; }
 };
 
 /// One rod passing through, starting or ending at a shared node: rod index and node index within the rod. A point of a

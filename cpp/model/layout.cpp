@@ -37,6 +37,10 @@ void note_carried(Model& model) {
       add(model.node_dof[static_cast<std::size_t>(part.base)], model.dimension);
       add(model.frame_dof[static_cast<std::size_t>(part.frame)], model.frame_size());
       if (part.slide >= 0) add(model.slides[static_cast<std::size_t>(part.slide)].dof, 1);
+    } else if (part.edge >= 0) {
+      part.own_dof = model.edge_dof[static_cast<std::size_t>(part.edge)];
+      part.own_size = 1;
+      add(model.frame_dof[static_cast<std::size_t>(part.frame)], model.frame_size());
     } else {
       part.own_dof = model.frame_dof[static_cast<std::size_t>(part.own_frame)];
       part.own_size = model.frame_size();
@@ -68,15 +72,17 @@ void lay_out_unknowns(Model& model) {
         if (slide.frame == f) slide.dof = next++;
     }
   };
-  // Points of bodies that no rod has, such as centres of mass, lie beside the base of their body.
+  // Points of bodies that no rod has, such as centres of mass, and their surfaces lie beside the base of their body.
   std::vector<bool> on_rod(at(model.node_count), false);
   for (const RodDescription& rod : rods)
-    for (int node : rod.nodes) on_rod[at(node)] = true;
+    for (int node : rod.nodes) on_rod[at(node)] = on_rod[at(node)] || !rod.is_surface();
   std::function<void(int)> place_node_of_body;
   const auto place_carried = [&](int base) {
     for (const CarriedPart& carried : model.carried) {
-      if (carried.base != base || on_rod[at(carried.node)] || model.node_dof[at(carried.node)] >= 0) continue;
-      place_node_of_body(carried.node);
+      if (carried.base != base) continue;
+      if (carried.edge >= 0) model.edge_dof[at(carried.edge)] = next++;
+      if (carried.is_node() && !on_rod[at(carried.node)] && model.node_dof[at(carried.node)] < 0)
+        place_node_of_body(carried.node);
     }
   };
   // A frame at the far end of a rod is outside of the stencil of the node before, so that the band stays narrow.
@@ -103,10 +109,11 @@ void lay_out_unknowns(Model& model) {
     }
   };
   std::vector<bool> placed(rods.size(), false);
+  for (std::size_t r = 0; r < rods.size(); ++r) placed[r] = rods[r].is_surface();
   // A chain starts at a rod whose first node is not the end of another rod, if there is one.
   std::vector<bool> is_end(at(model.node_count), false);
   for (const RodDescription& rod : rods)
-    if (!rod.closed) is_end[at(rod.nodes.back())] = true;
+    if (!rod.closed && !rod.is_surface()) is_end[at(rod.nodes.back())] = true;
   for (bool only_heads : {true, false})
     for (std::size_t r = 0; r < rods.size(); ++r) {
       if (placed[r] || (only_heads && is_end[at(rods[r].nodes.front())])) continue;
@@ -222,7 +229,7 @@ void add_constraints(Model& model) {
                        [&](const Constraint& c) { return c.first == first && c.free.isZero(); });
   };
   for (CarriedPart& part : model.carried)
-    part.is_held = part.is_node() && part.slide < 0 && holds(model.node_dof[at(part.base)]) &&
+    part.is_held = !part.is_frame() && part.slide < 0 && holds(model.node_dof[at(part.base)]) &&
                    holds(model.frame_dof[at(part.frame)]);
   const auto held = [&](int node) { return holder.nodes()[at(node)]; };
   model.edge_lumped.clear();

@@ -59,6 +59,7 @@ struct Slide {
 /// it are added to the rows of the body; see steps/carried_parts.hpp. The part is one of these:
 /// - a node, x = x_base + R (arm + s axis), where R turns the frame of the body; s is the coordinate of a slide, or 0
 /// - the frame of a second body, on a hinge or a slide of the first
+/// - the angle of an edge of its surface
 struct CarriedPart {
   int frame = -1;  ///< of the body
   // A node:
@@ -67,13 +68,16 @@ struct CarriedPart {
   int slide = -1;
   // A frame, which turns with the body if it is on no hinge:
   int own_frame = -1, hinge = -1;
+  // An edge:
+  int edge = -1;
 
   // Unknowns: its own, and those of the body (base, frame and slide, or frame and hinge).
   int own_dof = -1, own_size = 0;
   std::vector<int> body_dofs;
-  bool is_held = false;  ///< true of a node whose body a support holds in every direction
+  bool is_held = false;  ///< true of a node or an edge whose body a support holds in every direction
 
   bool is_node() const { return node >= 0; }
+  bool is_frame() const { return own_frame >= 0; }
 };
 
 /// The angle of a revolute joint by the unknowns, 0 as drawn: sign (q[turning] - q[against]). In space a hinge has its
@@ -254,7 +258,7 @@ struct Model {
   std::vector<Vec3d> initial_tangent, initial_director;
   VectorX initial_bend_tau, initial_half_tau;
   double length_scale = 1.0;     ///< [m]
-  double shortest_length = 1.0;  ///< of an edge; of bodies alone the length scale [m]
+  double shortest_length = 1.0;  ///< of an edge of a rod; of bodies alone the length scale [m]
 
   bool planar() const { return plane.has_value(); }
   int frame_size() const { return planar() ? 1 : 3; }
@@ -262,6 +266,10 @@ struct Model {
     return dof_component[static_cast<std::size_t>(node_dof[static_cast<std::size_t>(node)])];
   }
   bool has_bodies() const { return !body_frame.empty(); }
+  /// True of an edge of the surface of a body.
+  bool is_surface(int edge) const {
+    return description.rods[static_cast<std::size_t>(edge_rod[static_cast<std::size_t>(edge)])].is_surface();
+  }
   int component_of_edge(int edge) const { return component_of_node(edge_tail[static_cast<std::size_t>(edge)]); }
 };
 

@@ -237,6 +237,10 @@ std::optional<Plane> find_plane(const SceneDescription& scene, std::optional<boo
     reason = "bodies without rods move in space";
     return std::nullopt;
   }
+  if (std::any_of(scene.rods.begin(), scene.rods.end(), [](const RodDescription& rod) { return rod.is_surface(); })) {
+    reason = "bodies with surfaces that touch move in space";
+    return std::nullopt;
+  }
   // A user who requests a plane must keep such forces in it.
   const bool sure = asked.value_or(false);
   if (scene.has_custom_force && !sure) {

@@ -187,7 +187,7 @@ void accept_frames(const Model& model, const Configuration& configuration, State
     state.q.segment<3>(model.frame_dof[i]).setZero();
   }
   for (const CarriedPart& part : model.carried)
-    if (!part.is_node())
+    if (part.is_frame())
       state.frame[at(part.own_frame)] = state.frame[at(part.frame)] * hinge_turn(model, state.q, part.hinge);
   state.bend_tau = configuration.bend_strain.col(2);
   state.half_tau = configuration.half_strain.col(2);
@@ -228,7 +228,7 @@ void accept_configuration(const Model& model, const VectorX& q, const Configurat
   state.q = q;
   if (model.planar()) {
     for (const CarriedPart& part : model.carried)
-      if (!part.is_node() && part.hinge < 0) state.q(part.own_dof) = state.q(part.body_dofs.front());
+      if (part.is_frame() && part.hinge < 0) state.q(part.own_dof) = state.q(part.body_dofs.front());
     place_carried(model, state.frame, state.q);
     return;
   }

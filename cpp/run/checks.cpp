@@ -8,6 +8,7 @@
 #include "common/check.hpp"
 #include "common/text.hpp"
 #include "model/edge_vectors.hpp"
+#include "run/places.hpp"
 
 namespace withe {
 namespace {
@@ -127,8 +128,8 @@ void check_overlap(const Model& model, const Parameters& parameters, const State
   if (deepest == nullptr) return;
   const auto name = [&](int edge) {
     const int rod = model.edge_rod[at(edge)];
-    return "edge " + std::to_string(edge - model.rod_first_edge[at(rod)]) + " of rod '" +
-           description.rods[at(rod)].name + "'";
+    return (model.is_surface(edge) ? "" : "edge " + std::to_string(edge - model.rod_first_edge[at(rod)]) + " of ") +
+           name_of(model, rod);
   };
   const std::string other = deepest->key.b < 0 ? "'" + description.contact.obstacles[at(-1 - deepest->key.b)].name + "'"
                                                : name(deepest->key.b);

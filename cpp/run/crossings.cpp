@@ -37,6 +37,18 @@ CrossingWatch::CrossingWatch(const Model& model) {
       for (int other : rods_at[at(node)]) allowed_.emplace_back(other, static_cast<int>(r));
       rods_at[at(node)].push_back(static_cast<int>(r));
     }
+  // Rods may lie in the bodies that they are joined to, and bodies in each other.
+  for (std::size_t r = 0; r < rods.size(); ++r) {
+    if (!rods[r].is_surface()) continue;
+    const BodyDescription& body = model.description.bodies[at(rods[r].body)];
+    const auto add = [&](int node) {
+      for (int other : rods_at[at(node)])
+        allowed_.emplace_back(std::min(other, static_cast<int>(r)), std::max(other, static_cast<int>(r)));
+      rods_at[at(node)].push_back(static_cast<int>(r));
+    };
+    add(body.node);
+    for (int node : body.carried) add(node);
+  }
   for (const ContactPairDescription& pair : model.description.contact.pairs)
     if (pair.ignored) allowed_.emplace_back(std::min(pair.first, pair.second), std::max(pair.first, pair.second));
   std::sort(allowed_.begin(), allowed_.end());

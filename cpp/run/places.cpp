@@ -40,6 +40,11 @@ Place place_of(const Model& model, int row) {
   return place_of_node(model, node);
 }
 
+std::string name_of(const Model& model, int rod) {
+  const RodDescription& of = model.description.rods[at(rod)];
+  return (of.is_surface() ? "body '" : "rod '") + of.name + "'";
+}
+
 Place place_of_node(const Model& model, int node) {
   const std::vector<RodDescription>& rods = model.description.rods;
   for (std::size_t k = 0; k < rods.size(); ++k) {
@@ -47,7 +52,8 @@ Place place_of_node(const Model& model, int node) {
     const auto found = std::find(nodes.begin(), nodes.end(), node);
     if (found == nodes.end()) continue;
     const int place = static_cast<int>(found - nodes.begin());
-    return {static_cast<int>(k), place, " at node " + std::to_string(place) + " of rod '" + rods[k].name + "'"};
+    const std::string of = " of " + name_of(model, static_cast<int>(k));
+    return {static_cast<int>(k), place, (rods[k].is_surface() ? "" : " at node " + std::to_string(place)) + of};
   }
   return {};
 }

@@ -11,9 +11,11 @@ namespace withe {
 
 struct Place {
   int rod = -1, node = -1;  ///< -1: not known
-  std::string words;        ///< " at node 3 of rod 'arm'"; empty where it is not known
+  std::string words;        ///< " at node 3 of rod 'arm'", " of body 'ball'"; empty where it is not known
 };
 
+/// "rod 'arm'", or "body 'ball'" of a surface.
+std::string name_of(const Model& model, int rod);
 /// Place of a row of the residual.
 Place place_of(const Model& model, int row);
 Place place_of_node(const Model& model, int node);

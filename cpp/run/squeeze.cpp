@@ -19,7 +19,7 @@ std::string squeeze_warning(const Model& model, const Parameters& parameters, co
   const Touching &a = contact->contacts()[found.contact], &b = contact->contacts()[found.against];
   const auto other = [&](const Touching& t) {
     return t.pair.key.b < 0 ? "'" + description.contact.obstacles[at(-1 - t.pair.key.b)].name + "'"
-                            : "rod '" + description.rods[at(model.edge_rod[at(t.pair.key.b)])].name + "'";
+                            : name_of(model, model.edge_rod[at(t.pair.key.b)]);
   };
   const int edge = a.pair.key.a;
   const double radius = contact->surfaces().radius(edge);
@@ -39,7 +39,7 @@ void fail_squeezed(const Model& model, const Equations& system, const State& sta
   const ContactSet& set = system.contact()->contacts();
   const Touching& t = set[squeezed.contact];
   const double depth = t.pair.radii() - t.proximity.distance;
-  const auto rod_of = [&](int edge) { return "rod '" + description.rods[at(model.edge_rod[at(edge)])].name + "'"; };
+  const auto rod_of = [&](int edge) { return name_of(model, model.edge_rod[at(edge)]); };
   const auto other = [&](const ContactKey& key) {
     return key.b < 0 ? "'" + description.contact.obstacles[at(-1 - key.b)].name + "'" : rod_of(key.b);
   };

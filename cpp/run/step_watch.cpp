@@ -27,8 +27,9 @@ constexpr double kImpactMargin = 0.8;
 /// Work of an impact in a step whose rebound is visible, over the component's kinetic and elastic energy.
 constexpr double kMinImpactShare = 0.1;
 
-/// Time in which bending spreads over the length h of an edge, h^2 sqrt(m / B) [s].
+/// Time in which bending spreads over the length h of an edge, h^2 sqrt(m / B) [s]; 0 of a rigid body.
 double bending_time(const Model& model, const Parameters& parameters, int edge) {
+  if (model.is_surface(edge)) return 0.0;
   const double length = model.edge_length(edge);
   return length * length * std::sqrt(parameters.edge_density(edge) / parameters.edge_bend.row(edge).minCoeff());
 }

@@ -234,6 +234,39 @@ struct SlidFrame {
   }
 };
 
+/// The angle of an edge of the surface of a body. `tangent`: of the edge at the start of the step.
+struct SurfaceAngle {
+  static constexpr int kOwn = 1, kBody = 3;
+  BodyRule rule;
+  Vec3d tangent;
+  double start_angle;
+
+  template <class Scalar>
+  void place(const Scalar (&body)[kBody], Scalar (&own)[kOwn]) const {
+    const Vec3<Scalar> w{body[0], body[1], body[2]};
+    const double rate = rule.in_middle ? 2.0 : 1.0;
+    const Scalar along = (0.5 * rate) * dot(w, constant<Scalar>(tangent));  // tangent of half the angle
+    const double tan_half = value_of(along);
+    own[0] = start_angle + (2.0 / rate) * chain(along, std::atan(tan_half), 1.0 / (1.0 + tan_half * tan_half));
+  }
+  template <class Scalar>
+  void act(const Scalar (&body)[kBody], const double (&force)[kOwn], Scalar (&rows)[kBody]) const {
+    using std::sqrt;
+    const Vec3<Scalar> w{body[0], body[1], body[2]}, before = constant<Scalar>(tangent);
+    Vec3<Scalar> now = turned(rule.in_middle ? Scalar(2.0) * w : w, before);
+    if (rule.in_middle) {
+      const Vec3<Scalar> sum = before + now;
+      now = (1.0 / sqrt(dot(sum, sum))) * sum;
+    }
+    const Vec3<Scalar> moment = (force[0] / (1.0 + dot(before, now))) * (before + now);
+    const Vec3<Scalar> row = rule.are_moments ? moment : row_of_moment(w, moment);
+    for (int i = 0; i < 3; ++i) rows[i] = row[i];
+  }
+  void bound(const double (&force)[kOwn], double (&rows)[kBody]) const {
+    for (double& row : rows) row = force[0];
+  }
+};
+
 /// Calls use(part) with the carried part as one of the kinds above.
 template <class Use>
 void with_kind(const StepProblem& problem, const CarriedPart& part, const Use& use) {
@@ -244,6 +277,8 @@ void with_kind(const StepProblem& problem, const CarriedPart& part, const Use& u
     return use(
         HingedFrame{rule, to_vec3(problem.start->frame[at(part.frame)] * hinge.axis), problem.start->q[hinge.dof]});
   }
+  if (part.edge >= 0)
+    return use(SurfaceAngle{rule, problem.start->tangent[at(part.edge)], problem.start->q[part.own_dof]});
   if (!part.is_node()) return model.planar() ? use(SlidFrame<1>{}) : use(SlidFrame<3>{});
   const auto in_plane = [&](const Vector3& v) {
     return std::array{v.dot(model.plane->first), v.dot(model.plane->second)};
@@ -365,7 +400,7 @@ bool follow_held_bodies(const StepProblem& problem, const VectorX& z, VectorX& v
   const Model& model = problem.model;
   bool any = false;
   for (const CarriedPart& part : model.carried) {
-    if (!part.is_held) continue;
+    if (!part.is_held || !part.is_node()) continue;
     any = true;
     const int base = part.body_dofs.front(), frame = model.frame_dof[at(part.frame)];
     if (model.planar()) {

@@ -110,6 +110,10 @@ ResistiveForces::ResistiveForces(const Model& model) {
   for (int e = 0; e < model.edge_count; ++e) {
     const auto rod = at(model.edge_rod[at(e)]);
     const RodDescription& d = scene.rods[rod];
+    if (d.is_surface()) {  // bodies have no resistance
+      resistance_.emplace_back();
+      continue;
+    }
     require(d.fluid_radius.size() == d.rest_lengths.size(), "a rod in a fluid needs one radius an edge");
     const double radius = d.fluid_radius[e - model.rod_first_edge[rod]];
     resistance_.push_back(resistive_coefficients(radius, length[rod], scene.fluid.wavelength));

@@ -149,6 +149,7 @@ std::uint64_t fingerprint(const SceneDescription& scene) {
     w(rod.directors);
     w(rod.contact_radius);
     w(rod.fluid_radius);
+    if (rod.is_surface()) w(rod.body);
   }
   for (const BodyDescription& body : scene.bodies) {
     w(body.node);

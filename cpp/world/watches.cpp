@@ -54,12 +54,13 @@ void World::Implementation::check_crossings() {
   if (!crossing_watch || warnings.has_reported(Warning::crossing)) return;
   const auto [a, b] = crossing_watch->find(model, state.q);
   if (a < 0) return;
-  const auto rod = [&](int edge) { return "'" + description.rods[at(model.edge_rod[at(edge)])].name + "'"; };
+  const auto name = [&](int edge) { return name_of(model, model.edge_rod[at(edge)]); };
   const auto edge = [&](int e) { return std::to_string(e - model.rod_first_edge[at(model.edge_rod[at(e)])]); };
-  warnings.report(Warning::crossing, "Rods " + rod(a) + " and " + rod(b) + " pass through each other, with edge " +
-                                         edge(a) + " and edge " + edge(b) + " (time " + text(state.time, 6) +
+  warnings.report(Warning::crossing, "Without contact, " + name(a) + " and " + name(b) +
+                                         " pass through each other, with edge " + edge(a) + " and edge " + edge(b) +
+                                         " (time " + text(state.time, 6) +
                                          " s). Call scene.enable_contact() before scene.build(), or "
-                                         "scene.enable_contact(rods=False) if rods may pass through each other.");
+                                         "scene.enable_contact(rods=False) if they may pass through each other.");
   crossing_watch.reset();
 }
 

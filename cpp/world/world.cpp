@@ -451,6 +451,8 @@ void World::set_body_motion(int body, const Vector3& velocity, const Vector3& sp
         carried += v(slide.dof) * axis;
       }
       put_node_vector(model, part.node, carried, v);
+    } else if (part.edge >= 0) {
+      v(part.own_dof) = spin_of(part.frame).dot(to_eigen(self.state.tangent[at(part.edge)]));
     } else if (part.hinge < 0) {
       put_spin(part.own_frame, spin_of(part.frame));
     } else {

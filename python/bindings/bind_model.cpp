@@ -57,7 +57,10 @@ void register_rod(py::module_& module) {
       .def_readwrite("natural_curvature", &RodDescription::natural_curvature)
       .def_readwrite("natural_twist", &RodDescription::natural_twist)
       .def_readwrite("contact_radius", &RodDescription::contact_radius)
-      .def_readwrite("fluid_radius", &RodDescription::fluid_radius);
+      .def_readwrite("fluid_radius", &RodDescription::fluid_radius)
+      .def_readwrite("body", &RodDescription::body)
+      .def_readwrite("friction", &RodDescription::friction)
+      .def_readwrite("restitution", &RodDescription::restitution);
 }
 
 void register_body(py::module_& module) {

@@ -21,6 +21,8 @@ from withe.common import validation
 __all__ = ["Box", "Capsule", "Cylinder", "Mesh", "Sphere"]
 
 FloatArray = npt.NDArray[np.float64]
+# Length of the core of a ball over its radius: the ball turns with it, and it must not show.
+_POINT = 1e-3
 
 
 class Solid(Protocol):
@@ -91,6 +93,17 @@ class Sphere:
     def inertia_per_mass(self) -> FloatArray:
         """Moment of inertia about the centre of mass over the mass, shape (3, 3) [m^2]."""
         return 0.4 * float(self.radius) ** 2 * np.eye(3)
+
+    @property
+    def core(self) -> tuple[FloatArray, float]:
+        """Middle of the ball, as a segment that is too short to show.
+
+        Returns
+        -------
+        ends : ndarray of shape (2, 3) [m]
+        radius : float [m]
+        """
+        return 0.5 * _POINT * float(self.radius) * np.array([[0, 0, -1.0], [0, 0, 1.0]]), float(self.radius)
 
     def surface(self) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         """Return the surface for pictures.
@@ -249,6 +262,17 @@ class Capsule:
         # A hemisphere's centre of mass is 3 r / 8 from its flat side.
         across = barrel * (r**2 / 4.0 + h**2 / 12.0) + caps * (0.4 * r**2 + h**2 / 4.0 + 3.0 * h * r / 8.0)
         return np.diag([across, across, along]) / (barrel + caps)
+
+    @property
+    def core(self) -> tuple[FloatArray, float]:
+        """Segment at the distance of a radius from the surface.
+
+        Returns
+        -------
+        ends : ndarray of shape (2, 3) [m]
+        radius : float [m]
+        """
+        return 0.5 * float(self.length) * np.array([[0, 0, -1.0], [0, 0, 1.0]]), float(self.radius)
 
     def surface(self) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         """Return the surface for pictures.

@@ -53,7 +53,7 @@ def test_a_rod_that_falls_through_another_is_named_once(seed, time_step):
     """In steps in which it goes less than its radius, and in some in which it goes farther than its diameter."""
     scene, _, _ = falling(np.random.default_rng(seed))
     (message,) = warned(scene, time_step=time_step)
-    assert "Rods 'bar' and 'rod' pass through each other" in message
+    assert "rod 'bar' and rod 'rod' pass through each other" in message
     assert "scene.enable_contact()" in message
 
 

@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.batch.lanes import Lanes, output
-from withe.parts.handles import Body as RigidBody
 from withe.parts.handles import (
+    Body,
     Drag,
     Fluid,
     Hand,
@@ -26,7 +26,6 @@ from withe.parts.handles import (
 from withe.parts.torsion_springs import TorsionSpring
 from withe.simulation.readouts import Energy, Momentum, Reaction, RodEnergy, Statistics
 from withe.simulation.typed_words import (
-    Body,
     DragWord,
     FluidNumber,
     JointWord,
@@ -42,6 +41,7 @@ from withe.simulation.typed_words import (
     SupportVector,
     TendonWord,
     TorsionWord,
+    Toucher,
 )
 
 __all__ = ["Reading"]
@@ -434,7 +434,7 @@ class Reading:
         """
         return self._lanes.gathered(lambda s: s.joint_torque(joint))  # type: ignore[no-any-return]
 
-    def position(self, body: RigidBody | str) -> FloatArray:
+    def position(self, body: Body | str) -> FloatArray:
         """Return the position of the origin of the axes of a rigid body. See `Simulation.position`.
 
         Parameters
@@ -457,7 +457,7 @@ class Reading:
         """
         return self._lanes.gathered(lambda s: s.position(body))  # type: ignore[no-any-return]
 
-    def rotation(self, body: RigidBody | str) -> FloatArray:
+    def rotation(self, body: Body | str) -> FloatArray:
         """Return the axes, as columns of matrices, of a rigid body. See `Simulation.rotation`.
 
         Parameters
@@ -480,7 +480,7 @@ class Reading:
         """
         return self._lanes.gathered(lambda s: s.rotation(body))  # type: ignore[no-any-return]
 
-    def velocity(self, body: RigidBody | str) -> FloatArray:
+    def velocity(self, body: Body | str) -> FloatArray:
         """Return the velocity of the origin of the axes of a rigid body. See `Simulation.velocity`.
 
         Parameters
@@ -503,7 +503,7 @@ class Reading:
         """
         return self._lanes.gathered(lambda s: s.velocity(body))  # type: ignore[no-any-return]
 
-    def angular_velocity(self, body: RigidBody | str) -> FloatArray:
+    def angular_velocity(self, body: Body | str) -> FloatArray:
         """Return the angular velocity of a rigid body. See `Simulation.angular_velocity`.
 
         Parameters
@@ -616,10 +616,10 @@ class Reading:
     def get(self, target: Support, word: Literal["friction"]) -> FloatArray: ...
 
     @overload
-    def get(self, target: tuple[Body, Body], word: PairNumber) -> FloatArray: ...
+    def get(self, target: tuple[Toucher, Toucher], word: PairNumber) -> FloatArray: ...
 
     @overload
-    def get(self, target: tuple[Body, Body], word: Literal["friction", "contact_stiffness"]) -> Any: ...
+    def get(self, target: tuple[Toucher, Toucher], word: Literal["friction", "contact_stiffness"]) -> Any: ...
 
     @overload
     def get(self, target: Literal["gravity"], word: None = None) -> FloatArray: ...

@@ -16,7 +16,6 @@ from withe.parts.handles import Drag, Fluid, Joint, Load, Mass, NodeHandle, Obst
 from withe.parts.parameters import NATURAL_WORDS
 from withe.parts.torsion_springs import TorsionSpring
 from withe.simulation.typed_words import (
-    Body,
     DragWords,
     FluidWords,
     Frictions,
@@ -32,6 +31,7 @@ from withe.simulation.typed_words import (
     SupportWords,
     TendonWords,
     TorsionWords,
+    Toucher,
     Values,
 )
 
@@ -256,7 +256,7 @@ class Setting:
     @overload
     def set(
         self,
-        target: tuple[Body, Body],
+        target: tuple[Toucher, Toucher],
         /,
         *,
         over: float = 0.0,

@@ -11,10 +11,10 @@ from withe import _core
 from withe.common import validation
 from withe.parts.directory import Directory
 from withe.parts.handles import UnionFind
-from withe.parts.kinds import BodyPart, JoinPart, SupportPart
+from withe.parts.kinds import BodyPart, BodySurface, JoinPart, SupportPart
 from withe.solids import Solid
 
-__all__ = ["describe_bodies", "make_body"]
+__all__ = ["describe_bodies", "describe_surfaces", "make_body", "surfaces_of"]
 
 FloatArray = npt.NDArray[np.float64]
 _OF_SOLIDS = ("volume", "center", "inertia_per_mass", "surface")
@@ -30,6 +30,9 @@ def make_body(
     center: npt.ArrayLike | None,
     position: npt.ArrayLike,
     rotation: npt.ArrayLike | None,
+    friction: float | None = None,
+    restitution: float | None = None,
+    touches: bool = True,
 ) -> BodyPart:
     """Make and check a body; see `Scene.add_body`."""
     owner = f"body {name!r}"
@@ -60,7 +63,52 @@ def make_body(
         kilograms = validation.positive(mass, f"mass of {owner}")
         moment = _inertia(inertia, owner)
         middle = np.zeros(3) if center is None else validation.vector(center, f"center of {owner}")
-    return BodyPart(name, index, kilograms, axes @ moment @ axes.T, origin + axes @ middle, origin, axes, solid)
+    surface = None
+    core = getattr(solid, "core", None)
+    if validation.truth(touches, f"touches of {owner}") and core is not None:
+        ends, radius = core
+        surface = BodySurface(
+            origin + ends @ axes.T,
+            radius,
+            None if friction is None else validation.non_negative(friction, f"friction of {owner}"),
+            None if restitution is None else validation.share(restitution, f"restitution of {owner}"),
+        )
+    elif friction is not None or restitution is not None:
+        word = "restitution" if friction is None else "friction"
+        raise ValueError(f"{word} of {owner} has no effect, because it touches nothing: use a sphere or a capsule")
+    turned = axes @ moment @ axes.T
+    return BodyPart(name, index, kilograms, turned, origin + axes @ middle, origin, axes, solid, surface)
+
+
+def surfaces_of(directory: Directory) -> list[BodyPart]:
+    """Bodies that touch others, in the order in which the engine has their surfaces after all rods."""
+    return [body for body in directory.all(BodyPart) if body.surface is not None]
+
+
+def describe_surfaces(directory: Directory) -> list[_core.RodDescription]:
+    """Surfaces of bodies for the engine: edges without mass and stiffness that their bodies carry."""
+    found = []
+    for body in surfaces_of(directory):
+        surface = body.surface
+        assert surface is not None
+        way = surface.ends[1] - surface.ends[0]
+        length = float(np.linalg.norm(way))
+        description = _core.RodDescription()
+        description.name, description.body = body.name, body.index
+        description.nodes = [directory.row(node) for node in surface.nodes]
+        aside = np.cross(way, np.eye(3)[np.abs(way).argmin()])
+        description.directors = (aside / np.linalg.norm(aside))[None]
+        description.rest_lengths = description.arc_lengths = np.array([length])
+        description.contact_radius = np.array([surface.radius])
+        for word in ("stretch_stiffness", "twist_stiffness", "line_density", "rotary_inertia", "viscous_time", "drag"):
+            setattr(description, word, np.zeros(1))
+        description.bend_stiffness = np.zeros((1, 2))
+        description.fluid_radius = np.zeros(1)
+        description.natural_curvature, description.natural_twist = np.zeros((0, 2)), np.zeros(0)
+        description.friction = -1.0 if surface.friction is None else surface.friction
+        description.restitution = -1.0 if surface.restitution is None else surface.restitution
+        found.append(description)
+    return found
 
 
 def _inertia(value: npt.ArrayLike, owner: str) -> FloatArray:

@@ -10,10 +10,12 @@ import numpy.typing as npt
 
 from withe import _core
 from withe.common import validation
+from withe.parts.bodies import surfaces_of
 from withe.parts.directory import Directory
 from withe.parts.friction import Coefficients, Friction, check_law, check_rolling, coefficients
-from withe.parts.handles import Obstacle, Rod
+from withe.parts.handles import Body, Obstacle, Rod
 from withe.parts.kinds import (
+    BodyPart,
     ContactSettings,
     ObstaclePart,
     PairSettings,
@@ -22,8 +24,9 @@ from withe.parts.kinds import (
 
 __all__ = [
     "CONTACT",
-    "Body",
     "BodyPair",
+    "Toucher",
+    "Touching",
     "body_of",
     "contact_table",
     "describe_contact",
@@ -35,7 +38,8 @@ __all__ = [
 ]
 
 FloatArray = npt.NDArray[np.float64]
-Body = Rod | Obstacle | str
+Toucher = Rod | Body | Obstacle | str
+Touching = RodPart | ObstaclePart | BodyPart
 
 CONTACT = np.dtype(
     [
@@ -69,7 +73,7 @@ def make_obstacle(
     return ObstaclePart(name, kind, point, other, radius, both, restitution, rolling)
 
 
-def pair_of(directory: Directory, a: Body, b: Body) -> tuple[str, str]:
+def pair_of(directory: Directory, a: Toucher, b: Toucher) -> tuple[str, str]:
     """Names of two bodies that may touch, in the order by which `ContactSettings.pairs` knows them.
 
     Raises
@@ -85,7 +89,7 @@ def pair_of(directory: Directory, a: Body, b: Body) -> tuple[str, str]:
     return (first.name, second.name) if first.name <= second.name else (second.name, first.name)
 
 
-def pair_friction(directory: Directory, a: Body, b: Body, friction: Friction) -> Coefficients:
+def pair_friction(directory: Directory, a: Toucher, b: Toucher, friction: Friction) -> Coefficients:
     """Friction of two bodies, checked; see `Scene.set_friction`."""
     parts = [touching(directory, body) for body in (a, b)]
     rods = [part for part in parts if isinstance(part, RodPart)]
@@ -94,17 +98,19 @@ def pair_friction(directory: Directory, a: Body, b: Body, friction: Friction) ->
     return coefficients(friction, what, directed=directed, edges=len(rods[0].lengths) if directed else None)
 
 
-def touching(directory: Directory, handle: Body) -> RodPart | ObstaclePart:
-    """Return the rod or obstacle of a handle or name.
+def touching(directory: Directory, handle: Toucher) -> Touching:
+    """Return the rod, obstacle or rigid body of a handle or name.
 
     Raises
     ------
     ValueError
-        Neither a rod nor an obstacle.
+        Something else, or a body without a surface that touches.
     """
     part = directory.find_any(handle, "what touches")
-    if not isinstance(part, RodPart | ObstaclePart):
-        raise ValueError(f"bodies in contact must be rods or obstacles, got {part.name!r}")
+    if not isinstance(part, RodPart | ObstaclePart | BodyPart):
+        raise ValueError(f"bodies in contact must be rods, rigid bodies or obstacles, got {part.name!r}")
+    if isinstance(part, BodyPart) and part.surface is None:
+        raise ValueError(f"body {part.name!r} touches nothing: only spheres and capsules of withe.solids do")
     return part
 
 
@@ -112,8 +118,8 @@ def touching(directory: Directory, handle: Body) -> RodPart | ObstaclePart:
 class BodyPair:
     """Two that may touch."""
 
-    first: RodPart | ObstaclePart
-    second: RodPart | ObstaclePart
+    first: Touching
+    second: Touching
 
     @property
     def name(self) -> str:
@@ -125,8 +131,10 @@ class BodyPair:
         return {body_of(directory, self.first), body_of(directory, self.second)}
 
 
-def body_of(directory: Directory, part: RodPart | ObstaclePart) -> int:
-    """Return the number of a rod (its index) or an obstacle (-1 - index) in the engine."""
+def body_of(directory: Directory, part: Touching) -> int:
+    """Return the number in the engine: of a rod its index, of a body one after all rods, of an obstacle -1 - index."""
+    if isinstance(part, BodyPart):
+        return len(directory.all(RodPart)) + surfaces_of(directory).index(part)
     return part.index if isinstance(part, RodPart) else -1 - directory.all(ObstaclePart).index(part)
 
 
@@ -171,6 +179,7 @@ def describe_contact(directory: Directory) -> _core.ContactDescription:
     contact.obstacle_rolling = np.array([part.rolling_friction for part in obstacles], dtype=float)
     contact.obstacle_restitution = np.array([part.restitution for part in obstacles], dtype=float)
     bodies = {rod.name: rod.index for rod in rods} | {part.name: -1 - i for i, part in enumerate(obstacles)}
+    bodies |= {body.name: len(rods) + i for i, body in enumerate(surfaces_of(directory))}
     for (a, b), own in settings.pairs.items():
         if own.friction is not None:
             check_law(own.friction.directions, settings.friction_model, f"friction of {a!r} and {b!r}")
@@ -236,7 +245,7 @@ def drawn_frictions(scene: Directory) -> dict[tuple[str, ...], Coefficients]:
 
 def contact_table(directory: Directory, table: _core.ContactTable) -> npt.NDArray[np.void]:
     """Contacts of the engine as a structured array with names."""
-    rods = [rod.name for rod in directory.layout.rods]
+    rods = [rod.name for rod in directory.layout.rods] + [body.name for body in surfaces_of(directory)]
     obstacles = [part.name for part in directory.all(ObstaclePart)]
     contacts = np.zeros(len(table.bodies), CONTACT)
     bodies, numbers = table.bodies, table.numbers

@@ -114,6 +114,17 @@ class RodPart(Part):
 
 
 @dataclass(frozen=True, eq=False)
+class BodySurface:
+    """What touches others of a rigid body: all points at a distance from a segment of it."""
+
+    ends: FloatArray  # of the segment as drawn, (2, 3) [m]
+    radius: float  # [m]
+    friction: float | None  # [-]; None: that of the scene
+    restitution: float | None  # [-]
+    nodes: tuple[Pass, Pass] = ((-1, 0), (-1, 0))  # the ends among the points of the body
+
+
+@dataclass(frozen=True, eq=False)
 class BodyPart(Part):
     """A rigid body as it was drawn. Its points in the layout begin with its centre of mass."""
 
@@ -124,6 +135,7 @@ class BodyPart(Part):
     position: FloatArray  # origin of its axes (3,) [m]
     rotation: FloatArray  # of its axes, columns, (3, 3)
     solid: Any  # for pictures; None: a body without shape
+    surface: BodySurface | None = None  # None: it touches nothing
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,10 +15,10 @@ import numpy.typing as npt
 
 from withe.common import validation
 from withe.common.keywords import keyword_hints
-from withe.parts.contacts import Body, make_obstacle, pair_friction, pair_of
+from withe.parts.contacts import Toucher, make_obstacle, pair_friction, pair_of
 from withe.parts.directory import Directory
 from withe.parts.friction import Coefficients, Friction
-from withe.parts.handles import Obstacle, Rod
+from withe.parts.handles import Body, Obstacle, Rod
 from withe.parts.kinds import ContactModel, FrictionModel, Overlap, PairSettings
 
 __all__ = ["Contacts"]
@@ -366,12 +366,12 @@ class Contacts:
             overlap=cast(Overlap, validation.choice(overlap, "overlap", get_args(Overlap))),
         )
 
-    def set_friction(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, friction: Friction) -> None:
-        """Set the friction coefficient of two rods, or of a rod and an obstacle.
+    def set_friction(self, a: Rod | Body | Obstacle | str, b: Rod | Body | Obstacle | str, friction: Friction) -> None:
+        """Set the friction coefficient of two rods or bodies, or of one of them and an obstacle.
 
         Parameters
         ----------
-        a, b : Rod, Obstacle or str
+        a, b : Rod, Body, Obstacle or str
             The two bodies.
         friction : float, pair or tuple of three of float [-], array_like of shape (edges,), or callable
             One coefficient. For a rod and an obstacle also two or three coefficients by direction, or a function of
@@ -400,12 +400,14 @@ class Contacts:
         own = pair_friction(self._directory, a, b, friction)
         _set_pair(self._directory, a, b, friction=own)
 
-    def set_restitution(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, restitution: float) -> None:
-        """Set the coefficient of restitution of two rods, or of a rod and an obstacle.
+    def set_restitution(
+        self, a: Rod | Body | Obstacle | str, b: Rod | Body | Obstacle | str, restitution: float
+    ) -> None:
+        """Set the coefficient of restitution of two rods or bodies, or of one of them and an obstacle.
 
         Parameters
         ----------
-        a, b : Rod, Obstacle or str
+        a, b : Rod, Body, Obstacle or str
             The two bodies.
         restitution : float [-]
             Speed after an impact over the speed before, from 0 to 1; see `enable_contact`.
@@ -421,14 +423,16 @@ class Contacts:
         """
         _set_pair(self._directory, a, b, restitution=validation.share(restitution, "restitution"))
 
-    def set_contact_stiffness(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, stiffness: float) -> None:
-        """Set the contact stiffness of two rods, or of a rod and an obstacle.
+    def set_contact_stiffness(
+        self, a: Rod | Body | Obstacle | str, b: Rod | Body | Obstacle | str, stiffness: float
+    ) -> None:
+        """Set the contact stiffness of two rods or bodies, or of one of them and an obstacle.
 
         The stiffness is constant, except that it grows if surfaces would penetrate each other too deeply in a step.
 
         Parameters
         ----------
-        a, b : Rod, Obstacle or str
+        a, b : Rod, Body, Obstacle or str
             The two bodies.
         stiffness : float [N/m]
             Contact force per penetration of the surfaces.
@@ -444,12 +448,12 @@ class Contacts:
         """
         _set_pair(self._directory, a, b, stiffness=validation.positive(stiffness, "stiffness of contact"))
 
-    def ignore_contact(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str) -> None:
-        """Disable contact of two rods, of a rod and an obstacle, or of a rod with itself.
+    def ignore_contact(self, a: Rod | Body | Obstacle | str, b: Rod | Body | Obstacle | str) -> None:
+        """Disable contact of two rods or bodies, of one of them and an obstacle, or of a rod with itself.
 
         Parameters
         ----------
-        a, b : Rod, Obstacle or str
+        a, b : Rod, Body, Obstacle or str
             The two bodies, or one rod twice.
 
         Raises
@@ -495,8 +499,8 @@ def _optional(value: float | None, what: str) -> float | None:
 
 def _set_pair(
     directory: Directory,
-    a: Body,
-    b: Body,
+    a: Toucher,
+    b: Toucher,
     *,
     ignored: bool = False,
     friction: Coefficients | None = None,

@@ -96,6 +96,7 @@ def add_robot(
     bodies = [
         scene.add_body(
             body.solid,
+            touches=False,
             mass=body.mass,
             inertia=body.inertia,
             center=body.center,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import uuid
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast, overload
 
@@ -257,6 +258,9 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         center: npt.ArrayLike | None = None,
         position: npt.ArrayLike = (0.0, 0.0, 0.0),
         rotation: npt.ArrayLike | None = None,
+        friction: float | None = None,
+        restitution: float | None = None,
+        touches: bool = True,
         name: str | None = None,
     ) -> Body:
         """Add a rigid body: a plug, a payload, a hub, the trunk of a robot.
@@ -283,6 +287,15 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         rotation : array_like of shape (3, 3) or (4,), or scipy.spatial.transform.Rotation
             Orientation of the axes of the body: a matrix whose columns are the axes, or a unit quaternion
             (w, x, y, z). By default the axes of the world.
+        friction : float [-]
+            Friction coefficient of the surface. Of two bodies, the greater coefficient counts, and against an obstacle
+            the greater one too. By default the surface has the friction that rods have between each other.
+        restitution : float [-]
+            Speed after an impact over the speed before, from 0 to 1, of which the smaller one of two bodies counts. By
+            default that of rods.
+        touches : bool
+            False if the solid is only drawn. Spheres and capsules touch obstacles, and after `enable_contact` rods and
+            other bodies; other solids are only drawn.
         name : str
             Name of the body.
 
@@ -327,8 +340,14 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         """
         name = self._directory.new_name(name, "body")
         index = len(self._directory.layout.body_points)
-        part = make_body(name, index, solid, density, mass, inertia, center, position, rotation)
-        self._directory.layout.add_body(part.center)
+        part = make_body(
+            name, index, solid, density, mass, inertia, center, position, rotation, friction, restitution, touches
+        )
+        layout = self._directory.layout
+        layout.add_body(part.center)
+        if part.surface is not None:
+            first, second = (layout.body_point(index, end, -1.0) for end in part.surface.ends)
+            part = replace(part, surface=replace(part.surface, nodes=(first, second)))
         return cast(Body, self._directory.add(part))
 
     def add_robot(

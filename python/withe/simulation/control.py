@@ -32,7 +32,6 @@ from withe.simulation.motion import RotationLike
 from withe.simulation.parameters import Settable, get_value, set_values
 from withe.simulation.session import Session
 from withe.simulation.typed_words import (
-    Body,
     DragWord,
     DragWords,
     FluidNumber,
@@ -62,6 +61,7 @@ from withe.simulation.typed_words import (
     TendonWords,
     TorsionWord,
     TorsionWords,
+    Toucher,
 )
 
 __all__ = ["Control"]
@@ -192,7 +192,7 @@ class Control:
 
     @overload
     def set(
-        self, target: tuple[Body, Body], /, *, over: float = 0.0, **values: Unpack[PairWords[Number, Friction]]
+        self, target: tuple[Toucher, Toucher], /, *, over: float = 0.0, **values: Unpack[PairWords[Number, Friction]]
     ) -> None: ...
 
     @overload
@@ -316,10 +316,10 @@ class Control:
     def get(self, target: Support, word: Literal["friction"]) -> float: ...
 
     @overload
-    def get(self, target: tuple[Body, Body], word: PairNumber) -> float: ...
+    def get(self, target: tuple[Toucher, Toucher], word: PairNumber) -> float: ...
 
     @overload
-    def get(self, target: tuple[Body, Body], word: Literal["friction", "contact_stiffness"]) -> Any: ...
+    def get(self, target: tuple[Toucher, Toucher], word: Literal["friction", "contact_stiffness"]) -> Any: ...
 
     @overload
     def get(self, target: Literal["gravity"], word: None = None) -> FloatArray: ...

@@ -6,7 +6,7 @@ from typing import Any
 
 from withe.common import validation
 from withe.parts.contacts import BodyPair, touching
-from withe.parts.handles import Handle, Obstacle, Rod
+from withe.parts.handles import Body, Handle, Obstacle, Rod
 from withe.parts.kinds import RodPart, SupportPart
 from withe.simulation.access import Target, get_word, nothing_to_set, set_words, word_of, words_of
 from withe.simulation.rods import in_order
@@ -14,7 +14,7 @@ from withe.simulation.session import Session
 
 __all__ = ["Settable", "find_target", "get_value", "set_values"]
 
-Settable = Handle | tuple[Rod | Obstacle | str, Rod | Obstacle | str]
+Settable = Handle | tuple[Rod | Body | Obstacle | str, Rod | Body | Obstacle | str]
 
 
 def set_values(session: Session, target: Settable | str | None, values: dict[str, Any], over: float = 0.0) -> None:

@@ -324,12 +324,12 @@ class Placement:
             )
         move_obstacle(self._session, *obstacle, position, tangent, roll, over, path)
 
-    def set_friction(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, friction: Friction) -> None:
+    def set_friction(self, a: Rod | Body | Obstacle | str, b: Rod | Body | Obstacle | str, friction: Friction) -> None:
         """Deprecated: use ``set((a, b), friction=...)``.
 
         Parameters
         ----------
-        a, b : Rod, Obstacle or str
+        a, b : Rod, Body, Obstacle or str
             The two bodies.
         friction : float, pair or tuple of three of float [-], array_like of shape (edges,), or callable
             Friction coefficient, as in `Scene.set_friction`.
@@ -346,12 +346,14 @@ class Placement:
         old_word("set_friction", "set((a, b), friction=...)")
         set_values(self._session, (a, b), {"friction": friction})
 
-    def set_restitution(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, restitution: float) -> None:
+    def set_restitution(
+        self, a: Rod | Body | Obstacle | str, b: Rod | Body | Obstacle | str, restitution: float
+    ) -> None:
         """Deprecated: use ``set((a, b), restitution=...)``.
 
         Parameters
         ----------
-        a, b : Rod, Obstacle or str
+        a, b : Rod, Body, Obstacle or str
             The two bodies.
         restitution : float [-]
             Coefficient of restitution, from 0 to 1.
@@ -368,12 +370,14 @@ class Placement:
         old_word("set_restitution", "set((a, b), restitution=...)")
         set_values(self._session, (a, b), {"restitution": restitution})
 
-    def set_contact_stiffness(self, a: Rod | Obstacle | str, b: Rod | Obstacle | str, stiffness: float) -> None:
+    def set_contact_stiffness(
+        self, a: Rod | Body | Obstacle | str, b: Rod | Body | Obstacle | str, stiffness: float
+    ) -> None:
         """Deprecated: use ``set((a, b), contact_stiffness=...)``.
 
         Parameters
         ----------
-        a, b : Rod, Obstacle or str
+        a, b : Rod, Body, Obstacle or str
             The two bodies.
         stiffness : float [N/m]
             Contact stiffness.

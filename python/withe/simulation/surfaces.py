@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from withe import _core
 from withe.common import validation
-from withe.parts.contacts import BodyPair, body_of, pair_friction, pair_of, touching
+from withe.parts.contacts import BodyPair, Touching, body_of, pair_friction, pair_of, touching
 from withe.parts.friction import (
     Coefficients,
     as_given,
@@ -41,7 +41,6 @@ __all__ = [
 
 FloatArray = npt.NDArray[np.float64]
 Shape = tuple[int, ...]
-Touching = RodPart | ObstaclePart
 
 
 def set_scene(session: Session, part: None, values: dict[str, Any]) -> None:

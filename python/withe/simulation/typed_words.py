@@ -14,12 +14,11 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.parts.applied_loads import Value
+from withe.parts.contacts import Toucher
 from withe.parts.friction import Friction
-from withe.parts.handles import Obstacle, Rod
 from withe.simulation.motion import RotationLike
 
 __all__ = [
-    "Body",
     "DragWord",
     "DragWords",
     "FluidNumber",
@@ -51,10 +50,10 @@ __all__ = [
     "TendonWords",
     "TorsionWord",
     "TorsionWords",
+    "Toucher",
     "Values",
 ]
 
-Body = Rod | Obstacle | str
 Number = float | np.floating[Any] | np.integer[Any]
 # Values of a batch: one for all simulations, or a row for each.
 Values = Value | Sequence[Callable[[float], npt.ArrayLike]]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from withe import _core
-from withe.parts.contacts import Body, BodyPair, touching
+from withe.parts.contacts import BodyPair, Toucher, touching
 from withe.parts.handles import Handle, NodeHandle
 from withe.parts.kinds import Part, RodPart
 from withe.parts.table import SCENE_WORDS
@@ -28,7 +28,7 @@ __all__ = [
     "unknown_readers",
 ]
 
-Unknown = tuple[Handle | str | tuple[Body, Body], str] | str
+Unknown = tuple[Handle | str | tuple[Toucher, Toucher], str] | str
 """Parameter of a gradient: a part and a word of `set`, two bodies and "friction", or a word of the scene."""
 
 

@@ -1,0 +1,171 @@
+"""Contact of rigid bodies: what users set, read and are told."""
+
+from __future__ import annotations
+
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import withe
+
+BALL = withe.solids.Sphere(0.02)
+
+
+def ball_on_rods(**words: object) -> tuple[withe.Scene, withe.Body]:
+    """Draw a ball that falls onto two clamped rods."""
+    scene = withe.Scene(gravity=(0, 0, -9.81))
+    scene.enable_contact(friction=0.2)
+    rubber = withe.Material(youngs_modulus=2e6, density=1000.0)
+    for y in (-0.015, 0.015):
+        rod = scene.add_rod(start=(-0.1, y, 0), end=(0.1, y, 0), nodes=13, radius=0.004, material=rubber)
+        scene.clamp(rod.start)
+        scene.clamp(rod.end)
+    return scene, scene.add_body(BALL, density=400, position=(0, 0, 0.03), **words)  # type: ignore[arg-type]
+
+
+def test_contacts_name_bodies() -> None:
+    """Read-outs, and the weight that contacts carry."""
+    scene, _ = ball_on_rods(name="ball")
+    simulation = scene.build(integrator="static")
+    simulation.equilibrium()
+    contacts = simulation.contacts()
+    assert {tuple(pair) for pair in contacts["pair"]} == {("rod 1", "ball"), ("rod 2", "ball")}
+    pressing = (contacts["normal_force"][:, None] * contacts["normal"]).sum(axis=0) + contacts["friction"].sum(axis=0)
+    weight = 400 * BALL.volume * 9.81
+    np.testing.assert_allclose(pressing, [0, 0, -weight], atol=1e-4 * weight)
+
+
+def test_copies_pickles_and_snapshots_continue_to_the_bit() -> None:
+    """In the middle of an impact."""
+    scene, ball = ball_on_rods()
+    simulation = scene.build(time_step=1e-3)
+    simulation.step(60)
+    assert len(simulation.contacts()) > 0
+    snapshot, others = simulation.snapshot(), [simulation.copy(), pickle.loads(pickle.dumps(simulation))]
+    simulation.step(20)
+    for other in others:
+        other.step(20)
+        np.testing.assert_array_equal(other.positions(), simulation.positions())
+    expected = simulation.position(ball)
+    simulation.restore(snapshot)
+    simulation.step(20)
+    np.testing.assert_array_equal(simulation.position(ball), expected)
+
+
+def test_a_batch_steps_as_its_simulations() -> None:
+    """To the bit."""
+    scene, ball = ball_on_rods()
+    batch = scene.build_batch(2, time_step=1e-3)
+    batch.step(80)
+    simulation = scene.build(time_step=1e-3)
+    simulation.step(80)
+    np.testing.assert_array_equal(batch.position(ball)[1], simulation.position(ball))
+
+
+def test_a_scene_file_keeps_what_touches(tmp_path: Path) -> None:
+    """Friction, restitution, and a ball that touches nothing."""
+    scene, ball = ball_on_rods(friction=0.6, restitution=0.5, name="ball")
+    ghost = scene.add_body(BALL, density=400, position=(0, 0, 0.03), touches=False, name="ghost")
+    scene.save(tmp_path / "scene.toml")
+    found = []
+    for each in (scene, withe.Scene.load(tmp_path / "scene.toml")):
+        simulation = each.build(time_step=1e-3)
+        simulation.step(80)
+        found.append([simulation.position("ball"), simulation.position("ghost")])
+    np.testing.assert_array_equal(found[0], found[1])
+    assert found[0][1][2] == pytest.approx(0.03 - 0.5 * 9.81 * 0.08**2, rel=1e-6)  # it falls through
+    assert found[0][0][2] > 0.005
+    assert (ball.name, ghost.name) == ("ball", "ghost")
+
+
+@pytest.mark.parametrize(("own", "floor"), [(0.3, 0.0), (0.0, 0.3), (0.3, 0.1), (None, 0.3)])
+def test_the_greater_friction_counts(own: float | None, floor: float) -> None:
+    """Deceleration of a ball that slides, before it rolls."""
+    scene = withe.Scene(gravity=(0, 0, -9.81))
+    scene.add_floor(friction=floor)
+    ball = scene.add_body(BALL, density=1000, position=(0, 0, 0.02), friction=own)
+    simulation = scene.build(time_step=1e-3)
+    simulation.set_velocity(ball, (2, 0, 0))
+    simulation.step(50)
+    assert simulation.velocity(ball)[0] == pytest.approx(2.0 - 0.3 * 9.81 * 0.05, rel=1e-3)
+
+
+def test_friction_of_a_pair_has_precedence() -> None:
+    """Set in the scene, then during the run."""
+    scene = withe.Scene(gravity=(0, 0, -9.81))
+    floor = scene.add_floor(friction=0.5)
+    ball = scene.add_body(BALL, density=1000, position=(0, 0, 0.02), friction=0.4)
+    scene.set_friction(ball, floor, 0.1)
+    simulation = scene.build(time_step=1e-3)
+    simulation.set_velocity(ball, (2, 0, 0))
+    simulation.step(50)
+    speed = simulation.velocity(ball)[0]
+    assert speed == pytest.approx(2.0 - 0.1 * 9.81 * 0.05, rel=1e-3)
+    simulation.set((ball, floor), friction=0.2)
+    simulation.step(50)
+    assert simulation.velocity(ball)[0] == pytest.approx(speed - 0.2 * 9.81 * 0.05, rel=1e-3)
+
+
+def test_a_rod_does_not_touch_the_body_that_it_is_joined_to() -> None:
+    """Near the joint only: the far end of the rod does."""
+    scene = withe.Scene(gravity=(0, 0, 0))
+    scene.enable_contact()
+    rubber = withe.Material(youngs_modulus=1e5, density=1000.0)
+    ball = scene.add_body(BALL, density=1000)
+    rod = scene.add_rod(start=(0, 0, 0.02), end=(0, 0, 0.22), nodes=21, radius=0.003, material=rubber)
+    scene.join(rod.start, ball)
+    hold = scene.clamp(rod.end)
+    simulation = scene.build(integrator="static")
+    assert len(simulation.contacts()) == 0
+    rest = simulation.positions(rod).copy()
+    simulation.equilibrium()
+    np.testing.assert_allclose(simulation.positions(rod), rest, atol=1e-9)
+    assert hold.name == "clamp 1"
+
+
+def test_bodies_and_rods_that_pass_through_each_other_are_named() -> None:
+    """Where contact was forgotten."""
+    scene = withe.Scene(gravity=(0, 0, 0))
+    rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+    scene.clamp(scene.add_rod(start=(-0.1, 0, 0), end=(0.1, 0, 0), nodes=9, radius=0.004, material=rubber).start)
+    ball = scene.add_body(BALL, density=1000, position=(0, 0, 0.03), name="ball")
+    simulation = scene.build(time_step=1e-3)
+    simulation.set_velocity(ball, (0, 0, -1))
+    with pytest.warns(withe.RodCrossingWarning, match="rod 'rod 1' and body 'ball' pass through each other"):
+        simulation.step(60)
+
+
+def test_overlapping_bodies_are_named() -> None:
+    """In the error of build."""
+    scene = withe.Scene()
+    scene.enable_contact()
+    scene.add_body(BALL, density=1000, name="red")
+    scene.add_body(BALL, density=1000, position=(0, 0, 0.03), name="green")
+    with pytest.raises(ValueError, match=r"body 'red' and body 'green' overlap by 0\.01"):
+        scene.build(time_step=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("solid", "words", "message"),
+    [
+        (BALL, {"friction": -0.1}, "friction of body 'x' must not be negative"),
+        (BALL, {"restitution": 1.5}, "restitution of body 'x' must"),
+        (BALL, {"touches": "no"}, "touches of body 'x' must be True or False"),
+        (BALL, {"touches": False, "friction": 0.3}, "friction of body 'x' has no effect"),
+        (withe.solids.Box((0.1, 0.1, 0.1)), {"friction": 0.3}, "touches nothing: use a sphere or a capsule"),
+    ],
+)
+def test_what_cannot_be_is_refused(solid: object, words: dict[str, object], message: str) -> None:
+    """With what to do."""
+    with pytest.raises(ValueError, match=message):
+        withe.Scene().add_body(solid, density=1000, name="x", **words)  # type: ignore[arg-type]
+
+
+def test_a_solid_that_touches_nothing_has_no_pair() -> None:
+    """In set_friction."""
+    scene = withe.Scene()
+    floor, box = scene.add_floor(), scene.add_body(withe.solids.Box((0.1, 0.1, 0.1)), density=1000, name="box")
+    with pytest.raises(ValueError, match="body 'box' touches nothing"):
+        scene.set_friction(box, floor, 0.3)
