@@ -23,12 +23,16 @@ double way_between(const std::vector<Obstacle>& from, const std::vector<Obstacle
   return std::sqrt(square);
 }
 
+// Share of the distance of a body that an iteration must leave. Half of it would bring the middle of a ball between two
+// rods in a few iterations, without any centrelines that cross.
+constexpr double kMinDistanceOfBody = 0.98;
+
 /// Least allowed distance of centrelines: `share` times their distance at the start of a motion, or `nearest`,
 /// whichever is less.
 struct Limit {
   double share, nearest;  ///< [-], [m]
 };
-Limit apart(const ContactPair& pair) { return {kMinDistance, pair.nearest()}; }
+Limit apart(const ContactPair& pair) { return {pair.of_body ? kMinDistanceOfBody : kMinDistance, pair.nearest()}; }
 
 /// Allowed share of a motion, by conservative advancement: the distance, a function of that much, falls no faster
 /// than by `speed`.

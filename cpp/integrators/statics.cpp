@@ -301,7 +301,7 @@ class Statics {
   bool settle(double factor, StaticResult& result) {
     const bool conservative = equations_.has_potential();
     evaluate(factor);
-    const double stiffness = equations_.assembler().greatest_stiffness(equations_.mass().rows);
+    const double stiffness = stiffness_here();
     double potential = work_.data.potential;
     energy_scale_ = std::max(energy_scale_, std::abs(potential));
     double h = 1e2 / std::sqrt(stiffness), moved = INFINITY;
@@ -334,6 +334,21 @@ class Statics {
     }
     result.restless = !conservative && h > shortest;
     return false;
+  }
+
+  /// Greatest stiffness over mass at the present state [1/s^2]. Free bodies have none, but they fall a length of the
+  /// scene in a time.
+  double stiffness_here() const {
+    const VectorX& mass = equations_.mass().rows;
+    const double stiffness = equations_.assembler().greatest_stiffness(mass);
+    if (stiffness > 0.0) return stiffness;
+    const double size = equations_.model().length_scale;
+    double fastest = 1e-300;
+    for (const int dof : equations_.model().node_dof)
+      if (mass(dof) > 0.0)
+        fastest = std::max(fastest,
+                           work_.data.residual.segment(dof, equations_.model().dimension).norm() / (mass(dof) * size));
+    return fastest;
   }
 
   /// True if an interval lowers the potential, within rounding. A motion that goes `far` in an interval without inertia

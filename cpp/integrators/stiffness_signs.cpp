@@ -84,7 +84,7 @@ VectorX StiffnessSigns::lowest_mode(int seed) {
   const VectorX weight = equations_.mass().rows.cwiseMax(1e-300);
   const double stiffness = equations_.assembler().greatest_stiffness(weight);
   double damping = stiffness > 0.0 ? 1e-16 * stiffness : 1.0;  // a free body has none
-  while (damping < 1e3 * stiffness && !definite(solver, damping, weight)) damping *= 2.0;
+  while (!definite(solver, damping, weight) && damping < 1e3 * stiffness) damping *= 2.0;
   std::mt19937 random(static_cast<unsigned>(seed + 1));
   std::normal_distribution<double> normal;
   VectorX direction(model.dof_count);

@@ -277,3 +277,26 @@ def test_a_ball_on_rods_does_not_depend_on_the_axes_of_the_scene() -> None:
         assert len(simulation.contacts()) > 0
         found.append(axes.T @ simulation.position(ball))
     np.testing.assert_allclose(found[1], found[0], atol=1e-9)
+
+
+@pytest.mark.parametrize("gap", [0.0, 1e-3, 0.01, 0.1])
+def test_a_ball_comes_to_rest_below_where_it_was_drawn(gap: float) -> None:
+    """In a search for an equilibrium: on a floor, where nothing has a stiffness, and between two rods."""
+    scene = withe.Scene()
+    scene.add_floor(friction=0.3)
+    ball = scene.add_body(withe.solids.Sphere(RADIUS), density=300, position=(0, 0, RADIUS + gap))
+    simulation = scene.build(integrator="static")
+    simulation.equilibrium()
+    assert simulation.position(ball)[2] == pytest.approx(RADIUS, rel=0.01)
+
+    scene = withe.Scene()
+    scene.enable_contact(friction=0.3)
+    rubber = withe.Material(youngs_modulus=2e7, density=1100.0)
+    for y in (-0.02, 0.02):
+        rod = scene.add_rod(start=(-0.15, y, 0), end=(0.15, y, 0), nodes=31, radius=4e-3, material=rubber)
+        scene.clamp(rod.start)
+        scene.clamp(rod.end)
+    ball = scene.add_body(withe.solids.Sphere(0.03), density=300, position=(0, 0, 0.0275 + gap))
+    simulation = scene.build(integrator="static")
+    simulation.equilibrium()
+    assert simulation.position(ball)[2] == pytest.approx(0.0205, rel=0.01)
