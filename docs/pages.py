@@ -112,7 +112,7 @@ EXAMPLES = {
         "learn_follow",
     ),
     "Contact and friction": ("friction", "spider", "gripper", "flagella", "flagella_contact"),
-    "Rigid bodies": ("hanging_plug", "satellite", "crane_load"),
+    "Rigid bodies": ("hanging_plug", "satellite", "crane_load", "lift_ball"),
     "Hands, cables and sheets": (
         "carry_rope",
         "pull_rope",

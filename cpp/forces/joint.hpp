@@ -11,20 +11,48 @@
 /// a plane, frames that turn by x and y are measured by their Cayley vectors 2 tan(x / 2). T is then scaled by s to
 /// keep this work:
 ///   T (x - y) = T s (2 tan(x / 2) - 2 tan(y / 2)).
+///
+/// Stops at the angles a < b push back with the energy V = k (theta - b)^2 / 2 above b and k (a - theta)^2 / 2 below a.
+/// Their torque over a step is the discrete gradient -(V(theta1) - V(theta0)) / (theta1 - theta0), so that a joint
+/// rebounds from them without loss.
 
+#include <algorithm>
 #include <cmath>
 
 #include "common/dual.hpp"
+#include "model/description.hpp"
 
 namespace withe {
 
 struct JointTorque {
   double stiffness = 0, rest_angle = 0, damping = 0, moment = 0;
+  JointStops stops = {};
 
-  bool acts() const { return stiffness != 0.0 || damping != 0.0 || moment != 0.0; }
-  /// k (theta - theta0)^2 / 2 [J].
-  double energy(double angle) const { return 0.5 * stiffness * (angle - rest_angle) * (angle - rest_angle); }
+  bool acts() const { return stiffness != 0.0 || damping != 0.0 || moment != 0.0 || stops.stiffness != 0.0; }
+  /// k (theta - theta0)^2 / 2 and the energy of the stops [J].
+  double energy(double angle) const {
+    const double beyond = std::max({angle - stops.high, stops.low - angle, 0.0});
+    return 0.5 * stiffness * (angle - rest_angle) * (angle - rest_angle) + 0.5 * stops.stiffness * beyond * beyond;
+  }
 };
+
+/// Mean of the angle beyond a limit, from 0 on, over the change of an angle that is `from` and `to` beyond it.
+template <class Scalar>
+Scalar mean_beyond(const Scalar& from, const Scalar& to) {
+  const bool first = value_of(from) > 0.0, last = value_of(to) > 0.0;
+  if (first && last) return 0.5 * (from + to);
+  if (last) return (0.5 * to * to) / (to - from);
+  if (first) return (0.5 * from * from) / (from - to);
+  return Scalar(0.0);
+}
+
+/// Torque of stops over a change of angle; at one angle where both are the same [N m].
+template <class Scalar>
+Scalar torque_of_stops(const JointStops& stops, const Scalar& from, const Scalar& to) {
+  if (stops.stiffness == 0.0) return Scalar(0.0);
+  return stops.stiffness * (mean_beyond<Scalar>(stops.low - from, stops.low - to) -
+                            mean_beyond<Scalar>(from - stops.high, to - stops.high));
+}
 
 /// T [N m].
 template <class Scalar>

@@ -38,6 +38,7 @@ struct LinkPlace {
   int hinge = -1;
   bool turns = true;
   int slide = -1;
+  JointStops stops;
 };
 
 VectorX to_vector(const std::vector<double>& v) {
@@ -167,7 +168,7 @@ class Builder {
       hinged_body_.push_back(cluster.body);
       model_.hinges.push_back({-1, link.axis.normalized(), -1});
       hinge_parent_.push_back(root);
-      links_.push_back({root, turning, swapped ? -1.0 : 1.0, hinge});
+      links_.push_back({root, turning, swapped ? -1.0 : 1.0, hinge, true, -1, link.stops});
     }
   }
 
@@ -182,7 +183,7 @@ class Builder {
     const int slide = static_cast<int>(model_.slides.size());
     model_.slides.push_back({-1, link.axis.normalized(), -1});
     slide_places_.push_back({root, moving});
-    links_.push_back({root, moving, swapped ? -1.0 : 1.0, -1, true, slide});
+    links_.push_back({root, moving, swapped ? -1.0 : 1.0, -1, true, slide, link.stops});
   }
 
   /// In a plane, a hinge lies between two frames. A hinge about an axis in the plane cannot turn, so its clusters are
@@ -198,7 +199,7 @@ class Builder {
       if (std::abs(along(link)) < 0.5) merge(now(link.parent), now(link.child));
     for (const RevoluteLink& link : joint.links) {
       const int parent = now(link.parent), child = now(link.child);
-      links_.push_back({parent, child, along(link) < 0.0 ? -1.0 : 1.0, -1, parent != child});
+      links_.push_back({parent, child, along(link) < 0.0 ? -1.0 : 1.0, -1, parent != child, -1, link.stops});
     }
   }
 
@@ -349,9 +350,10 @@ class Builder {
   }
 
   void find_joint_angles() {
-    for (const auto& [parent, child, sign, hinge, turns, slide] : links_) {
+    for (const auto& [parent, child, sign, hinge, turns, slide, stops] : links_) {
       JointAngle joint;
       joint.sign = sign;
+      joint.stops = stops;
       joint.node = node_of(clusters_[at(clusters_[at(parent)].passes.empty() ? child : parent)]);
       if (slide >= 0) {
         joint.turning = model_.slides[at(slide)].dof;

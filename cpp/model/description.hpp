@@ -50,6 +50,12 @@ struct RodPass {
   int body() const { return -1 - rod; }
 };
 
+/// Stops of a joint: beyond an angle they push back by a stiffness.
+struct JointStops {
+  double low = -std::numeric_limits<double>::infinity(), high = -low;  ///< [rad]
+  double stiffness = 0;                                                ///< [N m/rad]; 0: no stops
+};
+
 /// A link inside a joint: the second cluster turns about `axis` relative to the first. If it slides, it moves along the
 /// axis instead and does not turn; the first cluster is then that of a body. Its coordinate is in metres, and the
 /// numbers below are forces [N] instead of moments.
@@ -63,6 +69,7 @@ struct RevoluteLink {
   double rest_angle = 0;  ///< [rad]
   double damping = 0;     ///< c [N m s/rad]
   double moment = 0;      ///< moment of a motor on the child [N m]
+  JointStops stops;
 };
 
 enum class JointForm {

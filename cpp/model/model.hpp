@@ -87,6 +87,7 @@ struct JointAngle {
   int turning = -1, against = -1;
   double sign = 1;
   int node = 0;
+  JointStops stops;
 
   bool turns() const { return turning >= 0; }
   /// Angle of a joint from unknowns, or its rate from rates.

@@ -128,8 +128,10 @@ class FrameForces {
 
   void add_joint(int j) {
     const JointAngle& joint = model_.joint_angles[at(j)];
-    const JointTorque torque = joint_torque(parameters_, elastic_, j);
-    const double pull = joint.sign * torque_of(torque, joint.angle(state_.q), 0.0);
+    JointTorque torque = joint_torque(model_, parameters_, elastic_, j);
+    const double angle = joint.angle(state_.q);
+    const double pull = joint.sign * (torque_of(torque, angle, 0.0) + torque_of_stops(torque.stops, angle, angle));
+    if (angle < torque.stops.low || angle > torque.stops.high) torque.stiffness += torque.stops.stiffness;
     const int turning = row_of(joint.turning), against = row_of(joint.against);
     if (turning >= 0) gradient(turning) -= pull, hessian(turning, turning) += torque.stiffness;
     if (against >= 0) gradient(against) += pull, hessian(against, against) += torque.stiffness;

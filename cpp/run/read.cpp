@@ -136,15 +136,19 @@ double joint_rate(const Model& model, const State& state, const Configuration& c
     if (model.planar()) return model.frame_dof[at(half.frame)] == (turns ? turning.turning : turning.against);
     return half.frame == hinge->frame && (turns ? half.hinge == hinge - model.hinges.begin() : half.hinge < 0);
   };
+  const Vector3 axis =
+      model.planar() ? model.plane->normal : Vector3(frame_rotation(model, state, hinge->frame) * hinge->axis);
   const auto rate = [&](bool turns) -> Vector3 {
     Vector3 sum = Vector3::Zero();
     int count = 0;
     for (const FrameStencil& half : model.half)
       if (belongs(half, turns)) sum += angular_velocity(model, state, c, half.edge), ++count;
-    return sum / count;
+    if (count > 0) return sum / count;
+    // A body without rods there turns with its frame.
+    if (model.planar()) return state.v(turns ? turning.turning : turning.against) * axis;
+    const Vector3 root = state.v.segment<3>(model.frame_dof[at(hinge->frame)]);
+    return turns ? Vector3(root + state.v(hinge->dof) * axis) : root;
   };
-  const Vector3 axis =
-      model.planar() ? model.plane->normal : Vector3(frame_rotation(model, state, hinge->frame) * hinge->axis);
   return turning.sign * axis.dot(rate(true) - rate(false));
 }
 

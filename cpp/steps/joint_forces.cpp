@@ -14,7 +14,10 @@ Scalar torque_on(const StepProblem& problem, const JointTorque& torque, const Jo
                  const Scalar (&start)[2]) {
   const double rate = problem.resists() ? 1.0 / problem.interval : 0.0;
   const Scalar angle = joint.sign * (z[0] - z[1]), before = joint.sign * (start[0] - start[1]);
-  const Scalar out = torque_of(torque, angle, rate * (angle - before));
+  // z is the end of a step, or its middle.
+  const Scalar end = problem.in_middle() ? Scalar(2.0 * angle - before) : angle;
+  const Scalar out = torque_of(torque, angle, rate * (angle - before)) +
+                     torque_of_stops(torque.stops, problem.in_middle() ? before : end, end);
   if (!problem.conserves_energy() || joint.against < 0) return out;
   return out * share_of_turns(2.0 * (z[0] - start[0]), 2.0 * (z[1] - start[1]));
 }
@@ -41,8 +44,9 @@ Dual<4> torque_with_slopes(const StepProblem& problem, const StepData& data, con
 
 }  // namespace
 
-JointTorque joint_torque(const Parameters& p, const ElasticCoefficients& elastic, int joint) {
-  return {elastic.joint_stiffness[joint], elastic.joint_natural[joint], p.joint_damping[joint], p.joint_moment[joint]};
+JointTorque joint_torque(const Model& model, const Parameters& p, const ElasticCoefficients& elastic, int joint) {
+  return {elastic.joint_stiffness[joint], elastic.joint_natural[joint], p.joint_damping[joint], p.joint_moment[joint],
+          model.joint_angles[at(joint)].stops};
 }
 
 JointForces::JointForces(const Model& model) {
@@ -64,7 +68,7 @@ void JointForces::add(const StepProblem& problem, StepData& data, const Assemble
   Local local;
   for (int j = 0; j < table_.count(); ++j) {
     const JointAngle& joint = problem.model.joint_angles[at(j)];
-    const JointTorque torque = joint_torque(*problem.parameters, problem.elastic, j);
+    const JointTorque torque = joint_torque(problem.model, *problem.parameters, problem.elastic, j);
     if (!joint.turns() || !torque.acts()) continue;
     const Dual<4> T = torque_with_slopes(problem, data, torque, joint);
     for (int i = 0; i < 2; ++i) {
@@ -90,7 +94,7 @@ void JointForces::add_adjoint(const StepProblem& problem, const StepData& data, 
     if (!joint.turns()) continue;
     gather(table_, j, adjoint.rows, rows);
     const double apart = -joint.sign * (rows[0] - rows[1]);
-    const JointTorque torque = joint_torque(*problem.parameters, problem.elastic, j);
+    const JointTorque torque = joint_torque(problem.model, *problem.parameters, problem.elastic, j);
     const auto by = [&](const JointTorque& unit) { return apart * torque_now(problem, data, unit, joint); };
     CoefficientAdjoint& out = adjoint.coefficients;
     out.joint_stiffness[j] += by({.stiffness = 1.0, .rest_angle = torque.rest_angle});
@@ -107,11 +111,11 @@ void JointForces::add_rounding(const StepProblem& problem, StepData& data) const
   const double rate = problem.resists() ? 1.0 / problem.interval : 0.0;
   for (int j = 0; j < table_.count(); ++j) {
     const JointAngle& joint = problem.model.joint_angles[at(j)];
-    const JointTorque torque = joint_torque(*problem.parameters, problem.elastic, j);
+    const JointTorque torque = joint_torque(problem.model, *problem.parameters, problem.elastic, j);
     if (!joint.turns() || !torque.acts()) continue;
     const double greatest = std::abs(unknown(data.z, joint.turning)) + std::abs(unknown(data.z, joint.against));
-    const double bound =
-        kRounding * (torque.stiffness + 2.0 * torque.damping * rate) * (greatest + std::abs(torque.rest_angle));
+    const double bound = kRounding * (torque.stiffness + torque.stops.stiffness + 2.0 * torque.damping * rate) *
+                         (greatest + std::abs(torque.rest_angle));
     for (int dof : {joint.turning, joint.against})
       if (dof >= 0) data.floor[dof] += bound;
   }
@@ -142,8 +146,10 @@ void JointForces::add_applied(const StepProblem& problem, const StepData& data, 
 }
 
 double joint_energy(const Model& model, const PartNumbers& numbers, const VectorX& q, int joint) {
-  const JointTorque torque{.stiffness = numbers.joint_stiffness[joint], .rest_angle = numbers.joint_rest_angle[joint]};
-  return torque.energy(model.joint_angles[at(joint)].angle(q));
+  const JointAngle& angle = model.joint_angles[at(joint)];
+  const JointTorque torque{
+      .stiffness = numbers.joint_stiffness[joint], .rest_angle = numbers.joint_rest_angle[joint], .stops = angle.stops};
+  return torque.energy(angle.angle(q));
 }
 
 }  // namespace withe

@@ -26,9 +26,10 @@ class JointForces final : public Term {
   ElementTable table_;
 };
 
-/// Torque of the motor, spring and damper of a joint.
-JointTorque joint_torque(const Parameters& parameters, const ElasticCoefficients& elastic, int joint);
-/// Energy of the spring of one joint at q [J].
+/// Torque of the motor, spring, damper and stops of a joint.
+JointTorque joint_torque(const Model& model, const Parameters& parameters, const ElasticCoefficients& elastic,
+                         int joint);
+/// Energy of the spring and the stops of one joint at q [J].
 double joint_energy(const Model& model, const PartNumbers& numbers, const VectorX& q, int joint);
 
 }  // namespace withe

@@ -72,7 +72,8 @@ double World::joint_torque(int joint) const {
   const double angle = joint_angle(joint);
   ElasticCoefficients elastic;
   set_elastic(implementation_->parameters, elastic);
-  return torque_of(withe::joint_torque(implementation_->parameters, elastic, joint), angle, joint_rate(joint));
+  const JointTorque torque = withe::joint_torque(implementation_->model, implementation_->parameters, elastic, joint);
+  return torque_of(torque, angle, joint_rate(joint)) + torque_of_stops(torque.stops, angle, angle);
 }
 
 Matrix3 World::body_rotation(int body) const {

@@ -142,7 +142,11 @@ void register_joints_and_supports(py::module_& module) {
       .def_readwrite("stiffness", &RevoluteLink::stiffness)
       .def_readwrite("rest_angle", &RevoluteLink::rest_angle)
       .def_readwrite("damping", &RevoluteLink::damping)
-      .def_readwrite("moment", &RevoluteLink::moment);
+      .def_readwrite("moment", &RevoluteLink::moment)
+      .def(
+          "set_stops",
+          [](RevoluteLink& link, double low, double high, double stiffness) { link.stops = {low, high, stiffness}; },
+          py::arg("low"), py::arg("high"), py::arg("stiffness"));
 
   py::class_<JointDescription> joint(module, "JointDescription", "A node that several rods share.");
   joint.def(py::init<>())

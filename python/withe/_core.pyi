@@ -205,6 +205,12 @@ class RevoluteLink:
         child: typing.SupportsInt | typing.SupportsIndex,
         axis: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
     ) -> None: ...
+    def set_stops(
+        self,
+        low: typing.SupportsFloat | typing.SupportsIndex,
+        high: typing.SupportsFloat | typing.SupportsIndex,
+        stiffness: typing.SupportsFloat | typing.SupportsIndex,
+    ) -> None: ...
     @property
     def axis(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...
     @axis.setter

@@ -114,7 +114,7 @@ class Sphere:
         triangles : ndarray of int, shape (m, 3)
             Rows of the vertices, counter-clockwise from outside.
         """
-        angles = np.linspace(0.0, np.pi, 13)
+        angles = np.linspace(0.0, np.pi, 25)
         return _turned(self.radius * np.sin(angles), -self.radius * np.cos(angles))
 
 
@@ -283,7 +283,7 @@ class Capsule:
         triangles : ndarray of int, shape (m, 3)
             Rows of the vertices, counter-clockwise from outside.
         """
-        angles = np.linspace(0.0, np.pi, 14)
+        angles = np.linspace(0.0, np.pi, 26)
         shift = np.where(angles < 0.5 * np.pi, -0.5, 0.5) * self.length
         return _turned(self.radius * np.sin(angles), shift - self.radius * np.cos(angles))
 
@@ -363,7 +363,7 @@ class Mesh:
         return np.asarray(self.vertices), np.asarray(self.triangles)
 
 
-def _turned(radii: FloatArray, heights: FloatArray, sides: int = 24) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+def _turned(radii: FloatArray, heights: FloatArray, sides: int = 48) -> tuple[FloatArray, npt.NDArray[np.int64]]:
     """Return the surface that a profile draws when it turns about z."""
     angles = np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)
     circle = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(sides)])

@@ -42,6 +42,7 @@ EXAMPLES = {
     "helix.py": ([], r"(\d+) um from the public code", 0.0, 100.0),
     "knot.py": (["--nodes", "201", "--points", "2", "--speed", "8e-3"], r" 200 .*?([-+.\d]+)%", -6.0, 6.0),
     "knot_limit.py": (["--points", "4"], r"at epsilon = 0: pull ([.\d]+) of the limit", 0.97, 1.03),
+    "lift_ball.py": ([], r"forces equal weights within ([.\d]+) %", 0.0, 0.05),
     "overhand.py": (["--knots", "1", "--speed", "8e-3"], r" 200 .* ([.\d]+)\n", 0.75, 0.92),
     "plectoneme.py": (["--forces", ".01", "--turns", "2"], r"moment at most ([.\d]+)% off", 0.0, 3.0),
     "ring_buckling.py": (["--nodes", "40"], r"\(([-+.\d]+) %\)", -3.0, 3.0),

@@ -124,4 +124,6 @@ def _describe_link(parent: int, child: int, join: JoinPart) -> _core.RevoluteLin
     link.slides = join.kind == "sliding"
     for word in kind_of(join).words:
         setattr(link, word.name, getattr(join, word.name))
+    if join.limits is not None:
+        link.set_stops(*join.limits, join.limit_stiffness)
     return link

@@ -151,6 +151,8 @@ class JoinPart(Part):
     rest_angle: float = 0.0  # [rad]
     damping: float = 0.0  # [N m s/rad]
     moment: float = 0.0  # [N m]
+    limits: tuple[float, float] | None = None  # [rad]
+    limit_stiffness: float = 0.0  # [N m/rad]
 
 
 @dataclass(frozen=True, eq=False)

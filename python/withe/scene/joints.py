@@ -19,6 +19,9 @@ __all__ = ["JoinedNodes"]
 
 FloatArray = npt.NDArray[np.float64]
 
+Stops = tuple[tuple[float, float] | None, float | None]
+"""Limits and the stiffness of stops, as given."""
+
 _ORDINALS = ("first", "second", "third", "fourth")
 
 
@@ -39,6 +42,7 @@ class JoinedNodes:
         axis: npt.ArrayLike | None,
         form: JointForm,
         numbers: tuple[float, float, float, float],
+        stops: Stops,
         name: str | None,
     ) -> list[JoinPart]:
         """Joins of the first node with each of the others, checked, and all merged; not yet in the directory.
@@ -51,7 +55,7 @@ class JoinedNodes:
         try:
             first, *others = self._places(nodes, at, kind)
             pairs = zip(names, others, strict=True)
-            parts = [self._part(own, first, other, kind, axis, form, numbers) for own, other in pairs]
+            parts = [self._part(own, first, other, kind, axis, form, numbers, stops) for own, other in pairs]
             joins = {
                 join.name: join for part in parts for node in part.nodes for join in connected(self._joins_at, node)
             }
@@ -119,6 +123,7 @@ class JoinedNodes:
         axis: npt.ArrayLike | None,
         form: JointForm,
         numbers: tuple[float, float, float, float],
+        stops: Stops,
     ) -> JoinPart:
         (node_a, name_a), (node_b, name_b) = a, b
         validation.choice(kind, "kind of the joint", ("rigid", "pinned", "revolute", "sliding"))
@@ -148,7 +153,18 @@ class JoinedNodes:
                 f"nodes {name_a!r} and {name_b!r} must coincide to be joined, but are {distance:g} m apart"
             )
         direction = None if axis is None else validation.unit_vector(axis, "axis of the joint")
-        return JoinPart(name, (node_a, node_b), (name_a, name_b), kind, direction, form, **values)
+        limits, stiffness = _stops(stops, name, kind if has_axis else None)
+        return JoinPart(
+            name,
+            (node_a, node_b),
+            (name_a, name_b),
+            kind,
+            direction,
+            form,
+            **values,
+            limits=limits,
+            limit_stiffness=stiffness,
+        )
 
     def _extent(self) -> float:
         """Diagonal of the box around all rods [m]."""
@@ -164,3 +180,26 @@ class JoinedNodes:
         for body in self._directory.layout.body_points:
             low, high = np.minimum(low, body[0]), np.maximum(high, body[0])
         return float(np.linalg.norm(high - low))
+
+
+def _stops(stops: Stops, name: str, kind: str | None) -> tuple[tuple[float, float] | None, float]:
+    """Return checked limits and the stiffness of their stops; `kind` is None for a joint without an axis."""
+    limits, stiffness = stops
+    if limits is None:
+        if stiffness is not None:
+            raise ValueError(f"limit_stiffness of joint {name!r} needs limits=")
+        return None, 0.0
+    if kind is None:
+        raise ValueError(f"limits of joint {name!r} need kind='revolute' or kind='sliding'")
+    try:
+        low, high = map(float, limits)
+    except (TypeError, ValueError):
+        raise ValueError(f"limits of joint {name!r} must be two angles, got {limits!r:.80}") from None
+    if not low <= 0.0 <= high or low == high:
+        raise ValueError(f"limits of joint {name!r} must contain the drawn angle, 0, got ({low:g}, {high:g})")
+    if stiffness is None:
+        raise ValueError(
+            f"limits of joint {name!r} need limit_stiffness=: the greatest torque that the stops must bear, over the "
+            "angle by which they may yield"
+        )
+    return (low, high), validation.positive(stiffness, f"limit_stiffness of joint {name!r}")

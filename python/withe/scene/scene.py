@@ -441,6 +441,8 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         rest_angle: float = 0.0,
         damping: float = 0.0,
         moment: float = 0.0,
+        limits: tuple[float, float] | None = None,
+        limit_stiffness: float | None = None,
         name: str | None = None,
     ) -> Joint: ...
 
@@ -460,6 +462,8 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         rest_angle: float = 0.0,
         damping: float = 0.0,
         moment: float = 0.0,
+        limits: tuple[float, float] | None = None,
+        limit_stiffness: float | None = None,
         name: str | None = None,
     ) -> tuple[Joint, ...]: ...
 
@@ -476,6 +480,8 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         rest_angle: float = 0.0,
         damping: float = 0.0,
         moment: float = 0.0,
+        limits: tuple[float, float] | None = None,
+        limit_stiffness: float | None = None,
         name: str | None = None,
     ) -> Joint | tuple[Joint, ...]:
         """Join two or more coincident nodes rigidly, by a pin or by a hinge.
@@ -516,6 +522,12 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
             Damping coefficient of a revolute joint.
         moment : float [N m]
             Torque of the motor of a revolute joint. Its work is part of `energy().loads`.
+        limits : tuple of two floats [rad]
+            Least and greatest angle; one of them may be infinite. Beyond a limit a stop pushes back with the torque
+            `limit_stiffness` times the angle beyond it. The joint rebounds from a stop without loss, but for its
+            damping.
+        limit_stiffness : float [N m/rad]
+            Stiffness of the stops. It must be given with `limits`.
         name : str
             Name of the joint. Several joints are named "NAME 1", "NAME 2", ...
 
@@ -528,7 +540,8 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         ------
         ValueError
             Nodes further apart than 1e-9 of the scene, a node given twice, contradicting joints at one node, or an
-            axis, stiffness, rest_angle, damping or moment for a joint without an axis. Then no node is joined.
+            axis, stiffness, rest_angle, damping, moment or limits for a joint without an axis. Limits that exclude the
+            drawn angle, or have no stiffness. Then no node is joined.
 
         See Also
         --------
@@ -553,7 +566,8 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
                 raise ValueError(f"kind of the joint must be given once, got {others[-1]!r} and {kind!r}")
             kind = cast(JoinKind, nodes.pop())
         numbers = (stiffness, rest_angle, damping, moment)
-        parts = self._joints.join(nodes, at, kind, axis, form, numbers, name)
+        stops = (limits, limit_stiffness)
+        parts = self._joints.join(nodes, at, kind, axis, form, numbers, stops, name)
         joints = tuple(cast(Joint, self._directory.add(part)) for part in parts)
         return joints if len(joints) > 1 else joints[0]
 
