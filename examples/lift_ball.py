@@ -102,7 +102,7 @@ def main() -> None:
         def lifted(time: float, top: Array = top) -> Array:
             """Return the position of a clamp."""
             share = np.clip((time - CURL) / LIFT, 0.0, 1.0)
-            return top + (0, 0, HEIGHT * share**2 * (3.0 - 2.0 * share))
+            return top + HEIGHT * share**2 * (3.0 - 2.0 * share) * np.array([0.0, 0.0, 1.0])
 
         simulation.move(support, path=lifted)
     start = float(simulation.pose(palm[0]).position[2])
