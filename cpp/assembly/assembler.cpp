@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 #include <utility>
 
 namespace withe {
@@ -67,8 +68,8 @@ RegularStencils regular_stencils(const Model& model, const ElementTable& bend) {
 
 }  // namespace
 
-void ElementTable::find_offsets(const LinearSolver& solver) {
-  symmetric_ = solver.symmetry() == Symmetry::symmetric;
+void ElementTable::find_offsets(const Assembler& assembler) {
+  symmetric_ = assembler.solver().symmetry() == Symmetry::symmetric;
   offsets_.clear();
   starts_.clear();
   for (int e = 0; e < count(); ++e) {
@@ -76,7 +77,7 @@ void ElementTable::find_offsets(const LinearSolver& solver) {
     const int* d = dofs(e);
     for (int i = 0; i < width_; ++i)
       for (int j = 0; j < (symmetric_ ? i + 1 : width_); ++j)
-        if (d[i] >= 0 && d[j] >= 0) offsets_.push_back(static_cast<int>(solver.place(d[i], d[j])));
+        if (d[i] >= 0 && d[j] >= 0) offsets_.push_back(static_cast<int>(assembler.place(d[i], d[j])));
   }
 }
 
@@ -147,6 +148,11 @@ Assembler::Assembler(const Model& model, std::vector<ElementTable*> declared, Sy
   const auto add_cliques = [&](const ElementTable& table) {
     for (int e = 0; e < table.count(); ++e) cliques_.emplace_back(table.dofs(e), table.dofs(e) + table.width());
   };
+  if (!model.carried.empty()) {
+    carried_.assign(at(model.dof_count), -1);
+    for (std::size_t i = 0; i < model.carried.size(); ++i)
+      std::fill_n(carried_.begin() + model.carried[i].own_dof, model.carried[i].own_size, static_cast<int>(i));
+  }
   add_cliques(stretch);
   add_cliques(bend);
   add_cliques(half);
@@ -170,12 +176,12 @@ void Assembler::couple(const std::vector<int>& contact_unknowns, int width) {
     for (int i = 0; i < width; ++i)
       for (int j = 0; j < i; ++j) {
         const int row = contact.dofs(e)[i], column = contact.dofs(e)[j];
-        if (row >= 0 && column >= 0 && !pattern_.contains(row, column)) {
+        if (row >= 0 && column >= 0 && !whole_pattern().contains(row, column)) {
           analyse();
           return;
         }
       }
-  contact.find_offsets(*solver_);
+  contact.find_offsets(*this);
 }
 
 void Assembler::order_for(const std::vector<int>& contact_unknowns, int width) {
@@ -187,7 +193,8 @@ void Assembler::couple_groups(const std::vector<std::vector<int>>& groups) {
   const std::size_t known = groups_.size();
   for (const std::vector<int>& group : groups)
     if (!std::all_of(group.begin(), group.end(), [&](int row) {
-          return std::all_of(group.begin(), group.end(), [&](int column) { return pattern_.contains(row, column); });
+          return std::all_of(group.begin(), group.end(),
+                             [&](int column) { return whole_pattern().contains(row, column); });
         }))
       groups_.push_back(group);
   if (groups_.size() > known) analyse();
@@ -206,13 +213,17 @@ void Assembler::analyse() {
   for (int e = 0; e < contact.count(); ++e) cliques.emplace_back(contact.dofs(e), contact.dofs(e) + contact.width());
   add_bodies_to(cliques);
   pattern_ = SparsityPattern::from_cliques(model_.dof_count, cliques);
+  if (!carried_.empty()) set_beside();
   solver_ = make_linear_solver(pattern_, symmetry_, kind_);
+  const auto first = static_cast<std::ptrdiff_t>(solver_->values().size()) - pattern_.beside;
+  for (std::ptrdiff_t& place : beside_)
+    if (place >= 0) place += first;
   ++generation_;
-  for (ElementTable* table : {&stretch, &bend, &half, &contact}) table->find_offsets(*solver_);
-  for (ElementTable* table : declared_) table->find_offsets(*solver_);
+  for (ElementTable* table : {&stretch, &bend, &half, &contact}) table->find_offsets(*this);
+  for (ElementTable* table : declared_) table->find_offsets(*this);
   find_edge_couplings();
   diagonal_.clear();
-  for (int i = 0; i < model_.dof_count; ++i) diagonal_.push_back(solver_->offset(i, i));
+  for (int i = 0; i < model_.dof_count; ++i) diagonal_.push_back(place(i, i));
   regular = regular_stencils(model_, bend);
   find_blocks();
   find_folds();
@@ -222,6 +233,33 @@ void Assembler::analyse() {
       const int row = pattern_.row_indices[at(k)];
       entries_.push_back(solver_->place(row, column));
     }
+}
+
+void Assembler::set_beside() {
+  std::swap(whole_, pattern_);
+  pattern_ = {};
+  pattern_.size = whole_.size;
+  pattern_.column_starts.assign(1, 0);
+  beside_.assign(whole_.row_indices.size(), -1);
+  for (int column = 0; column < whole_.size; ++column) {
+    for (int k = whole_.column_starts[at(column)]; k < whole_.column_starts[at(column) + 1]; ++k) {
+      const int row = whole_.row_indices[at(k)];
+      const bool is_carried = carried(row) || carried(column);
+      if (!is_carried || row == column) pattern_.row_indices.push_back(row);
+      if (is_carried && (symmetry_ != Symmetry::symmetric || row >= column)) beside_[at(k)] = pattern_.beside++;
+    }
+    pattern_.column_starts.push_back(static_cast<int>(pattern_.row_indices.size()));
+  }
+}
+
+std::ptrdiff_t Assembler::place(int row, int column) const {
+  if (!carried(row) && !carried(column)) return solver_->place(row, column);
+  if (symmetry_ == Symmetry::symmetric && row < column) std::swap(row, column);
+  const auto first = whole_.row_indices.begin();
+  const auto begin = first + whole_.column_starts[at(column)], end = first + whole_.column_starts[at(column) + 1];
+  const auto found = std::lower_bound(begin, end, row);
+  if (found == end || *found != row) throw std::invalid_argument("entry of a carried part outside of the pattern");
+  return beside_[static_cast<std::size_t>(found - first)];
 }
 
 void Assembler::multiply(const VectorX& x, VectorX& out) const {
@@ -294,14 +332,11 @@ void Assembler::find_blocks() {
 
 /// Forces on a carried part act on its body.
 void Assembler::add_bodies_to(std::vector<std::vector<int>>& cliques) const {
-  if (model_.carried.empty()) return;
-  std::vector<int> carried(at(model_.dof_count), -1);
-  for (std::size_t i = 0; i < model_.carried.size(); ++i)
-    std::fill_n(carried.begin() + model_.carried[i].own_dof, model_.carried[i].own_size, static_cast<int>(i));
+  if (carried_.empty()) return;
   for (std::vector<int>& clique : cliques)
     for (std::size_t k = 0; k < clique.size(); ++k) {  // also of those that are added: bodies carry bodies
-      if (clique[k] < 0 || carried[at(clique[k])] < 0) continue;
-      const CarriedPart& part = model_.carried[at(carried[at(clique[k])])];
+      if (clique[k] < 0 || !carried(clique[k])) continue;
+      const CarriedPart& part = model_.carried[at(carried_[at(clique[k])])];
       const auto add = [&](int dof) {
         if (std::find(clique.begin(), clique.end(), dof) == clique.end()) clique.push_back(dof);
       };
@@ -312,8 +347,9 @@ void Assembler::add_bodies_to(std::vector<std::vector<int>>& cliques) const {
 
 void Assembler::find_folds() {
   folds_.clear();
-  const auto place = [&](int row, int column) {
-    return pattern_.contains(row, column) ? solver_->place(row, column) : std::ptrdiff_t{-1};
+  const SparsityPattern& whole = whole_pattern();
+  const auto place_of = [&](int row, int column) {
+    return whole.contains(row, column) ? place(row, column) : std::ptrdiff_t{-1};
   };
   for (const CarriedPart& part : model_.carried) {
     std::vector<int> own, others;
@@ -321,9 +357,8 @@ void Assembler::find_folds() {
     std::vector<int> square = own;
     square.insert(square.end(), part.body_dofs.begin(), part.body_dofs.end());
     for (int dof : own)
-      for (int k = pattern_.column_starts[at(dof)]; k < pattern_.column_starts[at(dof) + 1]; ++k)
-        if (const int other = pattern_.row_indices[at(k)];
-            std::find(square.begin(), square.end(), other) == square.end())
+      for (int k = whole.column_starts[at(dof)]; k < whole.column_starts[at(dof) + 1]; ++k)
+        if (const int other = whole.row_indices[at(k)]; std::find(square.begin(), square.end(), other) == square.end())
           others.push_back(other);
     std::sort(others.begin(), others.end());
     others.erase(std::unique(others.begin(), others.end()), others.end());
@@ -333,7 +368,7 @@ void Assembler::find_folds() {
     fold.others = static_cast<int>(others.size());
     const auto list = [&](const std::vector<int>& rows, const std::vector<int>& columns, auto& out) {
       for (int row : rows)
-        for (int column : columns) out.push_back(place(row, column));
+        for (int column : columns) out.push_back(place_of(row, column));
     };
     list(own, others, fold.rows);
     list(part.body_dofs, others, fold.onto_rows);
@@ -342,6 +377,7 @@ void Assembler::find_folds() {
       list(others, part.body_dofs, fold.onto_columns);
     }
     list(square, square, fold.square);
+    for (int dof : own) fold.diagonal.push_back(solver_->offset(dof, dof));
     folds_.push_back(std::move(fold));
   }
 }
@@ -397,6 +433,7 @@ void Assembler::fold_carried(const std::vector<Carrying>& carrying) {
     const double size = dd.norm() / std::sqrt(d);
     for (int a = 0; a < d; ++a) {
       for (int b = 0; b < d; ++b) square(a, b) = a != b ? 0.0 : size > 0.0 ? size : 1.0;
+      values[static_cast<std::size_t>(fold.diagonal[at(a)])] = square(a, a);
       for (int b = 0; b < u; ++b) square(a, d + b) = square(d + b, a) = 0.0;
     }
     const Small uu = H * du + ud * G + H * dd * G + carrying[i].slope.topLeftCorner(u, u);
@@ -455,13 +492,14 @@ void Assembler::project_matrix(const Before& before) {
 }
 
 double* Assembler::entry(int row, int column, std::span<double> values) const {
-  if (!pattern_.contains(row, column)) return nullptr;
-  return &values[static_cast<std::size_t>(solver_->place(row, column))];
+  if (!whole_pattern().contains(row, column)) return nullptr;
+  return &values[static_cast<std::size_t>(place(row, column))];
 }
 
 void Assembler::turn_rows(int first, const Matrix3& by, std::span<double> values) const {
-  for (int k = pattern_.column_starts[at(first)]; k < pattern_.column_starts[at(first) + 1]; ++k) {
-    const int column = pattern_.row_indices[at(k)];
+  const SparsityPattern& whole = whole_pattern();
+  for (int k = whole.column_starts[at(first)]; k < whole.column_starts[at(first) + 1]; ++k) {
+    const int column = whole.row_indices[at(k)];
     Vector3 rows;
     for (int i = 0; i < 3; ++i) rows(i) = *entry(first + i, column, values);
     rows = (by * rows).eval();

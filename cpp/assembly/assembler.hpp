@@ -12,13 +12,15 @@
 
 namespace withe {
 
+class Assembler;
+
 /// Unknowns and matrix offsets of many stencils of one width. A negative unknown is left out.
 class ElementTable {
  public:
   ElementTable() = default;
   ElementTable(int width, std::vector<int> dofs) : width_(width), dofs_(std::move(dofs)) {}
 
-  void find_offsets(const LinearSolver& solver);
+  void find_offsets(const Assembler& assembler);
   int count() const { return width_ == 0 ? 0 : static_cast<int>(dofs_.size()) / width_; }
   int width() const { return width_; }
   const int* dofs(int element) const {
@@ -92,7 +94,10 @@ class Assembler {
   Assembler(const Model& model, std::vector<ElementTable*> declared, Symmetry symmetry, SolverKind kind,
             bool exact = false);
 
+  /// Pattern of the solver: without the entries of parts that bodies carry, of which only a diagonal is left.
   const SparsityPattern& pattern() const { return pattern_; }
+  /// Place of an entry in the solver's values: an entry of a carried part is beside the matrix.
+  std::ptrdiff_t place(int row, int column) const;
   LinearSolver& solver() { return *solver_; }
   const LinearSolver& solver() const { return *solver_; }
   /// Places of the diagonal in the solver's values, per unknown.
@@ -131,8 +136,8 @@ class Assembler {
   /// Another number whenever the solver is.
   int generation() const { return generation_; }
 
-  /// Adds the rows and columns of parts that bodies carry to those of their bodies. Their own rows keep a positive
-  /// diagonal alone.
+  /// Adds the rows and columns of parts that bodies carry, which lie beside the matrix, to those of their bodies. In
+  /// the matrix they have a positive diagonal alone.
   void fold_carried(const std::vector<Carrying>& carrying);
 
   /// Removes held unknowns: rows and columns are projected onto the free directions. Held directions get a positive
@@ -175,7 +180,8 @@ class Assembler {
     int own = 0, body = 0, others = 0;  ///< numbers of unknowns
     /// Row after row: own x others, body x others, and (unsymmetric) others x own, others x body.
     std::vector<std::ptrdiff_t> rows, onto_rows, columns, onto_columns;
-    std::vector<std::ptrdiff_t> square;  ///< (own, body) x (own, body)
+    std::vector<std::ptrdiff_t> square;    ///< (own, body) x (own, body)
+    std::vector<std::ptrdiff_t> diagonal;  ///< of its own unknowns in the matrix
   };
   /// `before(place)`: called before an entry is changed.
   template <class Before>
@@ -184,6 +190,11 @@ class Assembler {
   void find_blocks();
   void find_folds();
   void add_bodies_to(std::vector<std::vector<int>>& cliques) const;
+  /// Takes carried unknowns out of the pattern, and numbers their entries.
+  void set_beside();
+  bool carried(int dof) const { return !carried_.empty() && carried_[static_cast<std::size_t>(dof)] >= 0; }
+  /// The pattern with the entries of carried parts.
+  const SparsityPattern& whole_pattern() const { return carried_.empty() ? pattern_ : whole_; }
   void find_edge_couplings();
 
   const Model& model_;
@@ -200,6 +211,9 @@ class Assembler {
   std::vector<std::ptrdiff_t> entries_;  ///< entries of the pattern, one after the other; exact matrices only
   std::vector<Block> blocks_;
   std::vector<Fold> folds_;
+  std::vector<int> carried_;            ///< per unknown its part, or -1; empty without bodies
+  SparsityPattern whole_;               ///< with the entries of carried parts, if there are any
+  std::vector<std::ptrdiff_t> beside_;  ///< per entry of `whole_`: its place, if a carried part has it, or -1
   std::vector<std::pair<std::size_t, double>> replaced_;  ///< entries that a projection has changed
 };
 

@@ -62,38 +62,45 @@ void lay_out_unknowns(Model& model) {
   std::vector<std::vector<int>> frames_at(at(model.node_count));
   for (int f = 0; f < model.frame_count; ++f) frames_at[at(model.frame_node[at(f)])].push_back(f);
 
+  // Unknowns of carried parts come last. They take no part in the elimination, and would widen the band.
+  std::vector<bool> waiting_node(at(model.node_count), false), waiting_frame(at(model.frame_count), false);
+  for (const CarriedPart& part : model.carried) {
+    if (part.is_node()) waiting_node[at(part.node)] = true;
+    if (part.is_frame()) waiting_frame[at(part.own_frame)] = true;
+  }
   const auto place_frames = [&](int node) {
     for (int f : frames_at[at(node)]) {
-      model.frame_dof[at(f)] = next;
-      next += model.frame_size();
+      if (!waiting_frame[at(f)]) {
+        model.frame_dof[at(f)] = next;
+        next += model.frame_size();
+      }
       for (Hinge& hinge : model.hinges)
         if (hinge.frame == f) hinge.dof = next++;
       for (Slide& slide : model.slides)
         if (slide.frame == f) slide.dof = next++;
     }
   };
-  // Points of bodies that no rod has, such as centres of mass, and their surfaces lie beside the base of their body.
-  std::vector<bool> on_rod(at(model.node_count), false);
+  // Points of bodies that no rod has, such as centres of mass, lie beside the base of their body.
+  std::vector<bool> on_rod(at(model.node_count), false), placed_node(at(model.node_count), false);
   for (const RodDescription& rod : rods)
     for (int node : rod.nodes) on_rod[at(node)] = on_rod[at(node)] || !rod.is_surface();
   std::function<void(int)> place_node_of_body;
   const auto place_carried = [&](int base) {
-    for (const CarriedPart& carried : model.carried) {
-      if (carried.base != base) continue;
-      if (carried.edge >= 0) model.edge_dof[at(carried.edge)] = next++;
-      if (carried.is_node() && !on_rod[at(carried.node)] && model.node_dof[at(carried.node)] < 0)
-        place_node_of_body(carried.node);
-    }
+    for (const CarriedPart& carried : model.carried)
+      if (carried.base == base && carried.is_node() && !on_rod[at(carried.node)]) place_node_of_body(carried.node);
   };
   // A frame at the far end of a rod is outside of the stencil of the node before, so that the band stays narrow.
   const auto place_node = [&](int node, bool far_end) {
-    if (model.node_dof[at(node)] >= 0) return;
+    if (placed_node[at(node)]) return;
+    placed_node[at(node)] = true;
     if (!far_end) {
       place_carried(node);
       place_frames(node);
     }
-    model.node_dof[at(node)] = next;
-    next += model.dimension;
+    if (!waiting_node[at(node)]) {
+      model.node_dof[at(node)] = next;
+      next += model.dimension;
+    }
     if (far_end) {
       place_frames(node);
       place_carried(node);
@@ -128,6 +135,13 @@ void lay_out_unknowns(Model& model) {
       }
     }
   for (int node = 0; node < model.node_count; ++node) place_node(node, false);
+  for (const CarriedPart& part : model.carried) {
+    int& own = part.is_node()    ? model.node_dof[at(part.node)]
+               : part.is_frame() ? model.frame_dof[at(part.own_frame)]
+                                 : model.edge_dof[at(part.edge)];
+    own = next;
+    next += part.is_node() ? model.dimension : part.is_frame() ? model.frame_size() : 1;
+  }
   model.dof_count = next;
   note_places(model);
   note_carried(model);

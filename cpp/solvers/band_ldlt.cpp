@@ -18,7 +18,7 @@ class SymmetricBand : public LinearSolver {
       : pattern_(pattern),
         half_bandwidth_(pattern.half_bandwidth()),
         stride_(band_column_stride(width)),
-        values_(static_cast<std::size_t>(pattern.size) * stride_) {}
+        values_(static_cast<std::size_t>(pattern.size) * stride_ + static_cast<std::size_t>(pattern.beside)) {}
 
   int size() const override { return pattern_.size; }
   Symmetry symmetry() const override { return Symmetry::symmetric; }

@@ -64,7 +64,7 @@ class BandLu final : public LinearSolver {
         kernels_(band_kernels(pattern.half_bandwidth())),
         width_(kernels_ ? kernels_->half_bandwidth : pattern.half_bandwidth()),
         value_stride_(2 * width_ + 1),
-        values_(static_cast<std::size_t>(pattern.size) * value_stride_) {
+        values_(static_cast<std::size_t>(pattern.size) * value_stride_ + static_cast<std::size_t>(pattern.beside)) {
     if (kernels_)
       plain_.emplace(size(), width_);
     else

@@ -17,6 +17,7 @@ struct SparsityPattern {
   int size = 0;
   std::vector<int> column_starts;  ///< size + 1
   std::vector<int> row_indices;
+  int beside = 0;  ///< numbers that values() has beside the matrix, at its end; solvers ignore them
 
   /// Pattern from cliques: every group of unknowns couples fully. Entries < 0 are skipped.
   static SparsityPattern from_cliques(int size, const std::vector<std::vector<int>>& cliques);
@@ -54,7 +55,8 @@ class LinearSolver {
   std::ptrdiff_t place(int row, int column) const {
     return symmetry() == Symmetry::symmetric && column > row ? offset(column, row) : offset(row, column);
   }
-  /// The matrix's entries; kept intact by factorize(). Zeros may be added to kPadding numbers past their end.
+  /// The matrix's entries, and `SparsityPattern::beside` numbers; kept intact by factorize(). Zeros may be added to
+  /// kPadding numbers past their end.
   virtual std::span<double> values() = 0;
   virtual std::span<const double> values() const = 0;
   /// Factorises values() plus `shift` (empty, or one number a row) on the diagonal. Does not allocate

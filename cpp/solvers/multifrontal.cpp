@@ -166,7 +166,7 @@ class Multifrontal final : public LinearSolver {
       const auto first = sides_ == 1 ? find_entry(pattern_, column, column) : pattern_.column_starts[column];
       value_starts_.push_back(value_starts_.back() + static_cast<int>(end - first));
     }
-    values_.assign(static_cast<std::size_t>(value_starts_.back()) + kPadding, 0.0);
+    values_.assign(static_cast<std::size_t>(value_starts_.back() + pattern_.beside) + kPadding, 0.0);
   }
 
   /// Place in values_ of entry p of the pattern.
@@ -188,7 +188,7 @@ class Multifrontal final : public LinearSolver {
     const std::vector<int> mirror = find_mirrors();
     std::vector<int> place(size()), row_of(size());
     for (int k = 0; k < size(); ++k) place[nodes_.order[k]] = k;
-    places_.resize(values_.size() - kPadding);
+    places_.resize(static_cast<std::size_t>(value_starts_.back()));
     pivots_.resize(size());
     rows_in_parent_.resize(nodes_.rows.size());
     for (int s = 0; s < nodes_.count(); ++s) {

@@ -95,7 +95,6 @@ void CustomTerm::couple(const StepProblem& problem, Assembler& assembler) {
 void CustomTerm::add_matrix(const StepProblem& problem, const StepData& data, const Assembler& assembler,
                             std::span<double> values) const {
   const Model& model = problem.model;
-  const LinearSolver& solver = assembler.solver();
   const int nodes = model.node_count, size = model.dimension;
   Matrix3 axes = Matrix3::Identity();  // rows: axes of the unknowns
   if (model.planar()) axes << model.plane->first.transpose(), model.plane->second.transpose(), Vector3::Zero();
@@ -103,7 +102,7 @@ void CustomTerm::add_matrix(const StepProblem& problem, const StepData& data, co
     const int first = model.node_dof[at(column / 3)];
     for (int j = 0; j < size; ++j)
       if (const double share = axes(j, column % 3); share != 0.0)
-        values[static_cast<std::size_t>(solver.offset(row, first + j))] += share * value;
+        values[static_cast<std::size_t>(assembler.place(row, first + j))] += share * value;
   };
   Local local;
   for_each_derivative(problem, [&](int row, int column, double value) {
