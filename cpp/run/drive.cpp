@@ -87,7 +87,7 @@ void spread_jumps(const Model& model, const State& state, double duration, std::
 }
 
 bool turns_rods(const Model& model, const std::vector<SupportMotion>& motions, double time, bool prescribes) {
-  if (model.planar()) return false;
+  if (model.planar() && !prescribes) return false;  // a pose from a function may leave the plane
   for (std::size_t s = 0; s < model.supports.size(); ++s) {
     const Support& support = model.supports[s];
     const SupportMotion& motion = motions[s];

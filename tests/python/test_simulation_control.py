@@ -435,3 +435,20 @@ def test_the_engine_refuses_numbers_of_surfaces_out_of_range():
     assert world.contact.friction == 0.2
     with pytest.raises(ValueError, match="no such pair of bodies: 0, -2"):
         world.own_contact(0, -2)
+
+
+@pytest.mark.parametrize("integrator", ["implicit_midpoint", "energy_momentum"])
+def test_a_pose_from_a_function_turns_far_and_out_of_the_plane_in_a_step(integrator: str) -> None:
+    """The step is taken back and divided; in a plane nothing was kept to return to."""
+    scene = withe.Scene(gravity=(0, 0, -9.81))
+    rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+    arm = scene.add_rod(start=(0, 0, 0), end=(0.3, 0, 0), nodes=11, radius=0.01, material=rubber)
+    hold = scene.clamp(arm.start)
+    simulation = scene.build(time_step=2e-3, integrator=integrator)
+    assert simulation.plan.planar
+    turned = (np.cos(0.2), 0.0, 0.0, np.sin(0.2))
+    simulation.move(hold, path=lambda t: (np.zeros(3), turned if t > 0.003 else (1.0, 0.0, 0.0, 0.0)))
+    simulation.step(4)
+    assert not simulation.plan.planar
+    assert simulation.time == pytest.approx(8e-3)
+    assert simulation.positions(arm)[1, 1] > 5e-3
