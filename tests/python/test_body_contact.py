@@ -169,3 +169,20 @@ def test_a_solid_that_touches_nothing_has_no_pair() -> None:
     floor, box = scene.add_floor(), scene.add_body(withe.solids.Box((0.1, 0.1, 0.1)), density=1000, name="box")
     with pytest.raises(ValueError, match="body 'box' touches nothing"):
         scene.set_friction(box, floor, 0.3)
+
+
+def test_a_body_stands_for_its_support() -> None:
+    """Its pose, its reaction, and its release; a free body has none."""
+    scene, ball = ball_on_rods()
+    wand = scene.add_body(withe.solids.Capsule(0.01, 0.1), mass=0.2, position=(0, 0, 0.3), name="wand")
+    scene.clamp(wand)
+    simulation = scene.build(time_step=1e-3)
+    simulation.move(wand, position=(0, 0, 0.31), over=0.01)
+    simulation.step(200)
+    np.testing.assert_allclose(simulation.position(wand), (0, 0, 0.31), atol=1e-12)
+    np.testing.assert_allclose(simulation.reaction(wand).force, (0, 0, 0.2 * 9.81), atol=1e-9)
+    with pytest.raises(ValueError, match="body 'body 1' is not held: clamp or pin it first"):
+        simulation.move(ball, position=(0, 0, 0))
+    simulation.release(wand)
+    simulation.step(10)
+    assert simulation.position(wand)[2] < 0.31

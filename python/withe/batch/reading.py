@@ -272,12 +272,12 @@ class Reading:
         """
         return self._lanes.gathered(lambda s: s.momentum())  # type: ignore[no-any-return]
 
-    def reaction(self, support: Support | NodeHandle | str) -> Reaction:
+    def reaction(self, support: Support | NodeHandle | Body | str) -> Reaction:
         """Return the force and moment of a support on its rod.
 
         Parameters
         ----------
-        support : Support, NodeHandle or str
+        support : Support, NodeHandle, Body or str
             The support, or its node.
 
         Returns

@@ -12,7 +12,7 @@ from withe.batch.lanes import IntArray, Lanes, row
 from withe.common import validation
 from withe.common.deprecation import old_word
 from withe.common.keywords import keyword_hints
-from withe.parts.handles import Drag, Fluid, Joint, Load, Mass, NodeHandle, Obstacle, Rod, Spring, Support, Tendon
+from withe.parts.handles import Body, Drag, Fluid, Joint, Load, Mass, NodeHandle, Obstacle, Rod, Spring, Support, Tendon
 from withe.parts.parameters import NATURAL_WORDS
 from withe.parts.torsion_springs import TorsionSpring
 from withe.simulation.typed_words import (
@@ -338,7 +338,7 @@ class Setting:
 
     def move(
         self,
-        support: Support | NodeHandle | Obstacle | str,
+        support: Support | NodeHandle | Body | Obstacle | str,
         position: npt.ArrayLike | None = None,
         rotation: npt.ArrayLike | None = None,
         *,
@@ -351,7 +351,7 @@ class Setting:
 
         Parameters
         ----------
-        support : Support, NodeHandle, Obstacle or str
+        support : Support, NodeHandle, Body, Obstacle or str
             Support, node or obstacle, as in `Simulation.move`.
         position : array_like of shape (n, 3) [m]
             Target positions.

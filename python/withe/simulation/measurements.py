@@ -564,7 +564,7 @@ class Measurements:
         momentum = self._session.world.momentum()
         return Momentum(np.array(momentum.linear), np.array(momentum.angular))
 
-    def reaction(self, support: Support | NodeHandle | str) -> Reaction:
+    def reaction(self, support: Support | NodeHandle | Body | str) -> Reaction:
         """Return the force and moment of a support on its rod.
 
         During motion these are means over the last time step, inner steps included: together with all other forces they
@@ -572,7 +572,7 @@ class Measurements:
 
         Parameters
         ----------
-        support : Support, NodeHandle or str
+        support : Support, NodeHandle, Body or str
             The support, or its node.
 
         Returns
@@ -688,14 +688,14 @@ class Measurements:
         """
         return ring_passage(self._session, ring)
 
-    def pose(self, support: Support | NodeHandle | str) -> HeldPose:
+    def pose(self, support: Support | NodeHandle | Body | str) -> HeldPose:
         """Return the present position and rotation of a support or hand.
 
         For a support with `free`, the position is the one from which its node slides.
 
         Parameters
         ----------
-        support : Support, NodeHandle or str
+        support : Support, NodeHandle, Body or str
             Support or hand to read, or its node.
 
         Returns

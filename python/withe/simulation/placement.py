@@ -230,12 +230,12 @@ class Placement:
         """
         feed_ring(self._session, ring, rate)
 
-    def release(self, support: Support | NodeHandle | str) -> None:
+    def release(self, support: Support | NodeHandle | Body | str) -> None:
         """Remove a support.
 
         Parameters
         ----------
-        support : Support, NodeHandle or str
+        support : Support, NodeHandle, Body or str
             The support, or its node.
 
         Raises
@@ -251,7 +251,7 @@ class Placement:
 
     def move(
         self,
-        support: Support | NodeHandle | Obstacle | str,
+        support: Support | NodeHandle | Body | Obstacle | str,
         position: npt.ArrayLike | None = None,
         rotation: RotationLike | None = None,
         *,
@@ -267,9 +267,9 @@ class Placement:
 
         Parameters
         ----------
-        support : Support, NodeHandle, Obstacle or str
-            A support or its node, or a floor, plane, sphere or capsule. The position of an obstacle is the point of a
-            plane, the centre of a sphere, or the start of a capsule.
+        support : Support, NodeHandle, Body, Obstacle or str
+            A support, its node or the body that it holds, or a floor, plane, sphere or capsule. The position of an
+            obstacle is the point of a plane, the centre of a sphere, or the start of a capsule.
         position : array_like of shape (3,) [m]
             Target position.
         rotation : array_like of shape (4,) or (3, 3), or a SciPy Rotation

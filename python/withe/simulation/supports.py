@@ -10,7 +10,7 @@ import numpy.typing as npt
 from withe.common import drawing, validation
 from withe.parts.description import describe_support
 from withe.parts.handles import Handle, NodeHandle, Support
-from withe.parts.kinds import SupportPart
+from withe.parts.kinds import BodyPart, SupportPart
 from withe.parts.plausibility import check_angle
 from withe.parts.supports import check_not_held
 from withe.simulation.motion import (
@@ -56,7 +56,13 @@ def forget(session: Session, part: SupportPart) -> None:
 
 
 def find_support(session: Session, support: Handle | str) -> tuple[int, SupportPart]:
-    """Index and part of a support, given by itself or by its node."""
+    """Index and part of a support, given by itself, by its node or by the rigid body that it holds."""
+    if session.directory.is_body(support):
+        body = session.directory.find(support, BodyPart, "body")
+        for index, part in session.settings.supports.values():
+            if part.node[0] == -1 - body.index:
+                return index, part
+        raise ValueError(f"body {body.name!r} is not held: clamp or pin it first")
     if isinstance(support, NodeHandle) or (
         isinstance(support, str) and support not in session.directory.parts and "." in support
     ):
