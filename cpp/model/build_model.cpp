@@ -121,7 +121,7 @@ class Builder {
     }
   }
 
-  /// Of edges of rods, else the length scale.
+  /// Shortest length of an edge of a rod, else the length scale.
   double shortest_length() const {
     double shortest = INFINITY;
     for (int e = 0; e < model_.edge_count; ++e)

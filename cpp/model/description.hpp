@@ -32,7 +32,7 @@ struct RodDescription {
   VectorX natural_twist;       ///< per stencil [rad/m]
   VectorX contact_radius;      ///< radius of the round contact surface [m]; empty: no contact
   VectorX fluid_radius;        ///< radius in the fluid [m]
-  // Of the surface of a rigid body, which carries its nodes and its angle: it has no mass and no stiffness of its own.
+  // The surface of a rigid body is an edge without mass and stiffness. The body carries its nodes and its angle.
   int body = -1;            ///< that body; -1: a rod
   double friction = -1;     ///< coefficient [-]; negative: that of the scene
   double restitution = -1;  ///< coefficient [-]; negative: that of the scene

@@ -12,10 +12,10 @@
 /// A body B on a hinge of a body A turns by w_B = w_A + arm D phi, where the arm is along the mean of the hinge's axes
 /// at both ends of the step (`hinge_arm`). A moment on B acts on A, and its product with the arm acts on the angle phi.
 ///
-/// An edge of the surface of a body turns about itself by 2 atan(w . t0 / 2) against a frame that is transported in
-/// parallel: the twist about t0, its tangent at the start, which remains if R1 R0^T is split into this twist and a
-/// rotation about an axis normal to t0. A moment m about the edge is the moment m (t0 + t) / (1 + t0 . t) of the body,
-/// where t is the tangent of the edge at z.
+/// An edge of the surface of a body turns about itself by 2 atan(w . t0 / 2), against a frame that is transported in
+/// parallel. Here t0 is its tangent at the start. R1 R0^T is this twist about t0, followed by a rotation about an axis
+/// normal to t0. A moment m about the edge is the moment m (t0 + t) / (1 + t0 . t) of the body, where t is the tangent
+/// of the edge at z.
 ///
 /// Rows of a frame are moments in energy-momentum steps, else generalised forces S(w)^T m, where S dw is the spin.
 

@@ -126,7 +126,7 @@ def test_a_rod_does_not_touch_the_body_that_it_is_joined_to() -> None:
 
 
 def test_bodies_and_rods_that_pass_through_each_other_are_named() -> None:
-    """Where contact was forgotten."""
+    """A scene without contact warns once."""
     scene = withe.Scene(gravity=(0, 0, 0))
     rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
     scene.clamp(scene.add_rod(start=(-0.1, 0, 0), end=(0.1, 0, 0), nodes=9, radius=0.004, material=rubber).start)

@@ -115,7 +115,7 @@ class RodPart(Part):
 
 @dataclass(frozen=True, eq=False)
 class BodySurface:
-    """What touches others of a rigid body: all points at a distance from a segment of it."""
+    """The surface of a rigid body that touches others: all points at a distance from a segment."""
 
     ends: FloatArray  # of the segment as drawn, (2, 3) [m]
     radius: float  # [m]
