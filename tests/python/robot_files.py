@@ -37,6 +37,24 @@ MJCF = {
  <body name="tail" pos="-0.1 0 0"><joint name="tail ball" type="ball"/>
   <geom type="capsule" fromto="0 0 0 -0.15 0.03 0.05" size="0.008" mass="0.1"/></body>
 </body></worldbody></mujoco>""",
+    "several_joints": """<mujoco model="several joints"><compiler angle="radian"/>
+<default><geom contype="0" conaffinity="0"/></default><worldbody>
+<body name="trunk" pos="0 0 1"><joint name="along" type="slide" axis="1 0 0" stiffness="40" springref="0.1"/>
+ <joint name="up" type="slide" axis="0 0 1" stiffness="90" damping="0.3"/>
+ <joint name="pitch" axis="0 1 0" pos="0.02 0 0.01" stiffness="4" springref="0.3"/>
+ <geom type="box" size="0.15 0.05 0.04" mass="3"/>
+ <body name="thigh" pos="0.1 0.05 -0.04" euler="0.2 0 0.1">
+  <joint name="hip x" axis="1 0 0" stiffness="2" springref="0.4"/>
+  <joint name="hip z" axis="0 0 1" stiffness="1" springref="-0.5" damping="0.01"/>
+  <joint name="hip y" axis="0 1 0" stiffness="3" springref="0.6"/>
+  <geom type="capsule" fromto="0 0 0 0.03 0 -0.2" size="0.02" mass="0.5"/>
+  <body name="shin" pos="0.03 0 -0.2"><joint name="knee" axis="0 1 0" pos="0 0 0.01" stiffness="2"/>
+   <joint name="tibia" type="slide" axis="0 0 1" stiffness="300" springref="0.02"/>
+   <geom type="capsule" fromto="0 0 0 0 0.01 -0.2" size="0.015" mass="0.3"/></body></body>
+ <body name="tail" pos="-0.15 0 0"><joint name="out" type="slide" axis="1 0 0" stiffness="200" springref="-0.03"/>
+  <joint name="tail ball" type="ball"/>
+  <geom type="capsule" fromto="0 0 0 -0.15 0.03 0.05" size="0.008" mass="0.1"/></body>
+</body></worldbody></mujoco>""",
 }
 
 

@@ -148,6 +148,42 @@ def test_a_wrist_whose_axes_meet_moves_as_in_mujoco(tmp_path):
         np.testing.assert_allclose(simulation.rotation(robot[body]), rotation, atol=2e-4)
 
 
+def test_several_joints_of_one_body_converge_to_the_motion_of_mujoco_at_second_order(tmp_path):
+    """Planar roots, hips of three hinges at one point, and slides with a hinge or ball: 10 joints of 4 bodies."""
+    path = written(tmp_path, "several_joints", ".xml")
+    scene = withe.Scene(gravity=(1.0, 2.0, -9.0))
+    robot, _ = quietly(lambda: scene.add_robot(path))
+    bodies = motion_in_mujoco(path, 0.2, scene.gravity)
+    assert set(robot.bodies) == {"base", *bodies}
+    assert len(robot.joints) == 10
+    expected = np.concatenate([np.ravel(part) for pose in bodies.values() for part in pose])
+    apart = []
+    for time_step in (2e-3, 1e-3, 5e-4):
+        simulation = scene.build(time_step=time_step)
+        before = simulation.energy()
+        simulation.step(round(0.2 / time_step))
+        after = simulation.energy()
+        gain = after.total + after.dissipated - before.total - before.dissipated
+        assert abs(gain) < 1e-7 * after.kinetic
+        poses = [(simulation.position(robot[body]), simulation.rotation(robot[body])) for body in bodies]
+        apart.append(np.concatenate([np.ravel(part) for pose in poses for part in pose]) - expected)
+    errors = np.abs(apart).max(axis=1)
+    np.testing.assert_allclose(np.log2(errors[:-1] / errors[1:]), 2.0, atol=0.05)
+    assert np.abs(4.0 * apart[2] - apart[1]).max() / 3.0 < 1e-6  # Richardson's extrapolation
+
+
+def test_bodies_between_joints_are_parts_of_the_scene_and_not_of_the_robot(tmp_path):
+    path = mjcf(tmp_path, ARM.replace("<geom", '<joint name="twist" axis="1 0 0"/><geom'))
+    scene = withe.Scene()
+    robot = scene.add_robot(path)
+    assert list(robot.bodies) == ["link"]
+    assert list(robot.joints) == ["hinge", "twist"]
+    between = scene["link after hinge"]
+    part = scene._directory.parts[between.name]
+    assert part.mass == pytest.approx(1e-8 * 0.1)
+    assert part.solid.volume < 1e-9
+
+
 def test_a_servo_turns_a_joint_of_the_robot(tmp_path):
     motor = '<actuator><motor name="motor" joint="hinge"/></actuator>'
     scene = withe.Scene()
@@ -377,9 +413,18 @@ def test_a_saved_robot_moves_as_the_first_one(tmp_path):
         (lambda path: edited(path, 'mass="0.1"', 'mass="0"'), ValueError, "MuJoCo cannot read the robot: .*mass"),
         (lambda path: edited(path, ARM, ""), ValueError, "must have a body, got none"),
         (
-            lambda path: edited(path, "<geom", '<joint name="twist" axis="1 0 0"/><geom'),
+            lambda path: edited(path, "<geom", '<joint name="twist" axis="0 1 0"/><geom'),
             ValueError,
-            "joints 'hinge', 'twist' connect body 'link' to its parent, which must be one joint. Give each joint",
+            "joints 'hinge', 'twist' of body 'link' must move it in different ways, got two that move it alike",
+        ),
+        (
+            lambda path: edited(
+                path,
+                "<geom",
+                "".join(f'<joint type="slide" axis="{axis}"/>' for axis in ("1 0 0", "0 0 1", "1 0 1")) + "<geom",
+            ),
+            ValueError,
+            "joints 'hinge', 'joint 1', 'joint 2', 'joint 3' of body 'link' must move it in different ways",
         ),
         (
             lambda path: edited(path, "<worldbody>", '<asset><mesh name="m" file="lost.stl"/></asset><worldbody>'),
@@ -388,7 +433,9 @@ def test_a_saved_robot_moves_as_the_first_one(tmp_path):
         ),
     ],
 )
-def test_files_that_are_no_robot_are_refused(change, error, message, tmp_path):
+@pytest.mark.filterwarnings("ignore:Inertia matrix is too close to singular")
+def test_files_that_are_no_robot_are_refused(change, error, message, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes its log into the working directory
     path = change(mjcf(tmp_path, ARM))
     scene = withe.Scene()
     with pytest.raises(error, match=message):

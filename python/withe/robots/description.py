@@ -37,6 +37,8 @@ class RobotBody:
         Shape in the axes of the body, for pictures.
     is_fixed : bool
         True if the body is fixed to the world.
+    is_between : bool
+        True if the body only stands between two joints of one body of the file. It has a negligible mass.
     """
 
     names: tuple[str, ...]
@@ -47,6 +49,7 @@ class RobotBody:
     rotation: FloatArray
     solid: Solid | None
     is_fixed: bool
+    is_between: bool = False
 
 
 @dataclass(frozen=True, eq=False)

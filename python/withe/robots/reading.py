@@ -16,6 +16,7 @@ from withe.robots.files import CompiledRobot, compiled
 from withe.robots.names import name_of
 from withe.robots.shapes import drawn_geoms, solid_of
 from withe.robots.unsupported import listed, unsupported_content
+from withe.solids import Sphere
 
 __all__ = ["read_robot"]
 
@@ -28,6 +29,17 @@ _KINDS: dict[int, Literal["pinned", "sliding", "revolute"]] = {_BALL: "pinned", 
 # constant to the energy and a weight to the reaction of its clamp, which must be small.
 _FIXED_MASS_RATIO = 1e-6
 
+# Mass of a body between two joints of one body, over that of this body, and its radius of gyration over the size of
+# the robot. Motion changes by about this ratio. Rounding of energies grows as its inverse.
+_BETWEEN_MASS_RATIO = 1e-8
+_BETWEEN_RADIUS = 0.05
+# Radius of its ball in pictures, over the size of the robot.
+_BETWEEN_DRAWN = 1e-3
+
+# Smallest singular value of the motions by the joints of one body, over the largest one. Below it, two combinations
+# of the joints move the body alike, so that the inertia of the body does not determine their accelerations.
+_DISTINCT_MOTIONS = 1e-6
+
 # Distance between joints of one body that would be at the same point, over the size of the robot. A hinge may be
 # anywhere on its axis, and the position of a sliding joint has no effect.
 _ANCHOR_SHIFT = 0.01
@@ -39,7 +51,7 @@ def read_robot(path: str | os.PathLike[str]) -> RobotDescription:
     Raises
     ------
     ValueError
-        A suffix other than .urdf and .xml, a file that MuJoCo refuses, or several joints between two bodies.
+        A suffix other than .urdf and .xml, a file that MuJoCo refuses, or joints of one body that move it alike.
     FileNotFoundError
         The file, or a mesh of it, does not exist.
     ImportError
@@ -63,7 +75,8 @@ class _Reader:
 
     def description(self) -> RobotDescription:
         """Return the bodies, joints and points, and the content that they lack."""
-        self._check_single_joints()
+        if self._model.nbody < 2:
+            raise ValueError(f"{self._path} must have a body, got none")
         model = self._model
         self._unsupported += unsupported_content(model)
         groups = {top: np.nonzero(self._weld == top)[0].tolist() for top in sorted(set(self._weld.tolist()))}
@@ -74,8 +87,8 @@ class _Reader:
         if not has_base:
             del groups[0]
         numbers = {top: i for i, top in enumerate(groups)}
-        bodies = tuple(self._body(top, members, moving) for top, members in groups.items())
-        joints = self._joints(numbers)
+        bodies = [self._body(top, members, moving) for top, members in groups.items()]
+        joints = self._joints(numbers, bodies)
         points = {}
         for body in range(1, model.nbody):
             points[name_of(model, "body", body)] = (numbers[self._weld[body]], np.array(self._data.xpos[body]))
@@ -85,26 +98,15 @@ class _Reader:
                 points[name_of(model, "site", site)] = (numbers[top], np.array(self._data.site_xpos[site]))
         gravity = np.array(model.opt.gravity, dtype=float) if self._robot.has_gravity else None
         unsupported = (*self._unsupported, *self._robot.ignored)
-        return RobotDescription(self._robot.name, bodies, joints, points, self._size, gravity, unsupported)
-
-    def _check_single_joints(self) -> None:
-        model = self._model
-        if model.nbody < 2:
-            raise ValueError(f"{self._path} must have a body, got none")
-        for body in range(1, model.nbody):
-            count, first = int(model.body_jntnum[body]), int(model.body_jntadr[body])
-            if count > 1:
-                names = listed(name_of(model, "joint", first + i) for i in range(count))
-                raise ValueError(
-                    f"{self._path}: joints {names} connect body {name_of(model, 'body', body)!r} to its parent, which "
-                    "must be one joint. Give each joint a body of its own, with a small mass and inertia"
-                )
+        return RobotDescription(self._robot.name, tuple(bodies), joints, points, self._size, gravity, unsupported)
 
     def _needs_base(self, joint: int) -> bool:
         """Return True if a joint to the world has a spring, a damper or a motor, which supports of a scene lack."""
         model = self._model
         body, dof = int(model.jnt_bodyid[joint]), int(model.jnt_dofadr[joint])
-        if self._weld[model.body_parentid[body]] != 0 or model.jnt_type[joint] not in (_SLIDE, _HINGE):
+        is_first = joint == int(model.body_jntadr[body])  # the others connect two bodies
+        is_turning = model.jnt_type[joint] in (_SLIDE, _HINGE)
+        if self._weld[model.body_parentid[body]] != 0 or not is_first or not is_turning:
             return False
         motors = np.asarray(model.actuator_trnid, dtype=int).reshape(-1, 2)[:, 0]
         transmits = np.asarray(model.actuator_trntype, dtype=int) <= 1  # mjTRN_JOINT, mjTRN_JOINTINPARENT
@@ -157,33 +159,79 @@ class _Reader:
     def _note(self, what: str, names: Any) -> None:
         self._unsupported.append(f"{what} {listed(names)}")
 
-    def _joints(self, numbers: dict[int, int]) -> tuple[RobotJoint, ...]:
+    def _joints(self, numbers: dict[int, int], bodies: list[RobotBody]) -> tuple[RobotJoint, ...]:
+        """Return the joints, and append the bodies between several joints of one body to `bodies`.
+
+        The first joint of a body is the next to its parent, as in the kinematics of MuJoCo.
+        """
         model, data = self._model, self._data
         used: dict[int, list[FloatArray]] = {}  # positions of joints by body
         found = []
-        for joint in range(model.njnt):
-            kind = int(model.jnt_type[joint])
-            if kind == _FREE:
-                continue
-            body = int(model.jnt_bodyid[joint])
+        for body in np.nonzero(np.asarray(model.body_jntnum) > 0)[0].tolist():
+            first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
+            own = [joint for joint in range(first, first + count) if int(model.jnt_type[joint]) != _FREE]
+            self._check_distinct(body, own)
+            outer = numbers[int(self._weld[body])]
             parent = numbers.get(int(self._weld[model.body_parentid[body]]))
-            child = numbers[int(self._weld[body])]
-            axis = None if kind == _BALL else np.array(data.xaxis[joint], dtype=float)
-            at = np.array(data.xanchor[joint], dtype=float)
-            owners = {child} if parent is None else {parent, child}
-            taken = [point for owner in owners for point in used.get(owner, [])]
-            if axis is not None:
-                at = _free_place(at, axis, taken, _ANCHOR_SHIFT * self._size)
-            for owner in owners:
-                used.setdefault(owner, []).append(at)
-            values = (0.0, 0.0, 0.0)
-            if kind != _BALL:
-                place, dof = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
-                stiffness = float(model.jnt_stiffness[joint])
-                rest = float(model.qpos_spring[place] - model.qpos0[place]) if stiffness else 0.0
-                values = (stiffness, rest, float(model.dof_damping[dof]))
-            found.append(RobotJoint(name_of(model, "joint", joint), _KINDS[kind], parent, child, at, axis, *values))
+            for joint in own:
+                child = outer
+                if joint != own[-1]:
+                    child = len(bodies)
+                    bodies.append(self._between(joint, bodies[outer]))
+                kind = int(model.jnt_type[joint])
+                axis = None if kind == _BALL else np.array(data.xaxis[joint], dtype=float)
+                at = np.array(data.xanchor[joint], dtype=float)
+                owners = {child} if parent is None else {parent, child}
+                taken = [point for owner in owners for point in used.get(owner, [])]
+                if axis is not None:
+                    at = _free_place(at, axis, taken, _ANCHOR_SHIFT * self._size)
+                for owner in owners:
+                    used.setdefault(owner, []).append(at)
+                values = self._spring(joint)
+                found.append(RobotJoint(name_of(model, "joint", joint), _KINDS[kind], parent, child, at, axis, *values))
+                parent = child
         return tuple(found)
+
+    def _spring(self, joint: int) -> tuple[float, float, float]:
+        """Return the stiffness, the rest angle and the damping of a joint."""
+        model = self._model
+        if model.jnt_type[joint] == _BALL:
+            return 0.0, 0.0, 0.0
+        place, dof = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
+        stiffness = float(model.jnt_stiffness[joint])
+        rest = float(model.qpos_spring[place] - model.qpos0[place]) if stiffness else 0.0
+        return stiffness, rest, float(model.dof_damping[dof])
+
+    def _between(self, joint: int, outer: RobotBody) -> RobotBody:
+        """Return the body after a joint that is not the last one of its body."""
+        mass = _BETWEEN_MASS_RATIO * outer.mass
+        inertia = mass * (_BETWEEN_RADIUS * self._size) ** 2 * np.eye(3)
+        names = (f"{outer.names[0]} after {name_of(self._model, 'joint', joint)}",)
+        place = np.array(self._data.xanchor[joint], dtype=float)
+        drawn = Sphere(_BETWEEN_DRAWN * self._size)
+        return RobotBody(names, mass, np.zeros(3), inertia, place, np.eye(3), drawn, False, is_between=True)
+
+    def _check_distinct(self, body: int, joints: Sequence[int]) -> None:
+        """Refuse joints of one body that move it alike, such as two hinges with one axis."""
+        if len(joints) < 2:
+            return
+        model, data = self._model, self._data
+        columns: list[list[FloatArray]] = []
+        for joint in joints:
+            anchor = (np.array(data.xanchor[joint]) - np.array(data.xipos[body])) / self._size
+            if model.jnt_type[joint] == _SLIDE:
+                columns.append([np.zeros(3), np.array(data.xaxis[joint])])
+                continue
+            axes = np.eye(3) if model.jnt_type[joint] == _BALL else [np.array(data.xaxis[joint])]
+            columns += [[axis, np.cross(anchor, axis)] for axis in axes]
+        motions = np.reshape(columns, (-1, 6))
+        values = np.linalg.svd(motions, compute_uv=False)
+        if len(motions) > 6 or values[-1] < _DISTINCT_MOTIONS * values[0]:
+            names = listed(name_of(model, "joint", joint) for joint in joints)
+            raise ValueError(
+                f"{self._path}: joints {names} of body {name_of(model, 'body', body)!r} must move it in different "
+                "ways, got two that move it alike. Remove one, or give it a body of its own with a mass and an inertia"
+            )
 
 
 def _free_place(at: FloatArray, axis: FloatArray, taken: Sequence[FloatArray], shift: float) -> FloatArray:

@@ -115,7 +115,7 @@ def add_robot(
         axis = None if joint.axis is None else axes @ joint.axis
         joints[joint.name] = _add_joint(scene, bodies, joint, at, axis, new_name(joint.name, "joint"))
     points = {each: bodies[index].at(origin + axes @ place) for each, (index, place) in description.points.items()}
-    names = {each: bodies[i] for i, body in enumerate(description.bodies) for each in body.names}
+    names = {each: bodies[i] for i, body in enumerate(description.bodies) if not body.is_between for each in body.names}
     return Robot(own, MappingProxyType(names), MappingProxyType(joints), MappingProxyType(points))
 
 

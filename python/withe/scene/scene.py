@@ -384,8 +384,8 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         Raises
         ------
         ValueError
-            Another suffix, a file that MuJoCo cannot read, a mesh in another format than STL and OBJ, or several joints
-            between the same two bodies.
+            Another suffix, a file that MuJoCo cannot read, a mesh in another format than STL and OBJ, or joints of one
+            body that move it alike, such as two hinges with one axis.
         FileNotFoundError
             The file or one of its meshes does not exist.
         ImportError
@@ -413,6 +413,8 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         - Bodies that are fixed to the world become one clamped body, to which the joints are attached. If they have no
           mass, the clamped body has 1e-6 of the robot's mass. Without such bodies, a joint to the world is a support
           made by `clamp` or `pin`. A joint to the world with a spring, damper or actuator has a clamped body too.
+        - Several joints of one body, such as a hip of three hinges, become a chain of joints. Between them are bodies
+          named "BODY after JOINT", which are not in `Robot.bodies`. They have 1e-8 of the mass of the outer body.
         - A joint may be moved along its axis if another joint of the same body is at the same point. The motion does
           not depend on this position.
         - Geoms are only drawn. If a body has geoms that touch nothing, these are its shape. A mesh that is not closed
