@@ -406,7 +406,7 @@ def test_a_saved_robot_moves_as_the_first_one(tmp_path):
     ("change", "error", "message"),
     [
         (lambda path: path.with_name("none.xml"), FileNotFoundError, r"does not exist: .*none\.xml"),
-        (lambda path: path.rename(path.with_suffix(".txt")), ValueError, r"must end in \.urdf or \.xml"),
+        (lambda path: path.rename(path.with_suffix(".txt")), ValueError, r"must end in \.urdf, \.xml"),
         (lambda path: path.rename(path.with_suffix(".xacro")), ValueError, "xacro robot.xacro > robot.urdf"),
         (lambda path: edited(path, "</worldbody>", ""), ValueError, "is not XML"),
         (lambda path: edited(path, "mujoco", "sdf"), ValueError, "root element robot .* got 'sdf'"),

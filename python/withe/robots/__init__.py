@@ -1,4 +1,4 @@
-"""Robots in files of other programs: URDF and MJCF, read by MuJoCo."""
+"""Robots in files of other programs: URDF and MJCF, read by MuJoCo, and USD, read by usd-core."""
 
 from withe.robots.description import RobotBody, RobotDescription, RobotJoint
 from withe.robots.reading import read_robot

@@ -96,9 +96,11 @@ class RobotDescription:
     size : float [m]
         Diagonal of the box around the origins, joints and shapes of the robot.
     gravity : ndarray of shape (3,) [m/s^2], or None
-        Acceleration of free fall in the file; None for URDF, which has none.
+        Acceleration of free fall in the file; None if the file states none.
     unsupported : tuple of str
         Content of the file that the description lacks.
+    doubts : tuple of str
+        What is probably not meant, as sentences about the robot.
     """
 
     name: str
@@ -108,3 +110,4 @@ class RobotDescription:
     size: float
     gravity: FloatArray | None
     unsupported: tuple[str, ...]
+    doubts: tuple[str, ...] = ()

@@ -49,7 +49,9 @@ def compiled(path: Path) -> CompiledRobot:
     """
     if path.suffix.lower() not in (".urdf", ".xml"):
         advice = ". Expand macros first: xacro robot.xacro > robot.urdf" if path.suffix == ".xacro" else ""
-        raise ValueError(f"file of the robot must end in .urdf or .xml (MJCF), got {str(path)!r}{advice}")
+        raise ValueError(
+            f"file of the robot must end in .urdf, .xml (MJCF), .usd, .usda, .usdc or .usdz, got {str(path)!r}{advice}"
+        )
     if not path.is_file():
         raise FileNotFoundError(f"file of the robot does not exist: {path}")
     mujoco = require("mujoco", "robots")

@@ -11,11 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common.extras import require
+from withe.robots.composing import MassProperties, free_place, massless_base, united
 from withe.robots.description import RobotBody, RobotDescription, RobotJoint
 from withe.robots.files import CompiledRobot, compiled
 from withe.robots.names import name_of
 from withe.robots.shapes import drawn_geoms, solid_of
 from withe.robots.unsupported import listed, unsupported_content
+from withe.robots.usd_reading import USD_SUFFIXES, read_usd
 from withe.solids import Sphere
 
 __all__ = ["read_robot"]
@@ -24,10 +26,6 @@ FloatArray = npt.NDArray[np.float64]
 
 _FREE, _BALL, _SLIDE, _HINGE = 0, 1, 2, 3
 _KINDS: dict[int, Literal["pinned", "sliding", "revolute"]] = {_BALL: "pinned", _SLIDE: "sliding", _HINGE: "revolute"}
-
-# Mass of a fixed body without a mass, over that of the robot. The body does not move, so its mass only adds a
-# constant to the energy and a weight to the reaction of its clamp, which must be small.
-_FIXED_MASS_RATIO = 1e-6
 
 # Mass of a body between two joints of one body, over that of this body, and its radius of gyration over the size of
 # the robot. Motion changes by about this ratio. Rounding of energies grows as its inverse.
@@ -40,23 +38,21 @@ _BETWEEN_DRAWN = 1e-3
 # of the joints move the body alike, so that the inertia of the body does not determine their accelerations.
 _DISTINCT_MOTIONS = 1e-6
 
-# Distance between joints of one body that would be at the same point, over the size of the robot. A hinge may be
-# anywhere on its axis, and the position of a sliding joint has no effect.
-_ANCHOR_SHIFT = 0.01
-
 
 def read_robot(path: str | os.PathLike[str]) -> RobotDescription:
-    """Read a robot from a URDF or MJCF file.
+    """Read a robot from a URDF, MJCF or USD file.
 
     Raises
     ------
     ValueError
-        A suffix other than .urdf and .xml, a file that MuJoCo refuses, or joints of one body that move it alike.
+        Another suffix, a file that MuJoCo or `read_usd` refuses, or joints of one body that move it alike.
     FileNotFoundError
         The file, or a mesh of it, does not exist.
     ImportError
-        MuJoCo is not installed.
+        MuJoCo or usd-core is not installed.
     """
+    if Path(path).suffix.lower() in USD_SUFFIXES:
+        return read_usd(Path(path))
     robot = compiled(Path(path))
     mujoco = require("mujoco", "robots")
     model, data = robot.model, mujoco.MjData(robot.model)
@@ -128,21 +124,10 @@ class _Reader:
         first = members[0] if members else 0
         position = np.array(data.xpos[first], dtype=float)
         rotation = np.array(data.xmat[first], dtype=float).reshape(3, 3)
-        masses = np.asarray(model.body_mass, dtype=float)[list(members)]
-        mass = float(masses.sum())
-        if mass > 0.0:
-            centers = np.asarray(data.xipos, dtype=float)[list(members)]
-            center = masses @ centers / mass
-            inertia = np.zeros((3, 3))
-            for body, kilograms, place in zip(members, masses, centers, strict=True):
-                turn = np.array(data.ximat[body], dtype=float).reshape(3, 3)
-                arm = place - center
-                inertia += (turn * model.body_inertia[body]) @ turn.T
-                inertia += kilograms * (arm @ arm * np.eye(3) - np.outer(arm, arm))  # parallel axes
-        else:
-            mass = _FIXED_MASS_RATIO * moving if moving > 0.0 else 1.0
-            center = position
-            inertia = mass * (0.1 * self._size or 0.1) ** 2 * np.eye(3)
+        properties = united([self._properties(body) for body in members])
+        if properties is None:
+            properties = massless_base(position, moving, self._size)
+        own = properties.seen_from(position, rotation)
         geoms = [geom for geom in range(model.ngeom) if int(model.geom_bodyid[geom]) in members]
         drawn, missing = drawn_geoms(model, geoms)
         solid, hulls = solid_of(model, data, drawn, position, rotation)
@@ -152,9 +137,14 @@ class _Reader:
             meshes = (name_of(model, "mesh", int(model.geom_dataid[geom])) for geom in hulls)
             self._note("surfaces that are not closed, and are drawn as convex hulls, of meshes", meshes)
         names = tuple(name_of(model, "body", body) for body in members) or ("base",)
-        inertia = rotation.T @ inertia @ rotation
-        center = rotation.T @ (center - position)
-        return RobotBody(names, mass, center, 0.5 * (inertia + inertia.T), position, rotation, solid, top == 0)
+        return RobotBody(names, own.mass, own.center, own.inertia, position, rotation, solid, top == 0)
+
+    def _properties(self, body: int) -> MassProperties:
+        """Return the mass, centre and inertia of a body of MuJoCo in the axes of the world."""
+        model, data = self._model, self._data
+        turn = np.array(data.ximat[body], dtype=float).reshape(3, 3)
+        inertia = (turn * model.body_inertia[body]) @ turn.T
+        return MassProperties(float(model.body_mass[body]), np.array(data.xipos[body], dtype=float), inertia)
 
     def _note(self, what: str, names: Any) -> None:
         self._unsupported.append(f"{what} {listed(names)}")
@@ -184,7 +174,7 @@ class _Reader:
                 owners = {child} if parent is None else {parent, child}
                 taken = [point for owner in owners for point in used.get(owner, [])]
                 if axis is not None:
-                    at = _free_place(at, axis, taken, _ANCHOR_SHIFT * self._size)
+                    at = free_place(at, axis, taken, self._size)
                 for owner in owners:
                     used.setdefault(owner, []).append(at)
                 values = self._spring(joint)
@@ -232,10 +222,3 @@ class _Reader:
                 f"{self._path}: joints {names} of body {name_of(model, 'body', body)!r} must move it in different "
                 "ways, got two that move it alike. Remove one, or give it a body of its own with a mass and an inertia"
             )
-
-
-def _free_place(at: FloatArray, axis: FloatArray, taken: Sequence[FloatArray], shift: float) -> FloatArray:
-    """Return the nearest place on an axis that is not taken."""
-    steps = [0, *(sign * step for step in range(1, len(taken) + 1) for sign in (1, -1))]
-    places = [at + step * shift * axis for step in steps]
-    return next(place for place in places if all(np.linalg.norm(place - other) > 0.1 * shift for other in taken))

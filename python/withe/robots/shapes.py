@@ -1,8 +1,9 @@
-"""Shapes of a robot's bodies for pictures: solids from the geoms of MuJoCo."""
+"""Shapes of a robot's bodies: one solid of several, and those of the geoms of MuJoCo."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy.typing as npt
 
 from withe.solids import Box, Capsule, Cylinder, Mesh, Solid, Sphere
 
-__all__ = ["drawn_geoms", "solid_of"]
+__all__ = ["Shape", "closed_surface", "combined", "drawn_geoms", "solid_of", "welded"]
 
 FloatArray = npt.NDArray[np.float64]
 Surface = tuple[FloatArray, npt.NDArray[np.int64]]
@@ -30,6 +31,28 @@ def drawn_geoms(model: Any, geoms: Sequence[int]) -> tuple[list[int], list[int]]
     return visual or known, [geom for geom in geoms if geom not in known]
 
 
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A shape in the axes of a body.
+
+    Attributes
+    ----------
+    solid : Solid or None
+        Solid in axes of its own; None for a surface.
+    surface : tuple of (ndarray of shape (n, 3) [m], ndarray of int of shape (m, 3))
+        Vertices and triangles, in the axes of the solid.
+    place : ndarray of shape (3,) [m]
+        Origin of these axes.
+    turn : ndarray of shape (3, 3)
+        These axes, as columns.
+    """
+
+    solid: Solid | None
+    surface: Surface
+    place: FloatArray
+    turn: FloatArray
+
+
 def solid_of(
     model: Any, data: Any, geoms: Sequence[int], position: FloatArray, rotation: FloatArray
 ) -> tuple[Solid | None, list[int]]:
@@ -45,33 +68,36 @@ def solid_of(
         Axes of the body, as columns.
     """
     hulls: list[int] = []
-    surfaces: list[Surface] = []
+    shapes: list[Shape] = []
     for geom in geoms:
         place = rotation.T @ (data.geom_xpos[geom] - position)
         turn = rotation.T @ data.geom_xmat[geom].reshape(3, 3)
         plain = _plain(int(model.geom_type[geom]), model.geom_size[geom])
-        if (
-            len(geoms) == 1
-            and plain is not None
-            and np.abs(place).max() < 1e-12
-            and np.abs(turn - np.eye(3)).max() < 1e-9
-        ):
-            return plain, []
         if plain is not None:
-            vertices, triangles = _welded(*plain.surface())
+            surface = welded(*plain.surface())
         elif model.geom_type[geom] == _ELLIPSOID:
-            vertices, triangles = _welded(*Sphere(1.0).surface())
-            vertices = vertices * model.geom_size[geom]
+            vertices, triangles = welded(*Sphere(1.0).surface())
+            surface = (vertices * model.geom_size[geom], triangles)
         else:
-            (vertices, triangles), is_hull = _closed(*_mesh(model, int(model.geom_dataid[geom])))
+            surface, is_hull = closed_surface(*_mesh(model, int(model.geom_dataid[geom])))
             if is_hull:
                 hulls.append(geom)
-        surfaces.append((vertices @ turn.T + place, triangles))
-    if not surfaces:
-        return None, hulls
-    starts = np.cumsum([0, *(len(vertices) for vertices, _ in surfaces)])
-    rows = [triangles + start for (_, triangles), start in zip(surfaces, starts, strict=False)]
-    return Mesh(np.concatenate([vertices for vertices, _ in surfaces]), np.concatenate(rows)), hulls
+        shapes.append(Shape(plain, surface, place, turn))
+    return combined(shapes), hulls
+
+
+def combined(shapes: Sequence[Shape]) -> Solid | None:
+    """Return one solid of some shapes; None without shapes."""
+    if not shapes:
+        return None
+    first = shapes[0]
+    is_in_place = np.abs(first.place).max() < 1e-12 and np.abs(first.turn - np.eye(3)).max() < 1e-9
+    if len(shapes) == 1 and first.solid is not None and is_in_place:
+        return first.solid
+    vertices = [shape.surface[0] @ shape.turn.T + shape.place for shape in shapes]
+    starts = np.cumsum([0, *(len(rows) for rows in vertices)])
+    triangles = [shape.surface[1] + start for shape, start in zip(shapes, starts, strict=False)]
+    return Mesh(np.concatenate(vertices), np.concatenate(triangles))
 
 
 def _plain(kind: int, size: FloatArray) -> Solid | None:
@@ -91,10 +117,10 @@ def _mesh(model: Any, mesh: int) -> Surface:
     first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
     face, faces = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
     vertices = np.array(model.mesh_vert[first : first + count], dtype=float)
-    return _welded(vertices, np.array(model.mesh_face[face : face + faces], dtype=np.int64))
+    return welded(vertices, np.array(model.mesh_face[face : face + faces], dtype=np.int64))
 
 
-def _welded(vertices: FloatArray, triangles: npt.NDArray[np.int64]) -> Surface:
+def welded(vertices: FloatArray, triangles: npt.NDArray[np.int64]) -> Surface:
     """Return a surface without repeated vertices and without triangles that have no area."""
     scale = float(np.abs(vertices).max()) or 1.0
     _, first, place = np.unique(np.round(vertices / scale, 7), axis=0, return_index=True, return_inverse=True)
@@ -103,7 +129,7 @@ def _welded(vertices: FloatArray, triangles: npt.NDArray[np.int64]) -> Surface:
     return vertices[first], rows[distinct]
 
 
-def _closed(vertices: FloatArray, triangles: npt.NDArray[np.int64]) -> tuple[Surface, bool]:
+def closed_surface(vertices: FloatArray, triangles: npt.NDArray[np.int64]) -> tuple[Surface, bool]:
     """Return a surface that is closed with its normals outwards, and True if it is the convex hull."""
     for rows in (triangles, triangles[:, ::-1]):
         try:

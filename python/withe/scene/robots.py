@@ -14,6 +14,7 @@ import numpy.typing as npt
 from withe.common import validation
 from withe.common.user_warnings import warn
 from withe.errors import PlausibilityWarning, UnsupportedRobotWarning
+from withe.parts.bodies import make_body
 from withe.parts.handles import Body, BodyPoint, Joint, Support, parse_place, parse_point
 from withe.robots import RobotDescription, RobotJoint, read_robot
 
@@ -24,6 +25,8 @@ FloatArray = npt.NDArray[np.float64]
 # Size [m] and mass of a body [kg] above which the unit of the file is probably not SI.
 _LARGEST_SIZE = 20.0
 _LARGEST_MASS = 1e4
+# Difference of gravity [m/s^2] that is not reported: USD has numbers of single precision.
+_EQUAL_GRAVITY = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +87,10 @@ def add_robot(
     if name is not None and (not isinstance(name, str) or not name or not name.isprintable()):
         raise ValueError(f"name of the robot must be printable text, got {name!r:.80}")
     description = read_robot(path)
+    for body in description.bodies:  # checked before one is added
+        make_body(
+            body.names[0], 0, body.solid, None, body.mass, body.inertia, body.center, body.position, body.rotation
+        )
     own = description.name if name is None else name
     _warn(scene, path, description)
     taken = set(scene._directory.parts)
@@ -160,9 +167,11 @@ def _warn(scene: Any, path: str | os.PathLike[str], description: RobotDescriptio
             PlausibilityWarning,
             "size of a robot",
         )
+    for doubt in description.doubts:
+        warn(f"robot {description.name!r} {doubt}", PlausibilityWarning, "units of a robot")
     unsupported = list(description.unsupported)
     gravity = description.gravity
-    if gravity is not None and np.abs(gravity - scene.gravity).max() > 1e-9:
+    if gravity is not None and np.abs(gravity - scene.gravity).max() > _EQUAL_GRAVITY:
         unsupported.append(f"gravity {tuple(gravity.tolist())} m/s^2, because that of the scene is used")
     if unsupported:
         content = "".join(f"\n- {each}" for each in unsupported)

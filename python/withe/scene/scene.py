@@ -358,15 +358,17 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         rotation: npt.ArrayLike | None = None,
         name: str | None = None,
     ) -> Robot:
-        """Add the rigid bodies and joints of a robot from a URDF or MJCF file.
+        """Add the rigid bodies and joints of a robot from a URDF, MJCF or USD file.
 
         The robot is drawn in the reference configuration of the file, where all joints of a URDF file are at zero.
-        Rods can be joined to its bodies. MuJoCo, of the extra ``robots``, reads the file.
+        Rods can be joined to its bodies. MuJoCo reads URDF and MJCF, and usd-core reads USD, both of the extra
+        ``robots``.
 
         Parameters
         ----------
         path : path-like
-            File, ending in ".urdf", or in ".xml" for MJCF. Macros of xacro must be expanded.
+            File, ending in ".urdf", in ".xml" for MJCF, or in ".usd", ".usda", ".usdc" or ".usdz". Macros of xacro must
+            be expanded.
         position : array_like of shape (3,) [m]
             Where the origin of the file is.
         rotation : array_like of shape (3, 3) or (4,), or scipy.spatial.transform.Rotation
@@ -384,12 +386,13 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         Raises
         ------
         ValueError
-            Another suffix, a file that MuJoCo cannot read, a mesh in another format than STL and OBJ, or joints of one
-            body that move it alike, such as two hinges with one axis.
+            The suffix is another one, MuJoCo or usd-core cannot read the file, or a mesh is neither STL nor OBJ. Joints
+            of one body move it alike, such as two hinges with one axis. A joint of USD has different places on its two
+            bodies.
         FileNotFoundError
             The file or one of its meshes does not exist.
         ImportError
-            MuJoCo is not installed.
+            MuJoCo or usd-core is not installed.
 
         Warns
         -----
@@ -397,7 +400,7 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
             The file has content that a scene lacks: limits, armature and friction loss of joints, actuators, equality
             constraints, tendons, contact, sensors and others. One warning lists all of it with its names.
         PlausibilityWarning
-            The robot is larger than 20 m, or a body has more than 10,000 kg.
+            The robot is larger than 20 m, a body has more than 10,000 kg, or a USD file has no ``metersPerUnit``.
 
         See Also
         --------
@@ -419,6 +422,9 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
           not depend on this position.
         - Geoms are only drawn. If a body has geoms that touch nothing, these are its shape. A mesh that is not closed
           is drawn as its convex hull.
+        - USD: units and the up axis of the stage are converted to m, kg and z. Mass, density and inertia follow the
+          rules of UsdPhysics: without a mass, that of the colliders at their density, by default 1,000 kg/m^3.
+          Drives by force of joints become ``stiffness``, ``rest_angle`` and ``damping``.
         - Cameras, lights, colours and textures are not read. The integrator and the time step are options of `build`.
 
         Examples
