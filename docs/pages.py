@@ -112,7 +112,7 @@ EXAMPLES = {
         "learn_follow",
     ),
     "Contact and friction": ("friction", "spider", "gripper", "flagella", "flagella_contact"),
-    "Rigid bodies": ("hanging_plug", "satellite", "crane_load", "lift_ball"),
+    "Rigid bodies": ("hanging_plug", "satellite", "crane_load", "lift_ball", "soft_legs"),
     "Hands, cables and sheets": (
         "carry_rope",
         "pull_rope",

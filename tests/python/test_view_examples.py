@@ -54,6 +54,7 @@ EXAMPLES = {
     "satellite.py": ([], r"theory within ([.\d]+) %", 0.0, 0.1),
     "servo_arm.py": ([], r"by ([.\d]+) mm where it is shaped", 0.0, 1.0),
     "snake.py": (["--periods", "3"], r"Crawls at ([.\d]+) mm/s", 27.8, 28.7),
+    "soft_legs.py": (["--duration", "3"], r"theory within ([.\d]+) %", 0.0, 0.1),
     "soft_limb.py": ([], r"tip ([.\d]+) mm off on the mean", 0.3, 0.7),
     "stiffness_sweep.py": (["--arms", "60"], r"tips within ([-.\de]+) L of theory", 0.0, 1e-3),
     "tapered_arm.py": ([], r"tapered: clearance off by ([.\d]+) mm", 0.0, 1.0),
