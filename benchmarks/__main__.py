@@ -24,6 +24,7 @@ NAMES = (
     "rl_throughput",
     "work_precision",
     "peers",
+    "bodies",
     "friction_precision",
     "robustness",
     "ablation",

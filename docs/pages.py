@@ -64,6 +64,7 @@ MADE_BY = {
 BENCHMARKS = {
     "work_precision": ("Run time against error", "Which simulator reaches an error first, for beams and helices?"),
     "peers": ("Scenes in three simulators", "How fast are withe, PyElastica and MuJoCo at the same error?"),
+    "bodies": ("Rods with rigid bodies", "How fast are withe and MuJoCo at the same error, with a body at a rod?"),
     "friction_precision": (
         "Run time against error, friction",
         "Which simulator reaches an error first with friction?",

@@ -38,6 +38,7 @@ def run(name, folder, *arguments):
     [
         "work_precision",
         "peers",
+        "bodies",
         "friction_precision",
         "robustness",
         "ablation",

@@ -4,6 +4,7 @@ import importlib
 import re
 import struct
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -170,6 +171,26 @@ def test_several_joints_of_one_body_converge_to_the_motion_of_mujoco_at_second_o
     errors = np.abs(apart).max(axis=1)
     np.testing.assert_allclose(np.log2(errors[:-1] / errors[1:]), 2.0, atol=0.05)
     assert np.abs(4.0 * apart[2] - apart[1]).max() / 3.0 < 1e-6  # Richardson's extrapolation
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:compiler attribute 'settotalmass'")
+def test_models_of_gymnasium_load_and_keep_their_energy():
+    """Gravity acts across the planes of some robots, so that they fall or press on their joints."""
+    folder = Path(pytest.importorskip("gymnasium").__file__).parent / "envs" / "mujoco" / "assets"
+    paths = sorted(folder.glob("*.xml"))
+    assert len(paths) >= 14
+    for path in paths:
+        scene = withe.Scene(gravity=(1.0, 2.0, -9.0))
+        _, caught = quietly(lambda path=path, scene=scene: scene.add_robot(path))
+        assert all(each.category in (withe.UnsupportedRobotWarning, UserWarning) for each in caught)
+        simulation = scene.build(time_step=1e-3)
+        before = simulation.energy()
+        simulation.step(50)
+        after = simulation.energy()
+        gain = after.total + after.dissipated - before.total - before.dissipated
+        assert after.kinetic > 0.0
+        assert abs(gain) < 1e-6 * after.kinetic, path.name
 
 
 def test_bodies_between_joints_are_parts_of_the_scene_and_not_of_the_robot(tmp_path):
