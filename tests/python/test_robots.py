@@ -277,7 +277,6 @@ def test_one_warning_names_all_that_is_not_supported(tmp_path):
     _, caught = quietly(lambda: withe.Scene().add_robot(path))
     (found,) = [each for each in caught if each.category is withe.UnsupportedRobotWarning]
     for line in (
-        "limits of joints 'j1'",
         "force limits of joints 'j2'",
         "armature of joints 'j1'",
         "friction loss of joints 'j1'",
@@ -325,7 +324,6 @@ def test_elements_of_urdf_that_mujoco_does_not_read_are_named(tmp_path):
     for line in (
         "elements <transmission> (1)",
         "velocity limits of joints 'elbow'",
-        "limits of joints 'elbow'",
         "force limits of joints 'elbow'",
         "equality constraints of type joint 'elbow', which the mimic of URDF is too",
     ):
@@ -555,3 +553,43 @@ def test_the_files_of_these_tests_are_read_by_mujoco():
     """A fault of the files would otherwise look like one of the reader."""
     for text in MJCF.values():
         mujoco.MjModel.from_xml_string(text)
+
+
+STOPPED = """
+<mujoco><option gravity="0 0 -9.81" timestep="0.0005"/><worldbody>
+  <body name="wall"><geom contype="0" conaffinity="0" type="box" size=".01 .01 .01"/>
+    <body name="bar"><joint name="hinge" axis="0 1 0" range="-20 30" limited="true" damping="0.05"/>
+      <geom contype="0" conaffinity="0" type="box" size=".15 .01 .01" pos=".15 0 0" mass=".3"/></body></body>
+  <body name="sledge" pos="0 1 0"><joint name="rail" type="slide" axis="0 0 1" range="-.1 .2" damping="1"/>
+    <geom contype="0" conaffinity="0" type="box" size=".02 .02 .02" mass=".2"/></body>
+</worldbody></mujoco>
+"""
+
+
+def test_limits_of_joints_bear_loads_as_those_of_mujoco(tmp_path: Path) -> None:
+    """A bar and a sledge fall on their stops, which yield by a similar amount."""
+    mujoco = pytest.importorskip("mujoco")
+    path = tmp_path / "stopped.xml"
+    path.write_text(STOPPED)
+    scene = withe.Scene()
+    robot = scene.add_robot(path)
+    simulation = scene.build(time_step=2e-3, integrator="backward_euler")
+    simulation.run(4.0, progress=False)
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    for _ in range(8000):
+        mujoco.mj_step(model, data)
+    for name, limit in (("hinge", np.radians(30.0)), ("rail", -0.1)):
+        theirs = float(data.joint(name).qpos[0]) - limit
+        ours = simulation.joint_angle(robot.joints[name]) - limit
+        assert abs(theirs) > 1e-5
+        assert ours == pytest.approx(theirs, rel=0.5)  # MuJoCo's stiffness doubles over the first 1e-3
+
+
+def test_a_joint_drawn_outside_of_its_limits_is_named(tmp_path: Path) -> None:
+    """It gets no limits."""
+    pytest.importorskip("mujoco")
+    path = tmp_path / "outside.xml"
+    path.write_text(STOPPED.replace('range="-20 30"', 'range="10 30"'))
+    with pytest.warns(withe.UnsupportedRobotWarning, match="limits that exclude the drawn place of joints 'hinge'"):
+        withe.Scene().add_robot(path)

@@ -69,6 +69,10 @@ class RobotJoint:
         Unit vector; None for a pinned joint.
     stiffness, rest_angle, damping : float
         As in `Scene.join`.
+    limits : (float, float), or None
+        Least and greatest angle [rad], or displacement [m].
+    limit_stiffness : float or None
+        Stiffness of the stops [N m/rad], or [N/m].
     """
 
     name: str
@@ -80,6 +84,8 @@ class RobotJoint:
     stiffness: float = 0.0
     rest_angle: float = 0.0
     damping: float = 0.0
+    limits: tuple[float, float] | None = None
+    limit_stiffness: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -61,6 +61,27 @@ def read_robot(path: str | os.PathLike[str]) -> RobotDescription:
     return _Reader(robot, data, Path(path)).description()
 
 
+def stops_of(model: Any, joint: int) -> tuple[tuple[float, float] | None, float | None]:
+    """Return the limits of a hinge or slide, from its place in the drawing, and the stiffness of its stops.
+
+    MuJoCo's limit yields under a resting load by the load over m k d / (1 - d), where m is the inertia of the joint,
+    k the stiffness of `solref`, and d the impedance. The impedance grows with the yield; here it is the mean of both
+    values of `solimp`.
+    """
+    if not model.jnt_limited[joint] or model.jnt_type[joint] not in (_SLIDE, _HINGE):
+        return None, None
+    drawn = float(model.qpos0[int(model.jnt_qposadr[joint])])
+    low, high = (float(limit) - drawn for limit in model.jnt_range[joint])
+    inverse = float(model.dof_invweight0[int(model.jnt_dofadr[joint])])
+    if not low <= 0.0 <= high or low == high or not inverse > 0.0:
+        return None, None
+    first, second = map(float, model.jnt_solref[joint])
+    impedances = np.clip(model.jnt_solimp[joint][:2], 1e-4, 1.0 - 1e-4)
+    impedance, greatest = float(impedances.mean()), float(impedances[1])
+    rate = (1.0 / (first * second) ** 2 if first > 0.0 else -first) / greatest**2
+    return (low, high), rate * impedance / ((1.0 - impedance) * inverse)
+
+
 class _Reader:
     """Reader of one model in its reference configuration."""
 
@@ -97,7 +118,7 @@ class _Reader:
         return RobotDescription(self._robot.name, tuple(bodies), joints, points, self._size, gravity, unsupported)
 
     def _needs_base(self, joint: int) -> bool:
-        """Return True if a joint to the world has a spring, a damper or a motor, which supports of a scene lack."""
+        """Return True if a joint to the world has a spring, a damper, a motor or limits, which supports lack."""
         model = self._model
         body, dof = int(model.jnt_bodyid[joint]), int(model.jnt_dofadr[joint])
         is_first = joint == int(model.body_jntadr[body])  # the others connect two bodies
@@ -106,7 +127,8 @@ class _Reader:
             return False
         motors = np.asarray(model.actuator_trnid, dtype=int).reshape(-1, 2)[:, 0]
         transmits = np.asarray(model.actuator_trntype, dtype=int) <= 1  # mjTRN_JOINT, mjTRN_JOINTINPARENT
-        return bool(model.jnt_stiffness[joint] or model.dof_damping[dof] or joint in motors[transmits])
+        limited = stops_of(model, joint)[0] is not None
+        return bool(limited or model.jnt_stiffness[joint] or model.dof_damping[dof] or joint in motors[transmits])
 
     def _extent(self) -> float:
         """Return the diagonal of the box around bodies, joints and shapes, without the geoms of the world."""
@@ -177,7 +199,7 @@ class _Reader:
                     at = free_place(at, axis, taken, self._size)
                 for owner in owners:
                     used.setdefault(owner, []).append(at)
-                values = self._spring(joint)
+                values = (*self._spring(joint), *stops_of(model, joint))
                 found.append(RobotJoint(name_of(model, "joint", joint), _KINDS[kind], parent, child, at, axis, *values))
                 parent = child
         return tuple(found)

@@ -26,6 +26,14 @@ def listed(names: Iterable[str], most: int = 6) -> str:
     return ", ".join(known[:most]) + more
 
 
+def _excluded(model: Any) -> set[int]:
+    """Return the joints that the file draws outside of their limits."""
+    drawn = np.asarray(model.qpos0)[np.asarray(model.jnt_qposadr, dtype=int)]
+    low, high = np.asarray(model.jnt_range).reshape(-1, 2).T
+    outside = np.asarray(model.jnt_limited, dtype=bool) & ~((low <= drawn) & (drawn <= high) & (low < high))
+    return set(np.nonzero(outside)[0].tolist())
+
+
 def unsupported_content(model: Any) -> Iterator[str]:
     """Yield what a model has that a scene of rigid bodies and joints lacks, with names."""
     yield from _of_joints(model)
@@ -58,7 +66,8 @@ def _of_joints(model: Any) -> Iterator[str]:
 
     without_spring = set(np.nonzero(kind <= _BALL)[0].tolist())
     found = {
-        "limits of joints": of_joints(model.jnt_limited),
+        "limits of ball joints": of_joints(model.jnt_limited) & without_spring,
+        "limits that exclude the drawn place of joints": _excluded(model) - without_spring,
         "force limits of joints": of_joints(model.jnt_actfrclimited),
         "armature of joints": of_dofs(model.dof_armature),
         "friction loss of joints": of_dofs(model.dof_frictionloss),

@@ -397,7 +397,7 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         Warns
         -----
         UnsupportedRobotWarning
-            The file has content that a scene lacks: limits, armature and friction loss of joints, actuators, equality
+            The file has content that a scene lacks: armature and friction loss of joints, actuators, equality
             constraints, tendons, contact, sensors and others. One warning lists all of it with its names.
         PlausibilityWarning
             The robot is larger than 20 m, a body has more than 10,000 kg, or a USD file has no ``metersPerUnit``.
