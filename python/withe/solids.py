@@ -96,7 +96,7 @@ class Sphere:
 
     @property
     def core(self) -> tuple[FloatArray, float]:
-        """Middle of the ball, as a segment that is too short to show.
+        """Middle of the ball, as a segment too short to show: its ends, shape (2, 3), and the radius [m].
 
         Returns
         -------
@@ -265,7 +265,7 @@ class Capsule:
 
     @property
     def core(self) -> tuple[FloatArray, float]:
-        """Segment at the distance of a radius from the surface.
+        """Segment at the distance of a radius from the surface: its ends, shape (2, 3), and the radius [m].
 
         Returns
         -------
