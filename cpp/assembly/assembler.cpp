@@ -341,7 +341,9 @@ void Assembler::add_bodies_to(std::vector<std::vector<int>>& cliques) const {
         if (std::find(clique.begin(), clique.end(), dof) == clique.end()) clique.push_back(dof);
       };
       for (int i = 0; i < part.own_size; ++i) add(part.own_dof + i);
-      for (int dof : part.body_dofs) add(dof);
+      // Held unknowns are projected out, so that nothing couples through a held body.
+      for (int dof : part.body_dofs)
+        if (!part.is_held) add(dof);
     }
 }
 
@@ -354,8 +356,9 @@ void Assembler::find_folds() {
   for (const CarriedPart& part : model_.carried) {
     std::vector<int> own, others;
     append(own, part.own_dof, part.own_size);
+    const std::vector<int> body = part.is_held ? std::vector<int>{} : part.body_dofs;
     std::vector<int> square = own;
-    square.insert(square.end(), part.body_dofs.begin(), part.body_dofs.end());
+    square.insert(square.end(), body.begin(), body.end());
     for (int dof : own)
       for (int k = whole.column_starts[at(dof)]; k < whole.column_starts[at(dof) + 1]; ++k)
         if (const int other = whole.row_indices[at(k)]; std::find(square.begin(), square.end(), other) == square.end())
@@ -364,17 +367,17 @@ void Assembler::find_folds() {
     others.erase(std::unique(others.begin(), others.end()), others.end());
     Fold fold;
     fold.own = part.own_size;
-    fold.body = static_cast<int>(part.body_dofs.size());
+    fold.body = static_cast<int>(body.size());
     fold.others = static_cast<int>(others.size());
     const auto list = [&](const std::vector<int>& rows, const std::vector<int>& columns, auto& out) {
       for (int row : rows)
         for (int column : columns) out.push_back(place_of(row, column));
     };
     list(own, others, fold.rows);
-    list(part.body_dofs, others, fold.onto_rows);
+    list(body, others, fold.onto_rows);
     if (symmetry_ != Symmetry::symmetric) {
       list(others, own, fold.columns);
-      list(others, part.body_dofs, fold.onto_columns);
+      list(others, body, fold.onto_columns);
     }
     list(square, square, fold.square);
     for (int dof : own) fold.diagonal.push_back(solver_->offset(dof, dof));
