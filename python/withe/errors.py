@@ -92,8 +92,9 @@ class PoorMaskWarning(UserWarning):
     """The mask of a picture does not look like cables, so the tracing is probably wrong.
 
     The message names what is unlike cables: the share of the picture, parts without a cable, many short pieces, or very
-    different widths. Give `mask=` to `withe.perception.trace`: a filter by colour (`color_filter`), a network
-    (`network_mask`), or an array. `Tracing.mask_quality` has the numbers.
+    different widths. For the default filter it also names a blurred picture, a ground that varies as much as the
+    cables, or lines as straight as seams. Give `mask=` to `withe.perception.trace`: a filter by colour
+    (`color_filter`), a network (`network_mask`), or an array. `Tracing.mask_quality` has the numbers.
     """
 
 

@@ -1,5 +1,7 @@
 """Cables on bright ground under shadows, found by the default filter; dirty masks."""
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -62,6 +64,54 @@ def test_the_light_does_not_matter(factor):
 @pytest.mark.parametrize("level", [0, 90, 255])
 def test_small_pictures_of_one_colour_have_no_cable(shape, level):
     assert not ground_filter(np.full((*shape, 3), level, np.uint8)).any()
+
+
+# Pictures without an answer
+
+
+def seamed_wood(seed):
+    rng = np.random.default_rng(seed)
+    return np.clip(wood(rng, SHAPE) + rng.normal(0, 2, (*SHAPE, 3)), 0, 255).round().astype(np.uint8)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_wood_without_cables_has_none_or_warns(seed):
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        tracing = trace(seamed_wood(seed))
+    assert len(tracing) == 0 or any(issubclass(w.category, withe.PoorMaskWarning) for w in caught)
+
+
+def test_noise_as_strong_as_the_cables_warns():
+    _, image = picture(1, plain)
+    noisy = np.clip(image + np.random.default_rng(0).normal(0, 60, image.shape), 0, 255).round().astype(np.uint8)
+    with pytest.warns(withe.PoorMaskWarning, match="times as much as the ground itself"):
+        tracing = trace(noisy)
+    assert tracing.mask_quality.contrast < 1.1
+
+
+def test_a_blurred_picture_warns():
+    from scipy.ndimage import gaussian_filter
+
+    _, image = picture(1, plain)
+    with pytest.warns(withe.PoorMaskWarning, match="blurred"):
+        tracing = trace(gaussian_filter(image, (5, 5, 0)))
+    assert tracing.mask_quality.sharpness < 0.35
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_sharp_picture_does_not_warn():
+    _, image = picture(1, plain)
+    quality = trace(image).mask_quality
+    assert quality.is_good
+    assert quality.contrast > 2
+    assert quality.sharpness > 0.45
+
+
+def test_a_given_mask_is_not_held_against_the_picture():
+    scene, image = picture(1, plain)
+    noisy = np.clip(image + np.random.default_rng(0).normal(0, 60, image.shape), 0, 255).round().astype(np.uint8)
+    assert trace(noisy, mask=scene.mask).mask_quality.is_good
 
 
 # Dirty masks

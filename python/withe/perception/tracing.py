@@ -13,7 +13,7 @@ from withe import _core
 from withe.common.extras import require
 from withe.common.user_warnings import warn
 from withe.errors import PoorMaskWarning
-from withe.perception.mask_quality import measure_quality
+from withe.perception.mask_quality import compare_with_picture, measure_quality
 from withe.perception.masks import MaskFunction, ground_filter
 from withe.perception.results import Ambiguity, Crossing, Joint, Tracing
 
@@ -45,12 +45,18 @@ def check_mask(mask: ArrayLike, name: str = "mask") -> NDArray[np.uint8]:
     return np.ascontiguousarray(array != 0).view(np.uint8)
 
 
-def _tracing(found: dict[str, Any]) -> Tracing:
-    quality = measure_quality(found["cover"], found["labelled"], found["centrelines"], found["widths"])
+def _tracing(
+    found: dict[str, Any], image: NDArray[np.uint8] | None = None, mask: NDArray[np.uint8] | None = None
+) -> Tracing:
+    """Return the tracing with the quality of its mask. With the picture that the mask was made of, compare both."""
+    lines = found["centrelines"], found["widths"]
+    quality = measure_quality(found["cover"], found["labelled"], *lines)
+    if image is not None and mask is not None:
+        quality = compare_with_picture(quality, image, mask, *lines)
     if not quality.is_good:
         warn(
             f"the mask does not look like cables: {', '.join(quality.reasons)}. Give mask= to trace, such as a "
-            "color_filter, a network_mask or an array, or take the picture on a plain ground",
+            "color_filter, a network_mask or an array, or take a sharp picture on a plain ground",
             PoorMaskWarning,
         )
     return Tracing(
@@ -136,7 +142,8 @@ def trace(
     Warns
     -----
     PoorMaskWarning
-        The mask does not look like cables, so the tracing is probably wrong.
+        The mask does not look like cables, or the picture is too noisy or too blurred for the default filter, so the
+        tracing is probably wrong.
 
     Raises
     ------
@@ -156,13 +163,15 @@ def trace(
     _check_method(method)
     picture = read_image(image) if isinstance(image, str | os.PathLike) else check_image(image)
     started = time.perf_counter()
+    by_default = mask is None
     if mask is None:
         mask = ground_filter
     pixels = check_mask(mask(picture) if callable(mask) else mask)
     masked = time.perf_counter() - started
     if pixels.shape != picture.shape[:2]:
         raise ValueError(f"mask must be as large as the image, {picture.shape[:2]}, got {pixels.shape}")
-    tracing = _tracing(_core.trace_lines(pixels, picture, method))
+    found = _core.trace_lines(pixels, picture, method)
+    tracing = _tracing(found, picture, pixels) if by_default else _tracing(found)
     tracing.timings = {"mask": masked, **tracing.timings}
     return tracing
 
