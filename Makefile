@@ -20,8 +20,8 @@ export PATH := $(VENV)/bin:$(PATH)
 export CMAKE_BUILD_PARALLEL_LEVEL ?= $(JOBS)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 unexport PYTHONPATH PYTHONHOME
-# Python compiles modules when it first imports them, and few of those in torch and VTK ever are.
-PIP_INSTALL := python -m pip install --quiet --no-compile --constraint constraints.txt
+# One at a time, also with `make --jobs`. Python compiles modules when it first imports them; most never are.
+PIP_INSTALL := flock $(VENV) python -m pip install --quiet --no-compile --constraint constraints.txt
 requirements = $$(python tools/requirements.py $(1))
 
 CXX_SOURCES := $(wildcard cpp/*/*.hpp cpp/*/*.cpp python/bindings/*.hpp python/bindings/*.cpp)
