@@ -32,6 +32,22 @@ def run(name, folder, *arguments):
     return done.stdout
 
 
+def check_short_form(name, folder):
+    printed = run(name, folder, "--quick")
+    content = json.loads((folder / f"{name}.json").read_text())
+    assert content["name"] == name
+    assert content["command"] == f"python benchmarks/{name}.py --quick"  # that anybody can type
+    assert content["quick"] is True
+    assert content["machine"]["processor"]
+    assert content["tables"]
+    assert f"Goals of {name}" in printed
+    assert content["goals"]
+    for goal in content["goals"]:
+        assert set(goal) == {"name", "value", "target", "sign", "met"}
+        assert goal["met"] in (True, False)
+        assert goal["value"] is not None or not goal["met"]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
@@ -52,7 +68,6 @@ def run(name, folder, *arguments):
         "contact_robustness",
         "real2sim",
         "deployment",
-        "deployment_tables",
         "deployment_uses",
         "folding",
         "folding_trials",
@@ -63,24 +78,12 @@ def run(name, folder, *arguments):
     ],
 )
 def test_the_short_form_writes_its_figures(name, tmp_path):
-    printed = run(name, tmp_path, "--quick")
-    content = json.loads((tmp_path / f"{name}.json").read_text())
-    assert content["name"] == name
-    assert content["command"] == f"python benchmarks/{name}.py --quick"  # that anybody can type
-    assert content["quick"] is True
-    assert content["machine"]["processor"]
-    assert content["tables"]
-    assert f"Goals of {name}" in printed
-    assert content["goals"]
-    for goal in content["goals"]:
-        assert set(goal) == {"name", "value", "target", "sign", "met"}
-        assert goal["met"] in (True, False)
-        assert goal["value"] is not None or not goal["met"]
+    check_short_form(name, tmp_path)
 
 
 @pytest.mark.slow
 def test_a_run_that_was_cut_off_goes_on_with_what_it_had(tmp_path):
-    run("deployment_tables", tmp_path, "--quick")
+    check_short_form("deployment_tables", tmp_path)
     file = tmp_path / "deployment_tables.jsonl"
     first, second = file.read_text().splitlines()
     kept = json.dumps(json.loads(first) | {"error": 123.4})
