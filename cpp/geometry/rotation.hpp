@@ -1,9 +1,7 @@
 #pragma once
 /// Finite rotations: exponential, logarithm, and the Cayley map with its derivative.
 
-#include <cmath>
-
-#include <Eigen/Geometry>
+#include <Eigen/Geometry>  // for the cross products of who includes this
 
 #include "common/types.hpp"
 
@@ -16,60 +14,28 @@ inline Matrix3 cross_matrix(const Vector3& a) {
 }
 
 /// Rotation by |vector| rad about vector.
-inline Matrix3 rotation_exp(const Vector3& vector) {
-  const double angle = vector.norm();
-  if (angle < 1e-300) return Matrix3::Identity();
-  return Eigen::AngleAxisd(angle, vector / angle).toRotationMatrix();
-}
+Matrix3 rotation_exp(const Vector3& vector);
 
 /// Spatial spin = rotation_spin(v) dv of exp(v): I + (1 - cos a) / a^2 V + (a - sin a) / a^3 V^2, a = |v|.
-inline Matrix3 rotation_spin(const Vector3& vector) {
-  const double square = vector.squaredNorm(), angle = std::sqrt(square);
-  const Matrix3 V = cross_matrix(vector);
-  const bool little = angle < 1e-3;
-  const double half = angle < 1e-8 ? 1.0 : std::sin(0.5 * angle) / (0.5 * angle),
-               second = little ? 1.0 / 6.0 - square / 120.0 : (angle - std::sin(angle)) / (square * angle);
-  return Matrix3::Identity() + 0.5 * half * half * V + second * V * V;
-}
+Matrix3 rotation_spin(const Vector3& vector);
 
 /// Rotation vector of a rotation, |result| <= pi.
-inline Vector3 rotation_log(const Matrix3& rotation) {
-  Eigen::Quaterniond q(rotation);
-  if (q.w() < 0.0) q.coeffs() = -q.coeffs();
-  const double s = q.vec().norm();
-  if (s < 1e-300) return 2.0 * q.vec();
-  return (2.0 * std::atan2(s, q.w()) / s) * q.vec();
-}
+Vector3 rotation_log(const Matrix3& rotation);
 
 /// Cayley map: rotation by 2 atan(|w| / 2) about w; equals the exponential up to third order, and its
 /// spin is a rational function, without a singular coefficient at w = 0.
-inline Matrix3 cayley(const Vector3& w) {
-  const double c = 1.0 / (1.0 + 0.25 * w.squaredNorm());
-  const Matrix3 W = cross_matrix(w);
-  return Matrix3::Identity() + c * (W + 0.5 * W * W);
-}
+Matrix3 cayley(const Vector3& w);
 
 /// Inverse of the Cayley map; needs an angle below pi.
-inline Vector3 cayley_inverse(const Matrix3& rotation) {
-  const Vector3 v = rotation_log(rotation);
-  const double angle = v.norm();
-  return angle < 1e-12 ? v : Vector3((2.0 * std::tan(0.5 * angle) / angle) * v);
-}
+Vector3 cayley_inverse(const Matrix3& rotation);
 
 /// Spatial spin = cayley_spin(w) dw.
-inline Matrix3 cayley_spin(const Vector3& w) {
-  return (Matrix3::Identity() + 0.5 * cross_matrix(w)) / (1.0 + 0.25 * w.squaredNorm());
-}
+Matrix3 cayley_spin(const Vector3& w);
 
 /// Derivative of cayley_spin(w)^T m by w.
-inline Matrix3 cayley_moment_slope(const Vector3& w, const Vector3& m) {
-  const double c = 1.0 / (1.0 + 0.25 * w.squaredNorm());
-  return 0.5 * c * cross_matrix(m) - (0.5 * c * c) * (m - 0.5 * w.cross(m)) * w.transpose();
-}
+Matrix3 cayley_moment_slope(const Vector3& w, const Vector3& m);
 
 /// Removes the rounding that products of rotations collect.
-inline Matrix3 orthonormalized(const Matrix3& rotation) {
-  return Eigen::Quaterniond(rotation).normalized().toRotationMatrix();
-}
+Matrix3 orthonormalized(const Matrix3& rotation);
 
 }  // namespace withe
