@@ -87,7 +87,8 @@ def make(python: Path) -> Path:
     shutil.rmtree(raw, ignore_errors=True)
     # One build folder for all: the engine does not depend on the Python, and is compiled once.
     run(python, "-m", "pip", "wheel", "--quiet", "--no-build-isolation", "--no-deps", "--wheel-dir", raw,
-        "--config-settings=build-dir=build/wheel", ".")  # fmt: skip
+        "--config-settings=build-dir=build/wheel", "--config-settings=cmake.define.WITHE_PRECOMPILE_HEADERS=ON",
+        ".")  # fmt: skip
     (built,) = raw.glob("*.whl")
     run("auditwheel", "repair", "--wheel-dir", DIST, built)
     (wheel,) = DIST.glob(f"{'-'.join(built.name.split('-')[:3])}-*.whl")  # name, version and Python; another platform
