@@ -42,7 +42,7 @@ help:
 	@echo "make test          tests in C++ and Python, without the slow ones (about 5 minutes on two cores)"
 	@echo "make test-all      all tests, slow ones too"
 	@echo "make pytest        all tests in Python; TESTS=\"tests/physics -k knot\" runs some"
-	@echo "make ctest-baseline  C++ tests on an emulated machine without AVX (qemu-user)"
+	@echo "make ctest-baseline  that the engine runs on machines without AVX: compiled files, C++ tests, qemu-user"
 	@echo "make asan          C++ tests under the address and undefined-behaviour sanitizers"
 	@echo "make tsan          C++ tests of what runs in threads under the thread sanitizer"
 	@echo "make asan-python   random sequences of calls through Python under them; SEQUENCES=1000 SEED=7 runs others"
@@ -105,11 +105,14 @@ $(STAMPS)/notebook_tools: $(STAMPS)/build_tools
 	@$(PIP_INSTALL) $(call requirements,notebooks)
 	@touch $@
 
-# One build folder serves the installed module and the C++ tests, so the engine is compiled once.
+# One build folder serves the installed module and the C++ tests, so the engine is compiled once. UNITY=ON compiles some
+# files of a room as one, which is quicker where all are compiled and slower where one changed.
+UNITY ?=
 $(STAMPS)/installed: $(STAMPS)/build_tools $(CXX_SOURCES) $(CMAKE_FILES) $(PYTHON_SOURCES) $(SOURCE_FOLDERS) README.md
 	@echo "Building and installing withe (the first time takes some minutes)"
 	@python -m pip install --quiet --no-build-isolation --no-deps --force-reinstall \
-	    --config-settings=build-dir=$(BUILD) --config-settings=cmake.define.WITHE_PRECOMPILE_HEADERS=ON .
+	    --config-settings=build-dir=$(BUILD) --config-settings=cmake.define.WITHE_PRECOMPILE_HEADERS=ON \
+	    $(if $(UNITY),--config-settings=cmake.define.CMAKE_UNITY_BUILD=$(UNITY)) .
 	@touch $@
 
 # --- use ----------------------------------------------------------------------------------------------------
@@ -229,8 +232,9 @@ tidy: $(STAMPS)/dev_tools
 	@cmake --preset tidy
 	@printf '%s\0' $(filter-out tests/cpp/cholmod_comparison.cpp benchmarks/%,$(filter %.cpp,$(CXX_FILES))) | xargs -0 -n 1 -P $(JOBS) clang-tidy --quiet -p build/tidy
 
-tidy-changed: ctest-build $(STAMPS)/dev_tools
-	@tools/tidy_changed.sh $(BUILD) $(BASE)
+tidy-changed: $(STAMPS)/dev_tools
+	@cmake --preset tidy >/dev/null
+	@tools/tidy_changed.sh build/tidy $(BASE)
 
 clean:
 	rm -rf build dist out

@@ -11,7 +11,7 @@ constexpr int kAngle = 9, kWays = 11;
 int unknown_of(int way) { return way < kAngle ? way : way + 3; }
 
 /// Derivatives by them.
-struct Slopes {
+struct CurvedSlopes {
   double s[kWays] = {}, pressing[kWays] = {};
   Vec3d normal[kWays] = {}, turn[kWays] = {};  ///< n, omega
   Vec3d force[kWays], moment[kWays];           ///< F, F x n
@@ -45,7 +45,7 @@ Curve curve_of(const FrictionSetting& f, const SlippingSurfaces<double>& c) {
 
 /// Point of contact, normal force, and normal.
 void add_contact_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, const Curve& curve,
-                        const Vec3d (&x)[3], Slopes& d) {
+                        const Vec3d (&x)[3], CurvedSlopes& d) {
   const Vec3d nodes[4] = {x[0], x[1], x[2], {}};
   const CurveDistance<double> distance = distance_of(f, nodes);
   const CurveSlopes slopes = curve_slopes(f.pair->piece, distance);
@@ -58,7 +58,7 @@ void add_contact_slopes(const FrictionSetting& f, const SlippingSurfaces<double>
   });
 }
 
-void add_turn_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, const Curve& curve, Slopes& d) {
+void add_turn_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, const Curve& curve, CurvedSlopes& d) {
   for (int b = 0; b < c.bodies; ++b) {
     const SlippingEdge<double>& side = c.sides[b];
     const double rho = curve.lever[b], inverse = side.inverse, angle = dot(side.turn, side.tangent);
@@ -85,7 +85,8 @@ void add_turn_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c
 }
 
 /// Derivatives of `obstacle_arm`: of a - (delta - r) n with a = c(s), da - (n . da) n - (delta - r) dn.
-Vec3d obstacle_arm_slope(const FrictionSetting& f, const Curve& curve, const Vec3d (&x)[3], const Slopes& d, int j) {
+Vec3d obstacle_arm_slope(const FrictionSetting& f, const Curve& curve, const Vec3d (&x)[3], const CurvedSlopes& d,
+                         int j) {
   if (f.rolling) return -f.pair->radius_a * d.normal[j];
   const PointDistance<double> point = distance_to(*f.obstacle, curve_point(curve.w, x, curve.s));
   Vec3d moved = d.s[j] * curve_direction(curve.w, x, curve.s);
@@ -94,7 +95,7 @@ Vec3d obstacle_arm_slope(const FrictionSetting& f, const Curve& curve, const Vec
 }
 
 void add_force_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, const Curve& curve,
-                      const Vec3d (&x)[3], Slopes& d) {
+                      const Vec3d (&x)[3], CurvedSlopes& d) {
   const Vec3d &n = c.normal, way = whole_way(f, c);
   const double off = dot(way, n);
   const Vec3d slip = way - off * n;
@@ -118,7 +119,7 @@ void add_force_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& 
 
 /// Converts the force of the greatest coefficient to that of `direct_friction`.
 void direct_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, const Curve& curve, const Vec3d (&x)[3],
-                   Slopes& d) {
+                   CurvedSlopes& d) {
   const double share = dot(c.along, c.plain), across = f.pair->across, more = f.pair->along(share) - across;
   const Vec3d e = rod_direction(f, c), &n = c.normal;
   const double inverse = 1.0 / std::sqrt(dot(e, e));
@@ -139,7 +140,7 @@ void direct_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, 
 
 /// Force of the moment m = F x n on an edge, r m_b (m x t / |e| + (t . m) spin), and to its angle.
 void add_couples(const FrictionSetting& f, const SlippingSurfaces<double>& c, const Curve& curve, int b,
-                 const Slopes& d, double (&jacobian)[kContactUnknowns][kContactUnknowns]) {
+                 const CurvedSlopes& d, double (&jacobian)[kContactUnknowns][kContactUnknowns]) {
   const SlippingEdge<double>& side = c.sides[b];
   const Vec3d &t = side.tangent, m = cross(c.friction.force, c.normal);
   const double rho = curve.lever[b], inverse = side.inverse, along = dot(t, m);
@@ -183,7 +184,7 @@ void add_curve_friction_jacobian(const FrictionSetting& f, const SlippingSurface
                                  double (&jacobian)[kContactUnknowns][kContactUnknowns]) {
   const Vec3d x[3] = {c.node[0], c.node[1], c.node[2]};
   const Curve curve = curve_of(f, c);
-  Slopes d;
+  CurvedSlopes d;
   add_contact_slopes(f, c, curve, x, d);
   add_turn_slopes(f, c, curve, d);
   add_force_slopes(f, c, curve, x, d);

@@ -276,8 +276,8 @@ void update_viscous_times(const Model& model, Parameters& p) {
 }
 
 /// `square`: of what the arc turns by [rad^2].
-double twist_stiffness(const Model& model, double twist, const Vector2& bend, std::pair<int, int> owner,
-                       double square) {
+double stiffness_of_twist(const Model& model, double twist, const Vector2& bend, std::pair<int, int> owner,
+                          double square) {
   const ArcOfStencil arc = arc_of(model, owner, square);
   if (!arc.turns || twist == 0.0 || bend.minCoeff() <= 0.0) return twist;
   return twist_of_arc(twist, bend(0), bend(1), arc.square_of_turn, arc.share);
@@ -298,7 +298,7 @@ class BendStiffness {
     part_ = part(b, share_b);
     const Vector2 bending(in_series(before.bend1, part_.bend1), in_series(before.bend2, part_.bend2));
     const double twist = in_series(before.twist, part_.twist), square = 0.5 * (before.square + part_.square);
-    return {bending(0), bending(1), twist_stiffness(model_, twist, bending, model_.bend_owner[at(stencil)], square)};
+    return {bending(0), bending(1), stiffness_of_twist(model_, twist, bending, model_.bend_owner[at(stencil)], square)};
   }
 
  private:
@@ -326,7 +326,7 @@ void update_half_stiffness(const Model& model, Parameters& p, int half) {
   const double twist = p.edge_twist(edge) / model.half_voronoi(half);
   const double square = 0.25 * square_of_turn(model.edge_length(edge), model.edge_arc(edge));
   p.half_stiffness.row(half) << bending.transpose(),
-      twist_stiffness(model, twist, bending, model.half_owner[at(half)], square);
+      stiffness_of_twist(model, twist, bending, model.half_owner[at(half)], square);
 }
 
 /// Calls `own(row of a bend stencil, its stencil of the rod)` for those of a rod, `across(row)` for those across it

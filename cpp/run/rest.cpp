@@ -17,7 +17,7 @@ constexpr int kMaxStiffenings = 8;
 constexpr double kMaxRelievedRatio = 0.9;
 // A frame may turn by so much from the present state to the next on a path [rad]: rotations do not tell more than half
 // a turn from less.
-constexpr double kMaxTurn = 2.5;
+constexpr double kMaxTurnOnPath = 2.5;
 
 /// Rotation vector of the turn of a support from one place to another that is left beside its roll.
 Vector3 swing_between(const SupportMotion& from, const SupportMotion& to) {
@@ -70,7 +70,7 @@ Boundary boundary_between(const Model& model, const Moving& now, Equations& syst
     hold(model, now, poses, there);
     for (std::size_t s = 0; s < to.size(); ++s) {
       const double turn = to[s].roll.norm() + swing_between(from[s], to[s]).norm();
-      if (to[s].roll != Vector3::Zero() && std::abs(factor - present) * turn > kMaxTurn) there.reachable = false;
+      if (to[s].roll != Vector3::Zero() && std::abs(factor - present) * turn > kMaxTurnOnPath) there.reachable = false;
     }
     system.assembler().add_held_change(q, there.q, 1.0, q);
     return there.reachable;

@@ -18,7 +18,7 @@ namespace {
 using D = Dual<kTorsionUnknowns>;
 using TorsionLocal = LocalOf<kTorsionUnknowns>;
 
-TorsionSpring spring_of(const PartNumbers& p, int spring) {
+TorsionSpring torsion_spring_of(const PartNumbers& p, int spring) {
   return {.stiffness = p.torsion_stiffness[spring], .rest_angle = p.torsion_rest_angle[spring]};
 }
 
@@ -198,7 +198,7 @@ std::string TorsionForces::note() const {
 void TorsionForces::add(const StepProblem& problem, StepData& data, const Assembler&, std::span<double> values) const {
   TorsionLocal local;
   for (int s = 0; s < table_.count(); ++s) {
-    const TorsionSpring spring = spring_of(*problem.parameters, s);
+    const TorsionSpring spring = torsion_spring_of(*problem.parameters, s);
     if (spring.stiffness == 0.0) continue;
     const TorsionArms<double>& carried = carried_[at(s)];
     if (problem.conserves_energy())
@@ -222,7 +222,7 @@ void TorsionForces::add_adjoint(const StepProblem& problem, const StepData& data
   if (problem.conserves_energy()) discrete.emplace(problem, data, adjoint.rows, adjoint);
   for (int s = 0; s < table_.count(); ++s) {
     const TorsionArms<double>& carried = carried_[at(s)];
-    const TorsionSpring spring = spring_of(*problem.parameters, s);
+    const TorsionSpring spring = torsion_spring_of(*problem.parameters, s);
     double rows[kTorsionUnknowns];
     gather(table_, s, adjoint.rows, rows);
     const auto along = [&](const TorsionSpring& of) {
@@ -255,7 +255,7 @@ void TorsionForces::add_adjoint(const StepProblem& problem, const StepData& data
 /// Rounding of the moments: directions, and angles with them, round by eps |x| / l.
 void TorsionForces::add_rounding(const StepProblem& problem, StepData& data) const {
   for (int s = 0; s < table_.count(); ++s) {
-    const TorsionSpring spring = spring_of(*problem.parameters, s);
+    const TorsionSpring spring = torsion_spring_of(*problem.parameters, s);
     const auto inverse_length = [&](const TorsionSeat& seat) { return 1.0 / data.configuration.length[seat.edge]; };
     const Seats& seats = seats_[at(s)];
     const double turns = data.rounding.reach * (inverse_length(seats[0]) + inverse_length(seats[1]));
@@ -270,7 +270,8 @@ void TorsionForces::add_rounding(const StepProblem& problem, StepData& data) con
 }
 
 double torsion_energy(const Model& model, const PartNumbers& numbers, const Configuration& c, int spring) {
-  return energy_between(model, edges_of(model, spring), carried_arms(model, spring), spring_of(numbers, spring), c);
+  return energy_between(model, edges_of(model, spring), carried_arms(model, spring), torsion_spring_of(numbers, spring),
+                        c);
 }
 
 }  // namespace withe
