@@ -298,3 +298,61 @@ def test_a_ball_comes_to_rest_below_where_it_was_drawn(gap: float) -> None:
     simulation = scene.build(integrator="static")
     simulation.equilibrium()
     assert simulation.position(ball)[2] == pytest.approx(0.0205, rel=0.01)
+
+
+@pytest.mark.case("bodies", "Bar that a ball strikes off its centre", source="effective mass of the bar")
+def test_a_ball_strikes_a_free_bar_off_its_centre() -> None:
+    """Elastic, at 1 m/s: 1 / m = 1 / M + d^2 / J of the bar."""
+    mass, ball, length, arm = 0.1, 0.05, 0.4, 0.15
+    inertia = mass * length**2 / 12.0
+    kick = 2.0 / (1.0 / ball + 1.0 / mass + arm**2 / inertia)
+    expected = np.array([kick / ball - 1.0, -kick / mass, kick * arm / inertia])
+    scene = withe.Scene(gravity=(0, 0, 0))
+    scene.enable_contact()
+    along_x = [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]
+    bar = scene.add_body(
+        withe.solids.Capsule(5e-3, 0.39), mass=mass, inertia=(inertia, inertia, 1e-6), rotation=along_x
+    )
+    striker = scene.add_body(withe.solids.Sphere(0.01), mass=ball, position=(arm, 0, 0.03))
+    simulation = scene.build(time_step=5e-4)
+    simulation.set_velocity(striker, (0, 0, -1))
+    simulation.step(200)
+    velocity, spin = simulation.velocity(bar)[2], simulation.angular_velocity(bar)[1]
+    found = np.array([simulation.velocity(striker)[2], velocity, spin])
+    errors = np.abs(found / expected - 1.0)
+    measured(errors.max())
+    assert errors.max() < 1e-3
+
+
+@pytest.mark.case("bodies", "Atwood's machine with a heavy rope on a pulley", source="Lagrange's equation")
+def test_a_rope_turns_a_pulley() -> None:
+    """The pulley is a capsule on a hinge of the world, and the rope does not slip."""
+    heavy, light, density, radius, hang, pulley = 2.0, 1.0, 0.1, 0.05, 0.8, 2.0
+    inertia, length = 0.5 * pulley * radius**2, 2.0 * hang + np.pi * radius
+    mass = heavy + light + density * length + inertia / radius**2
+    rate = np.sqrt(2.0 * density * G / mass)
+    way = (heavy - light) / (2.0 * density) * (np.cosh(0.5 * rate) - 1.0)
+    errors = []
+    for nodes in (101, 201):
+        scene = withe.Scene(gravity=(0, 0, -G))
+        scene.enable_contact(friction=0.5)
+        arc = np.linspace(0.0, length, nodes)
+        turn = np.clip((arc - hang) / radius, 0.0, np.pi)
+        below = np.minimum(arc - hang, 0.0) + np.minimum(length - hang - arc, 0.0)
+        points = np.column_stack([-radius * np.cos(turn), 0.0 * arc, radius * np.sin(turn) + below])
+        limp = withe.Stiffness(stretch=2e5, bend=1e-7, twist=1e-5)
+        rope = scene.add_rod(points=points, radius=1e-3, stiffness=limp, line_density=density)
+        inside = radius * np.cos(0.5 * length / (nodes - 1) / radius) - 1e-3  # of the chords
+        along_y = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
+        wheel = scene.add_body(
+            withe.solids.Capsule(inside, 0.06), mass=pulley, inertia=(2e-3, 2e-3, inertia), rotation=along_y
+        )
+        scene.clamp(wheel, spin=(0, 1, 0))
+        scene.add_mass(rope.start, heavy)
+        scene.add_mass(rope.end, light)
+        simulation = scene.build(time_step=2e-3, planar=False)
+        simulation.step(250)
+        errors.append(abs((points[0, 2] - simulation.positions(rope)[0, 2]) / way - 1.0))
+    measured(errors[-1])
+    assert errors[-1] < 2e-3
+    assert_order_at_least(errors, 1.5)
