@@ -186,3 +186,15 @@ def test_a_body_stands_for_its_support() -> None:
     simulation.release(wand)
     simulation.step(10)
     assert simulation.position(wand)[2] < 0.31
+
+
+def test_a_pendulum_that_touches_nothing_stays_planar() -> None:
+    """Its ball could touch something only if there were another part."""
+    scene = withe.Scene()
+    rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+    cable = scene.add_rod(start=(0, 0, 0), end=(0.3, 0, 0), nodes=11, radius=0.004, material=rubber)
+    scene.pin(cable.start)
+    scene.join(cable.end, scene.add_body(BALL, density=1000, position=(0.32, 0, 0)))
+    assert scene.build(time_step=1e-3).plan.planar
+    scene.add_body(BALL, density=1000, position=(0.1, 0, -0.2))
+    assert not scene.build(time_step=1e-3).plan.planar

@@ -11,7 +11,7 @@ from withe import _core
 from withe.common import validation
 from withe.parts.directory import Directory
 from withe.parts.handles import UnionFind
-from withe.parts.kinds import BodyPart, BodySurface, JoinPart, SupportPart
+from withe.parts.kinds import BodyPart, BodySurface, JoinPart, ObstaclePart, SupportPart
 from withe.solids import Solid
 
 __all__ = ["describe_bodies", "describe_surfaces", "make_body", "surfaces_of"]
@@ -86,9 +86,12 @@ def surfaces_of(directory: Directory) -> list[BodyPart]:
 
 
 def describe_surfaces(directory: Directory) -> list[_core.RodDescription]:
-    """Surfaces of bodies for the engine: edges without mass and stiffness that their bodies carry."""
+    """Surfaces of bodies for the engine: edges without mass and stiffness that their bodies carry.
+
+    Empty where they cannot touch anything, so that such a scene may be planar.
+    """
     found = []
-    for body in surfaces_of(directory):
+    for body in surfaces_of(directory) if _may_touch(directory) else ():
         surface = body.surface
         assert surface is not None
         way = surface.ends[1] - surface.ends[0]
@@ -109,6 +112,21 @@ def describe_surfaces(directory: Directory) -> list[_core.RodDescription]:
         description.restitution = -1.0 if surface.restitution is None else surface.restitution
         found.append(description)
     return found
+
+
+def _may_touch(directory: Directory) -> bool:
+    """Return True if there is contact, or if parts that are not joined may pass through each other without it."""
+    contact = directory.contact
+    if contact.rods or contact.pairs or directory.all(ObstaclePart):
+        return True
+    if contact.rods is not None:
+        return False
+    rods = len(directory.layout.rods)
+    parts = UnionFind(rods + len(directory.all(BodyPart)))
+    place = [owner if owner >= 0 else rods - 1 - owner for join in directory.all(JoinPart) for owner, _ in join.nodes]
+    for first, second in zip(place[::2], place[1::2], strict=True):
+        parts.unite(first, second)
+    return len({parts.find(i) for i in range(rods + len(directory.all(BodyPart)))}) > 1
 
 
 def _inertia(value: npt.ArrayLike, owner: str) -> FloatArray:
