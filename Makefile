@@ -154,7 +154,8 @@ EMULATED := $(filter-out forces elastica,$(ROOMS_WITH_KERNELS))
 ctest-baseline: ctest-build
 	@command -v qemu-x86_64 >/dev/null || { echo "make ctest-baseline needs qemu-x86_64: apt-get install qemu-user"; exit 1; }
 	@python tools/baseline_check.py $(BUILD)
-	@printf '%s\n' $(ROOMS_WITH_KERNELS) | WITHE_SIMD=baseline xargs -P $(JOBS) -I ROOM $(BUILD)/tests/cpp/test_ROOM --gtest_brief=1
+	@printf '%s\n' $(ROOMS_WITH_KERNELS) | xargs -P $(JOBS) -I ROOM \
+	    env WITHE_SIMD=baseline $(BUILD)/tests/cpp/test_ROOM --gtest_brief=1
 	@printf '%s\n' $(EMULATED) | xargs -P $(JOBS) -I ROOM \
 	    qemu-x86_64 -cpu qemu64 $(BUILD)/tests/cpp/test_ROOM --gtest_brief=1 --gtest_filter='-$(REPEATING)'
 
