@@ -255,11 +255,9 @@ void Assembler::set_beside() {
 std::ptrdiff_t Assembler::place(int row, int column) const {
   if (!carried(row) && !carried(column)) return solver_->place(row, column);
   if (symmetry_ == Symmetry::symmetric && row < column) std::swap(row, column);
-  const auto first = whole_.row_indices.begin();
-  const auto begin = first + whole_.column_starts[at(column)], end = first + whole_.column_starts[at(column) + 1];
-  const auto found = std::lower_bound(begin, end, row);
-  if (found == end || *found != row) throw std::invalid_argument("entry of a carried part outside of the pattern");
-  return beside_[static_cast<std::size_t>(found - first)];
+  const std::ptrdiff_t found = whole_.find(row, column);
+  if (found < 0) throw std::invalid_argument("entry of a carried part outside of the pattern");
+  return beside_[static_cast<std::size_t>(found)];
 }
 
 void Assembler::multiply(const VectorX& x, VectorX& out) const {

@@ -11,13 +11,12 @@ constexpr double kSlender = 100.0;
 
 /// A surface has the mass of its body, without bound where this is held.
 void set_body_masses(const Model& model, const Parameters& parameters, VectorX& edge_mass) {
-  for (const CarriedPart& surface : model.carried) {
-    if (surface.edge < 0) continue;
-    double mass = parameters.added_mass(surface.base);
-    for (const CarriedPart& part : model.carried)
-      if (part.is_node() && part.frame == surface.frame && part.slide < 0) mass += parameters.added_mass(part.node);
-    edge_mass(surface.edge) = surface.is_held ? INFINITY : mass;
-  }
+  VectorX of_frame = VectorX::Zero(model.frame_count);
+  for (int frame : model.body_frame) of_frame(frame) = parameters.added_mass(model.frame_node[at(frame)]);
+  for (const CarriedPart& part : model.carried)
+    if (part.is_node() && part.slide < 0) of_frame(part.frame) += parameters.added_mass(part.node);
+  for (const CarriedPart& surface : model.carried)
+    if (surface.edge >= 0) edge_mass(surface.edge) = surface.is_held ? INFINITY : of_frame(surface.frame);
 }
 
 bool by_bodies(const BodyOffset& a, const BodyOffset& b) { return a.rod != b.rod ? a.rod < b.rod : a.other < b.other; }

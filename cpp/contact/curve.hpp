@@ -72,38 +72,22 @@ inline constexpr CurveWeights kCurveEnd{.nodes = 2,
                                         .low = -1.0,
                                         .value_by = {0.0, 0.0, 1.0},
                                         .slope_by = {1.0, -4.0, 3.0}};
-/// The first and the last node, for themselves.
-inline constexpr CurveWeights kCurveFirst{.nodes = 2,
-                                          .edges = 1,
-                                          .middle = {1.0, 0.0, 0.0},
-                                          .slope = {},
-                                          .bend = {},
-                                          .share = {1.0, 0.0},
-                                          .share_slope = {},
-                                          .low = -0.5,
-                                          .value_by = {0.0, 1.0, 0.0},
-                                          .slope_by = {}};
-inline constexpr CurveWeights kCurveLast{.nodes = 2,
-                                         .edges = 1,
-                                         .middle = {0.0, 1.0, 0.0},
-                                         .slope = {},
-                                         .bend = {},
-                                         .share = {1.0, 0.0},
-                                         .share_slope = {},
-                                         .low = -0.5,
-                                         .value_by = {0.0, 1.0, 0.0},
-                                         .slope_by = {}};
-/// A ball, whose edge is too short to show.
-inline constexpr CurveWeights kCurveMiddle{.nodes = 2,
-                                           .edges = 1,
-                                           .middle = {0.5, 0.5, 0.0},
-                                           .slope = {},
-                                           .bend = {},
-                                           .share = {1.0, 0.0},
-                                           .share_slope = {},
-                                           .low = -0.5,
-                                           .value_by = {0.0, 1.0, 0.0},
-                                           .slope_by = {}};
+/// A point of an edge by itself, at a share of its length.
+constexpr CurveWeights point_of_edge(double share) {
+  return {.nodes = 2,
+          .edges = 1,
+          .middle = {1.0 - share, share, 0.0},
+          .slope = {},
+          .bend = {},
+          .share = {1.0, 0.0},
+          .share_slope = {},
+          .low = -0.5,
+          .value_by = {0.0, 1.0, 0.0},
+          .slope_by = {}};
+}
+/// The first and the last node, and the middle of a ball, whose edge is too short to show.
+inline constexpr CurveWeights kCurveFirst = point_of_edge(0.0), kCurveLast = point_of_edge(1.0),
+                              kCurveMiddle = point_of_edge(0.5);
 
 /// One piece; its second node and edge are the next ones along the rod.
 struct CurvePiece {

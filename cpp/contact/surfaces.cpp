@@ -161,24 +161,23 @@ bool Surfaces::may_meet(int first, int second) const {
   return last == pairs.rend() || !last->ignored;
 }
 
-std::vector<std::vector<NearSurface>> Surfaces::surfaces_at_nodes() const {
-  if (!model_.has_bodies()) return {};
-  std::vector<std::vector<NearSurface>> near(at(model_.node_count));
+std::vector<Surfaces::SurfaceNode> Surfaces::surface_nodes() const {
+  std::vector<SurfaceNode> out;
+  const auto place = [&](int node) { return local_position(model_, model_.initial_q, node); };
   for (const CarriedPart& surface : model_.carried) {
     if (surface.edge < 0) continue;
-    const auto place = [&](int node) { return local_position(model_, model_.initial_q, node); };
     const Vec3d tail = place(model_.edge_tail[at(surface.edge)]),
                 way = place(model_.edge_head[at(surface.edge)]) - tail;
     const auto add = [&](int node) {
       const Vec3d apart = place(node) - tail;
       const double s = std::clamp(dot(apart, way) / dot(way, way), 0.0, 1.0);
-      near[at(node)].push_back({surface.edge, std::max(0.0, norm(apart - s * way) - radius(surface.edge))});
+      out.push_back({surface.edge, node, std::max(0.0, norm(apart - s * way) - radius(surface.edge))});
     };
     add(surface.base);
     for (const CarriedPart& part : model_.carried)
       if (part.is_node() && part.frame == surface.frame) add(part.node);
   }
-  return near;
+  return out;
 }
 
 /// Edges that a walk along rods, through joints too, reaches before it has gone too far for a rod to touch itself.
@@ -189,7 +188,11 @@ void Surfaces::find_neighbours() {
     edges_at[at(model_.edge_head[at(e)])].push_back(e);
   }
   neighbours_.resize(at(model_.edge_count));
-  const std::vector<std::vector<NearSurface>> surfaces = surfaces_at_nodes();
+  std::vector<std::vector<SurfaceNode>> surfaces_at(at(model_.node_count)), nodes_of(at(model_.edge_count));
+  for (const SurfaceNode& each : surface_nodes()) {
+    surfaces_at[at(each.node)].push_back(each);
+    nodes_of[at(each.edge)].push_back(each);
+  }
   std::vector<double> distance(at(model_.node_count), INFINITY);
   using Visit = std::pair<double, int>;
   for (int e : edges_) {
@@ -204,17 +207,14 @@ void Surfaces::find_neighbours() {
     };
     reach(model_.edge_tail[at(e)], 0.0);
     reach(model_.edge_head[at(e)], 0.0);
-    for (int node = 0; node < static_cast<int>(surfaces.size()) && model_.is_surface(e); ++node)
-      for (const NearSurface& surface : surfaces[at(node)])
-        if (surface.edge == e) reach(node, surface.distance);
+    for (const SurfaceNode& own : nodes_of[at(e)]) reach(own.node, own.distance);
     std::vector<int>& found = neighbours_[at(e)];
     while (!queue.empty()) {
       const auto [d, node] = queue.top();
       queue.pop();
       if (d > distance[at(node)]) continue;
-      if (!surfaces.empty())
-        for (const NearSurface& surface : surfaces[at(node)])
-          if (d + surface.distance < limit) found.push_back(surface.edge);
+      for (const SurfaceNode& surface : surfaces_at[at(node)])
+        if (d + surface.distance < limit) found.push_back(surface.edge);
       for (int other : edges_at[at(node)]) {
         found.push_back(other);
         reach(model_.edge_tail[at(other)], d + model_.edge_length(other));
@@ -360,14 +360,12 @@ void Surfaces::add_pieces(const ContactPair& prototype, const Obstacle& obstacle
                {model_.edge_tail[at(before)], model_.edge_head[at(before)], -1},
                {before, -1},
                12.0 * kDepth * std::min(p.radius_a, model_.edge_length(before))};
-    if (&weights == &kCurveMiddle) {
-      p.share = 1.0;
-    } else if (before == behind) {  // half as long
-      p.share = 0.5;
-      p.piece.least_bend *= 0.25;
-    } else {
+    if (before != behind) {
       p.piece.node[2] = model_.edge_head[at(behind)];
       p.piece.edge[1] = behind;
+    } else if (&weights != &kCurveMiddle) {  // half as long
+      p.share = 0.5;
+      p.piece.least_bend *= 0.25;
     }
     obstacle_pairs_.push_back(p);
   };

@@ -30,12 +30,6 @@ inline constexpr int kContactUnknowns = 14;
 /// Unknowns of a piece of a planar curve: its nodes (2 each).
 inline constexpr int kPlaneUnknowns = 6;
 
-/// A surface of a body that a walk along rods and joints may reach from one of its nodes.
-struct NearSurface {
-  int edge;
-  double distance;  ///< from the node, as drawn [m]
-};
-
 /// Two surfaces that may touch, and their data that do not change during contact.
 struct ContactPair {
   ContactKey key;    ///< for a piece of a curve: the edge before its node (at the first node: after it), and its end
@@ -145,8 +139,13 @@ class Surfaces {
   double weight(int edge, double radii) const;
   /// True of the surface of a held body.
   bool held(int edge) const { return held_[static_cast<std::size_t>(edge)]; }
-  /// Surfaces of bodies at their nodes; empty without bodies.
-  std::vector<std::vector<NearSurface>> surfaces_at_nodes() const;
+  /// How far a surface of a body is from a node of the body, as drawn [m].
+  struct SurfaceNode {
+    int edge, node;
+    double distance;
+  };
+  /// For each surface and each node of its body, surface by surface.
+  std::vector<SurfaceNode> surface_nodes() const;
   void unknowns_of_edges(const ContactKey& key, int (&dofs)[kContactUnknowns]) const;
 
   const Model& model_;

@@ -54,10 +54,18 @@ Scalar torque_of_stops(const JointStops& stops, const Scalar& from, const Scalar
                             mean_beyond<Scalar>(from - stops.high, to - stops.high));
 }
 
-/// T [N m].
+/// T and the torque of the stops, over a change of angle with a mean and a mean rate [N m].
+template <class Scalar>
+Scalar torque_of(const JointTorque& joint, const Scalar& angle, const Scalar& rate, const Scalar& from,
+                 const Scalar& to) {
+  return joint.moment - joint.stiffness * (angle - joint.rest_angle) - joint.damping * rate +
+         torque_of_stops(joint.stops, from, to);
+}
+
+/// The same at one angle.
 template <class Scalar>
 Scalar torque_of(const JointTorque& joint, const Scalar& angle, const Scalar& rate) {
-  return joint.moment - joint.stiffness * (angle - joint.rest_angle) - joint.damping * rate;
+  return torque_of(joint, angle, rate, angle, angle);
 }
 
 /// s = (x - y) / (2 tan(x / 2) - 2 tan(y / 2)), with tan a - tan b = tan(a - b) (1 + tan a tan b).

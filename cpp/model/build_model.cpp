@@ -267,7 +267,7 @@ class Builder {
         const bool waits = body.carrier >= 0 && !is_placed[at(body.carrier)];
         if (is_placed[b] || waits || follows[at(body.node)]) continue;
         is_placed[b] = true;
-        carry_parts(body, model_.body_frame[b]);
+        carry_parts(static_cast<int>(b));
         for (int node : body.carried) follows[at(node)] = false;
         for (std::size_t k = 0; k < slide_places_.size(); ++k)
           if (model_.slides[k].frame == model_.body_frame[b]) follows[at(slid_node(k))] = false;
@@ -286,7 +286,9 @@ class Builder {
     return moving.body >= 0 ? scene_.bodies[at(moving.body)].node : node_of(moving);
   }
 
-  void carry_parts(const BodyDescription& body, int frame) {
+  void carry_parts(int index) {
+    const BodyDescription& body = scene_.bodies[at(index)];
+    const int frame = model_.body_frame[at(index)];
     for (std::size_t h = 0; h < model_.hinges.size(); ++h)
       if (hinged_body_[h] >= 0 && model_.body_frame[at(hinged_body_[h])] == frame) {
         CarriedPart part;
@@ -325,13 +327,12 @@ class Builder {
       model_.length_scale = std::max(model_.length_scale, part.arm.norm());
       mass += scene_.added_mass(node);
     }
-    for (int e = 0; e < model_.edge_count && !model_.planar(); ++e) {
-      const RodDescription& surface = scene_.rods[at(model_.edge_rod[at(e)])];
-      if (!surface.is_surface() || &scene_.bodies[at(surface.body)] != &body) continue;
+    for (int r = 0; r < static_cast<int>(scene_.rods.size()); ++r) {
+      if (rod(r).body != index) continue;
       CarriedPart part;
       part.frame = frame;
       part.base = body.node;
-      part.edge = e;
+      part.edge = first_edge(r);
       model_.carried.push_back(part);
     }
     if (mass > 0.0) model_.length_scale = std::max(model_.length_scale, std::sqrt(body.inertia.trace() / mass));

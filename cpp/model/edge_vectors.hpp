@@ -1,5 +1,5 @@
 #pragma once
-/// Vectors of nodes and edges among the unknowns.
+/// Vectors of nodes, frames and edges among the unknowns.
 
 #include "geometry/vec3.hpp"
 #include "model/model.hpp"
@@ -12,6 +12,12 @@ inline Vector3 node_vector(const Model& model, const VectorX& v, int node) {
   const int dof = model.node_dof[at(node)];
   if (!model.planar()) return v.segment<3>(dof);
   return v(dof) * model.plane->first + v(dof + 1) * model.plane->second;
+}
+
+/// Vector of a frame, in the axes of space: its spin, of velocities, or its angular momentum.
+inline Vector3 frame_vector(const Model& model, const VectorX& v, int frame) {
+  const int dof = model.frame_dof[at(frame)];
+  return model.planar() ? Vector3(v(dof) * model.plane->normal) : Vector3(v.segment<3>(dof));
 }
 
 /// Position of a node in space, from any configuration vector.

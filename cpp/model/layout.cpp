@@ -80,7 +80,7 @@ void lay_out_unknowns(Model& model) {
         if (slide.frame == f) slide.dof = next++;
     }
   };
-  // Points of bodies that no rod has, such as centres of mass, lie beside the base of their body.
+  // Bodies at points that no rod has lie beside the base of the body that carries them.
   std::vector<bool> on_rod(at(model.node_count), false), placed_node(at(model.node_count), false);
   for (const RodDescription& rod : rods)
     for (int node : rod.nodes) on_rod[at(node)] = on_rod[at(node)] || !rod.is_surface();

@@ -32,22 +32,17 @@ void set_positions(const Model& model, const VectorX& q, std::vector<Vec3d>& out
 CrossingWatch::CrossingWatch(const Model& model) {
   const auto& rods = model.description.rods;
   std::vector<std::vector<int>> rods_at(at(model.node_count));
-  for (std::size_t r = 0; r < rods.size(); ++r)
-    for (int node : rods[r].nodes) {
-      for (int other : rods_at[at(node)]) allowed_.emplace_back(other, static_cast<int>(r));
-      rods_at[at(node)].push_back(static_cast<int>(r));
-    }
-  // Rods may lie in the bodies that they are joined to, and bodies in each other.
-  for (std::size_t r = 0; r < rods.size(); ++r) {
-    if (!rods[r].is_surface()) continue;
-    const BodyDescription& body = model.description.bodies[at(rods[r].body)];
-    const auto add = [&](int node) {
-      for (int other : rods_at[at(node)])
-        allowed_.emplace_back(std::min(other, static_cast<int>(r)), std::max(other, static_cast<int>(r)));
-      rods_at[at(node)].push_back(static_cast<int>(r));
-    };
-    add(body.node);
-    for (int node : body.carried) add(node);
+  const auto add = [&](int rod, int node) {
+    for (int other : rods_at[at(node)]) allowed_.emplace_back(other, rod);
+    rods_at[at(node)].push_back(rod);
+  };
+  for (int r = 0; r < static_cast<int>(rods.size()); ++r) {
+    for (int node : rods[at(r)].nodes) add(r, node);
+    if (!rods[at(r)].is_surface()) continue;
+    // Rods may lie in the bodies that they are joined to, and bodies in each other.
+    const BodyDescription& body = model.description.bodies[at(rods[at(r)].body)];
+    add(r, body.node);
+    for (int node : body.carried) add(r, node);
   }
   for (const ContactPairDescription& pair : model.description.contact.pairs)
     if (pair.ignored) allowed_.emplace_back(std::min(pair.first, pair.second), std::max(pair.first, pair.second));

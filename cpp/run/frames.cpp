@@ -130,7 +130,7 @@ class FrameForces {
     const JointAngle& joint = model_.joint_angles[at(j)];
     JointTorque torque = joint_torque(model_, parameters_, elastic_, j);
     const double angle = joint.angle(state_.q);
-    const double pull = joint.sign * (torque_of(torque, angle, 0.0) + torque_of_stops(torque.stops, angle, angle));
+    const double pull = joint.sign * torque_of(torque, angle, 0.0);
     if (angle < torque.stops.low || angle > torque.stops.high) torque.stiffness += torque.stops.stiffness;
     const int turning = row_of(joint.turning), against = row_of(joint.against);
     if (turning >= 0) gradient(turning) -= pull, hessian(turning, turning) += torque.stiffness;

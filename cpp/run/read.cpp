@@ -146,7 +146,7 @@ double joint_rate(const Model& model, const State& state, const Configuration& c
     if (count > 0) return sum / count;
     // A body without rods there turns with its frame.
     if (model.planar()) return state.v(turns ? turning.turning : turning.against) * axis;
-    const Vector3 root = state.v.segment<3>(model.frame_dof[at(hinge->frame)]);
+    const Vector3 root = frame_vector(model, state.v, hinge->frame);
     return turns ? Vector3(root + state.v(hinge->dof) * axis) : root;
   };
   return turning.sign * axis.dot(rate(true) - rate(false));
@@ -172,10 +172,7 @@ Momentum momentum(const Model& model, const Parameters& parameters, const State&
     out.linear += p;
     out.angular += node_position(model, state.q, i).cross(p);
   }
-  for (int f = 0; f < model.frame_count; ++f) {
-    const int dof = model.frame_dof[at(f)];
-    out.angular += model.planar() ? Vector3(carried(dof) * model.plane->normal) : Vector3(carried.segment<3>(dof));
-  }
+  for (int f = 0; f < model.frame_count; ++f) out.angular += frame_vector(model, carried, f);
   if (model.planar()) return out;
   for (int e = 0; e < model.edge_count; ++e) {
     const Vector3 tail = node_position(model, state.q, model.edge_tail[at(e)]);

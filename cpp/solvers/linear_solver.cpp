@@ -72,9 +72,15 @@ SparsityPattern SparsityPattern::from_cliques(int size, const std::vector<std::v
   return pattern;
 }
 
-bool SparsityPattern::contains(int row, int column) const {
-  const auto begin = row_indices.begin() + column_starts[column];
-  return std::binary_search(begin, row_indices.begin() + column_starts[column + 1], row);
+std::ptrdiff_t SparsityPattern::find(int row, int column) const {
+  // Without branches: all but one step of a short search would be mispredicted as often as not.
+  const int* first = row_indices.data() + column_starts[column];
+  for (int count = column_starts[column + 1] - column_starts[column]; count > 1;) {
+    const int half = count / 2;
+    first += first[half] <= row ? half : 0;
+    count -= half;
+  }
+  return *first == row ? first - row_indices.data() : std::ptrdiff_t{-1};
 }
 
 int SparsityPattern::half_bandwidth() const {
@@ -116,14 +122,7 @@ void require_valid(const SparsityPattern& pattern) {
 
 std::ptrdiff_t find_entry(const SparsityPattern& pattern, int row, int column) {
   if (row >= 0 && row < pattern.size && column >= 0 && column < pattern.size) {
-    // Without branches: all but one step of a short search would be mispredicted as often as not.
-    const int* first = pattern.row_indices.data() + pattern.column_starts[column];
-    for (int count = pattern.column_starts[column + 1] - pattern.column_starts[column]; count > 1;) {
-      const int half = count / 2;
-      first += first[half] <= row ? half : 0;
-      count -= half;
-    }
-    if (*first == row) return first - pattern.row_indices.data();
+    if (const std::ptrdiff_t found = pattern.find(row, column); found >= 0) return found;
   }
   throw std::invalid_argument(entry_text(row, column) + " is outside the sparsity pattern of a matrix of size " +
                               std::to_string(pattern.size));

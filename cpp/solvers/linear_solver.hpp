@@ -21,7 +21,9 @@ struct SparsityPattern {
 
   /// Pattern from cliques: every group of unknowns couples fully. Entries < 0 are skipped.
   static SparsityPattern from_cliques(int size, const std::vector<std::vector<int>>& cliques);
-  bool contains(int row, int column) const;
+  /// Index of an entry in `row_indices`; -1: there is none.
+  std::ptrdiff_t find(int row, int column) const;
+  bool contains(int row, int column) const { return find(row, column) >= 0; }
   /// Greatest |row - column| of any entry.
   int half_bandwidth() const;
 };

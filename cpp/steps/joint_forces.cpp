@@ -14,10 +14,9 @@ Scalar torque_on(const StepProblem& problem, const JointTorque& torque, const Jo
                  const Scalar (&start)[2]) {
   const double rate = problem.resists() ? 1.0 / problem.interval : 0.0;
   const Scalar angle = joint.sign * (z[0] - z[1]), before = joint.sign * (start[0] - start[1]);
-  // z is the end of a step, or its middle.
-  const Scalar end = problem.in_middle() ? Scalar(2.0 * angle - before) : angle;
-  const Scalar out = torque_of(torque, angle, rate * (angle - before)) +
-                     torque_of_stops(torque.stops, problem.in_middle() ? before : end, end);
+  const Scalar turned = rate * (angle - before);
+  const Scalar out = problem.in_middle() ? torque_of(torque, angle, turned, before, Scalar(2.0 * angle - before))
+                                         : torque_of(torque, angle, turned);
   if (!problem.conserves_energy() || joint.against < 0) return out;
   return out * share_of_turns(2.0 * (z[0] - start[0]), 2.0 * (z[1] - start[1]));
 }

@@ -73,7 +73,7 @@ double World::joint_torque(int joint) const {
   ElasticCoefficients elastic;
   set_elastic(implementation_->parameters, elastic);
   const JointTorque torque = withe::joint_torque(implementation_->model, implementation_->parameters, elastic, joint);
-  return torque_of(torque, angle, joint_rate(joint)) + torque_of_stops(torque.stops, angle, angle);
+  return torque_of(torque, angle, joint_rate(joint));
 }
 
 Matrix3 World::body_rotation(int body) const {
@@ -88,9 +88,7 @@ int World::body_base(int body) const {
 
 Vector3 World::body_spin(int body) const {
   const Implementation& self = *implementation_;
-  const int dof = self.model.frame_dof[at(self.model.body_frame.at(at(body)))];
-  if (self.model.planar()) return self.state.v(dof) * self.model.plane->normal;
-  return self.state.v.segment<3>(dof);
+  return frame_vector(self.model, self.state.v, self.model.body_frame.at(at(body)));
 }
 
 VectorX World::spins(int rod) const { return withe::spins(implementation_->model, implementation_->state, rod); }

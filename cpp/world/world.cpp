@@ -430,10 +430,7 @@ void World::set_body_motion(int body, const Vector3& velocity, const Vector3& sp
     else
       v.segment<3>(dof) = turn;
   };
-  const auto spin_of = [&](int f) -> Vector3 {
-    const int dof = model.frame_dof[at(f)];
-    return model.planar() ? Vector3(v(dof) * model.plane->normal) : Vector3(v.segment<3>(dof));
-  };
+  const auto spin_of = [&](int f) { return frame_vector(model, v, f); };
   put_node_vector(model, base, velocity, v);
   put_spin(frame, spin);
   // Parts follow their bodies; of a body on a joint of another, only its motion in the joint is its own.

@@ -103,7 +103,7 @@ class Sphere:
         ends : ndarray of shape (2, 3) [m]
         radius : float [m]
         """
-        return 0.5 * _POINT * float(self.radius) * np.array([[0, 0, -1.0], [0, 0, 1.0]]), float(self.radius)
+        return _along_z(_POINT * float(self.radius)), float(self.radius)
 
     def surface(self) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         """Return the surface for pictures.
@@ -272,7 +272,7 @@ class Capsule:
         ends : ndarray of shape (2, 3) [m]
         radius : float [m]
         """
-        return 0.5 * float(self.length) * np.array([[0, 0, -1.0], [0, 0, 1.0]]), float(self.radius)
+        return _along_z(float(self.length)), float(self.radius)
 
     def surface(self) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         """Return the surface for pictures.
@@ -361,6 +361,11 @@ class Mesh:
             Rows of the vertices, counter-clockwise from outside.
         """
         return np.asarray(self.vertices), np.asarray(self.triangles)
+
+
+def _along_z(length: float) -> FloatArray:
+    """Return the ends of a segment along z, about the origin."""
+    return np.array([[0.0, 0.0, -0.5 * length], [0.0, 0.0, 0.5 * length]])
 
 
 def _turned(radii: FloatArray, heights: FloatArray, sides: int = 48) -> tuple[FloatArray, npt.NDArray[np.int64]]:

@@ -14,6 +14,7 @@ from withe.common.extras import require
 from withe.robots.composing import MassProperties, free_place, massless_base, united
 from withe.robots.description import RobotBody, RobotDescription, RobotJoint
 from withe.robots.files import CompiledRobot, compiled
+from withe.robots.mujoco_joints import BALL, FREE, HINGE, SLIDE, stops_of
 from withe.robots.names import name_of
 from withe.robots.shapes import drawn_geoms, solid_of
 from withe.robots.unsupported import listed, unsupported_content
@@ -24,8 +25,7 @@ __all__ = ["read_robot"]
 
 FloatArray = npt.NDArray[np.float64]
 
-_FREE, _BALL, _SLIDE, _HINGE = 0, 1, 2, 3
-_KINDS: dict[int, Literal["pinned", "sliding", "revolute"]] = {_BALL: "pinned", _SLIDE: "sliding", _HINGE: "revolute"}
+_KINDS: dict[int, Literal["pinned", "sliding", "revolute"]] = {BALL: "pinned", SLIDE: "sliding", HINGE: "revolute"}
 
 # Mass of a body between two joints of one body, over that of this body, and its radius of gyration over the size of
 # the robot. Motion changes by about this ratio. Rounding of energies grows as its inverse.
@@ -59,27 +59,6 @@ def read_robot(path: str | os.PathLike[str]) -> RobotDescription:
     data.qpos[:] = model.qpos0
     mujoco.mj_forward(model, data)
     return _Reader(robot, data, Path(path)).description()
-
-
-def stops_of(model: Any, joint: int) -> tuple[tuple[float, float] | None, float | None]:
-    """Return the limits of a hinge or slide, from its place in the drawing, and the stiffness of its stops.
-
-    MuJoCo's limit yields under a resting load by the load over m k d / (1 - d), where m is the inertia of the joint,
-    k the stiffness of `solref`, and d the impedance. The impedance grows with the yield; here it is the mean of both
-    values of `solimp`.
-    """
-    if not model.jnt_limited[joint] or model.jnt_type[joint] not in (_SLIDE, _HINGE):
-        return None, None
-    drawn = float(model.qpos0[int(model.jnt_qposadr[joint])])
-    low, high = (float(limit) - drawn for limit in model.jnt_range[joint])
-    inverse = float(model.dof_invweight0[int(model.jnt_dofadr[joint])])
-    if not low <= 0.0 <= high or low == high or not inverse > 0.0:
-        return None, None
-    first, second = map(float, model.jnt_solref[joint])
-    impedances = np.clip(model.jnt_solimp[joint][:2], 1e-4, 1.0 - 1e-4)
-    impedance, greatest = float(impedances.mean()), float(impedances[1])
-    rate = (1.0 / (first * second) ** 2 if first > 0.0 else -first) / greatest**2
-    return (low, high), rate * impedance / ((1.0 - impedance) * inverse)
 
 
 class _Reader:
@@ -122,7 +101,7 @@ class _Reader:
         model = self._model
         body, dof = int(model.jnt_bodyid[joint]), int(model.jnt_dofadr[joint])
         is_first = joint == int(model.body_jntadr[body])  # the others connect two bodies
-        is_turning = model.jnt_type[joint] in (_SLIDE, _HINGE)
+        is_turning = model.jnt_type[joint] in (SLIDE, HINGE)
         if self._weld[model.body_parentid[body]] != 0 or not is_first or not is_turning:
             return False
         motors = np.asarray(model.actuator_trnid, dtype=int).reshape(-1, 2)[:, 0]
@@ -181,7 +160,7 @@ class _Reader:
         found = []
         for body in np.nonzero(np.asarray(model.body_jntnum) > 0)[0].tolist():
             first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
-            own = [joint for joint in range(first, first + count) if int(model.jnt_type[joint]) != _FREE]
+            own = [joint for joint in range(first, first + count) if int(model.jnt_type[joint]) != FREE]
             self._check_distinct(body, own)
             outer = numbers[int(self._weld[body])]
             parent = numbers.get(int(self._weld[model.body_parentid[body]]))
@@ -191,7 +170,7 @@ class _Reader:
                     child = len(bodies)
                     bodies.append(self._between(joint, bodies[outer]))
                 kind = int(model.jnt_type[joint])
-                axis = None if kind == _BALL else np.array(data.xaxis[joint], dtype=float)
+                axis = None if kind == BALL else np.array(data.xaxis[joint], dtype=float)
                 at = np.array(data.xanchor[joint], dtype=float)
                 owners = {child} if parent is None else {parent, child}
                 taken = [point for owner in owners for point in used.get(owner, [])]
@@ -207,7 +186,7 @@ class _Reader:
     def _spring(self, joint: int) -> tuple[float, float, float]:
         """Return the stiffness, the rest angle and the damping of a joint."""
         model = self._model
-        if model.jnt_type[joint] == _BALL:
+        if model.jnt_type[joint] == BALL:
             return 0.0, 0.0, 0.0
         place, dof = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
         stiffness = float(model.jnt_stiffness[joint])
@@ -231,10 +210,10 @@ class _Reader:
         columns: list[list[FloatArray]] = []
         for joint in joints:
             anchor = (np.array(data.xanchor[joint]) - np.array(data.xipos[body])) / self._size
-            if model.jnt_type[joint] == _SLIDE:
+            if model.jnt_type[joint] == SLIDE:
                 columns.append([np.zeros(3), np.array(data.xaxis[joint])])
                 continue
-            axes = np.eye(3) if model.jnt_type[joint] == _BALL else [np.array(data.xaxis[joint])]
+            axes = np.eye(3) if model.jnt_type[joint] == BALL else [np.array(data.xaxis[joint])]
             columns += [[axis, np.cross(anchor, axis)] for axis in axes]
         motions = np.reshape(columns, (-1, 6))
         values = np.linalg.svd(motions, compute_uv=False)

@@ -7,12 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from withe.robots.mujoco_joints import BALL, stops_of
 from withe.robots.names import name_of
 
 __all__ = ["listed", "unsupported_content"]
 
-# Types of joints, mjtJoint of MuJoCo.
-_FREE, _BALL = 0, 1
 _EQUALITIES = ("connect", "weld", "joint", "tendon", "flex", "flexvert", "flexstrain")
 _NAMED = {"actuator": "nu", "tendon": "ntendon", "sensor": "nsensor", "keyframe": "nkey", "pair": "npair"}
 _PLURAL = {"keyframe": "keyframes", "pair": "contact pairs"}
@@ -24,14 +23,6 @@ def listed(names: Iterable[str], most: int = 6) -> str:
     known = [repr(name) for name in names]
     more = f" and {len(known) - most} more" if len(known) > most else ""
     return ", ".join(known[:most]) + more
-
-
-def _excluded(model: Any) -> set[int]:
-    """Return the joints that the file draws outside of their limits."""
-    drawn = np.asarray(model.qpos0)[np.asarray(model.jnt_qposadr, dtype=int)]
-    low, high = np.asarray(model.jnt_range).reshape(-1, 2).T
-    outside = np.asarray(model.jnt_limited, dtype=bool) & ~((low <= drawn) & (drawn <= high) & (low < high))
-    return set(np.nonzero(outside)[0].tolist())
 
 
 def unsupported_content(model: Any) -> Iterator[str]:
@@ -64,10 +55,13 @@ def _of_joints(model: Any) -> Iterator[str]:
         rows = np.asarray(values).reshape(len(kind), -1)
         return set(np.nonzero((rows != 0.0).any(axis=1))[0].tolist())
 
-    without_spring = set(np.nonzero(kind <= _BALL)[0].tolist())
+    limited = of_joints(model.jnt_limited)
+    without_spring = set(np.nonzero(kind <= BALL)[0].tolist())
     found = {
-        "limits of ball joints": of_joints(model.jnt_limited) & without_spring,
-        "limits that exclude the drawn place of joints": _excluded(model) - without_spring,
+        "limits of ball joints": limited & without_spring,
+        "limits that exclude the drawn place of joints": {
+            joint for joint in limited - without_spring if stops_of(model, joint)[0] is None
+        },
         "force limits of joints": of_joints(model.jnt_actfrclimited),
         "armature of joints": of_dofs(model.dof_armature),
         "friction loss of joints": of_dofs(model.dof_frictionloss),
