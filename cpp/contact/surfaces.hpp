@@ -139,7 +139,7 @@ class Surfaces {
   double weight(int edge, double radii) const;
   /// True of the surface of a held body.
   bool held(int edge) const { return held_[static_cast<std::size_t>(edge)]; }
-  /// How far a surface of a body is from a node of the body, as drawn [m].
+  /// Distance of a surface of a body from a node of the body, as drawn [m].
   struct SurfaceNode {
     int edge, node;
     double distance;
