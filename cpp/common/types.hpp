@@ -15,6 +15,7 @@ using VectorX = Eigen::VectorXd;
 using MatrixX = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 using MatrixX2 = Eigen::Matrix<double, Eigen::Dynamic, 2, Eigen::RowMajor>;
 using MatrixX3 = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
+using MatrixX4 = Eigen::Matrix<double, Eigen::Dynamic, 4, Eigen::RowMajor>;
 /// One row per stencil, each column together, so that packs load neighbours at once.
 using Columns3 = Eigen::Matrix<double, Eigen::Dynamic, 3>;
 /// One row per edge: a 3 x 3 matrix with rows d1, d2, tangent, flattened row by row.

@@ -4,7 +4,34 @@
 #include <cmath>
 
 namespace withe {
-namespace {}  // namespace
+namespace {
+
+// Angle up to which a direction counts as normal to a face, and two edges as parallel [rad].
+constexpr double kFlat = 0.02;
+
+/// True if a direction, from an edge of a body to another surface, is normal to a face beside the edge, or leans over
+/// that face. Points of the face then touch the other surface, and not the edge.
+bool leans_over_face(const Model& model, const VectorX& q, const EdgeFaces& beside, const Vec3d& edge,
+                     const Vec3d& direction) {
+  const auto over = [&](const Face& face, double side) {
+    const Vec3d inward = side * cross(axes_of(model, q, face).normal, edge);
+    return dot(direction, inward) > -kFlat * std::sqrt(dot(edge, edge));
+  };
+  return over(*beside.left, 1.0) || over(*beside.right, -1.0);
+}
+
+}  // namespace
+
+ClosestPoints face_points(const ContactPair& pair, const Vec3d (&x)[4]) {
+  const FaceVectors<double> v(x, pair.point);
+  const double height = dot(v.point, v.edge) / pair.face->length;
+  ClosestPoints c;
+  c.s = pair.point;
+  c.t = 0.0;
+  c.between = (height / pair.face->length) * v.edge;
+  c.square = height * height;
+  return c;
+}
 
 double Bodies::place(std::span<const ObstaclePlace> places) {
   double square = 0.0;
@@ -86,6 +113,15 @@ Proximity Bodies::proximity(const ContactPair& pair, const VectorX& q, bool whol
     return p;
   }
   end_points(pair, q, x);
+  if (pair.face != nullptr) {
+    p.points = face_points(pair, x);
+    const FaceDistance d = distance_from(*pair.face, axes_of(*model, q, *pair.face), x[0] + pair.point * (x[1] - x[0]));
+    p.distance = std::sqrt(p.points.square);
+    p.outside = d.outside;
+    p.beyond = d.outside > 0.0;
+    p.normal = (1.0 / std::max(std::sqrt(p.points.square), 1e-300)) * p.points.between;
+    return p;
+  }
   // Far apart by their middles: no need for more.
   const Vec3d middle = 0.5 * (x[0] + x[1] - x[2] - x[3]), u = x[1] - x[0], v = x[3] - x[2];
   const double size = 0.5 * (std::sqrt(dot(u, u)) + std::sqrt(dot(v, v))) + (1.0 + kMaxPatternDistance) * pair.reach();
@@ -97,6 +133,12 @@ Proximity Bodies::proximity(const ContactPair& pair, const VectorX& q, bool whol
   p.distance = std::sqrt(p.points.square);
   const double length = std::sqrt(dot(p.points.between, p.points.between));
   p.normal = (1.0 / std::max(length, 1e-300)) * p.points.between;
+  if (pair.beside_a.left != nullptr) {
+    const double along = dot(cross(u, v), cross(u, v)) / (dot(u, u) * dot(v, v));
+    const bool cross_inside = p.points.s_free && p.points.t_free && along > kFlat * kFlat;
+    p.beyond = !cross_inside && (leans_over_face(*model, q, pair.beside_a, u, -p.normal) ||
+                                 leans_over_face(*model, q, pair.beside_b, v, p.normal));
+  }
   return p;
 }
 

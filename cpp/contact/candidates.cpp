@@ -32,7 +32,7 @@ constexpr double kMinDistanceOfBody = 0.98;
 struct Limit {
   double share, nearest;  ///< [-], [m]
 };
-Limit apart(const ContactPair& pair) { return {pair.of_body ? kMinDistanceOfBody : kMinDistance, pair.nearest()}; }
+Limit apart(const ContactPair& pair) { return {pair.narrow() ? kMinDistanceOfBody : kMinDistance, pair.nearest()}; }
 
 /// Allowed share of a motion, by conservative advancement: the distance, a function of that much, falls no faster
 /// than by `speed`.
@@ -72,6 +72,24 @@ double allowed_of_piece(const Bodies& bodies, const ContactPair& pair, const Vec
   });
 }
 
+/// Allowed share of the motion of a point beside a face. Points of the face move no faster than its tail does, and by
+/// how much its axes turn.
+double allowed_beside(const Bodies& bodies, const ContactPair& pair, const VectorX& q, const VectorX* change,
+                      const Vec3d (&x)[4], const Vec3d (&d)[4], const Limit& limit) {
+  const Face& face = *pair.face;
+  const Vec3d aside = local_position(*bodies.model, q, face.aside),
+              way = change ? local_position(*bodies.model, *change, face.aside) : Vec3d{},
+              point = x[0] + pair.point * (x[1] - x[0]), moved = d[0] + pair.point * (d[1] - d[0]) - d[2];
+  const auto size = [](const Vec3d& v) { return std::sqrt(dot(v, v)); };
+  const double turned = 2.0 * size(d[3] - d[2]) / face.length + size(way - d[2]) / size(aside - x[2]),
+               speed = size(moved) + 2.0 * turned * face.size;
+  if (speed == 0.0) return 1.0;
+  return advance(limit, speed, [&](double tau) {
+    const FaceAxes axes(x[2] + tau * d[2], x[3] + tau * d[3], aside + tau * way);
+    return distance_from(face, axes, point + tau * (d[0] + pair.point * (d[1] - d[0]))).distance;
+  });
+}
+
 /// Allowed share for straight lines, whose distance falls no faster than their ends approach each other. `change` is
 /// the change of q; null: rods stay. `shift` is that of the obstacle.
 double allowed_of(const Bodies& bodies, const ContactPair& pair, const VectorX& q, const VectorX* change,
@@ -84,6 +102,7 @@ double allowed_of(const Bodies& bodies, const ContactPair& pair, const VectorX& 
     d[2 * side] = local_vector(*bodies.model, *change, bodies.model->tail_dof[at(edges[side])]);
     d[2 * side + 1] = local_vector(*bodies.model, *change, bodies.model->head_dof[at(edges[side])]);
   }
+  if (pair.face != nullptr) return allowed_beside(bodies, pair, q, change, x, d, limit);
   double speed = 0.0;
   for (int a = 0; a < 2; ++a)
     for (int b = 2; b < 4; ++b) speed = std::max(speed, dot(d[a] - d[b], d[a] - d[b]));
@@ -104,6 +123,7 @@ double distance_of(const Bodies& bodies, const ContactPair& pair, const VectorX&
   if (pair.curve()) return bodies.piece_distance(pair, q, shift).distance;
   Vec3d x[4];
   bodies.end_points(pair, q, x);
+  if (pair.face != nullptr) return bodies.proximity(pair, q).apart();
   const Vec3d between = closest_points(x[0], x[1], x[2] - shift, x[3] - shift, pair.weight_a, pair.weight_b).between;
   return std::sqrt(dot(between, between));
 }
@@ -179,6 +199,19 @@ void Candidates::set_boxes(const VectorX& from, const VectorX& to, const More& m
       box.include(Box::around(local_position(model_, to, tail), local_position(model_, to, head), grow));
     out.push_back(box);
   }
+  for (const Face& face : surfaces_.faces()) {
+    const auto around = [&](const VectorX& q) {
+      const FaceAxes axes = axes_of(model_, q, face);
+      const auto corner = [&](double x, double y) { return axes.origin + x * axes.first + y * axes.second; };
+      const double grow = face.depth + 0.5 * surfaces_.greatest_tolerance() + more(face.edge);
+      Box box = Box::around(corner(face.low[0], face.low[1]), corner(face.high[0], face.high[1]), grow);
+      box.include(Box::around(corner(face.low[0], face.high[1]), corner(face.high[0], face.low[1]), grow));
+      return box;
+    };
+    Box box = around(from);
+    if (&from != &to) box.include(around(to));
+    out.push_back(box);
+  }
 }
 
 /// Pairs that are near at q, with edges thicker by a number of radii.
@@ -209,11 +242,21 @@ void Candidates::find_pairs(const VectorX& from, const VectorX& to) {
 /// Pairs with obstacles, and pairs of edges with overlapping boxes, sorted by key.
 void Candidates::add_near(const std::vector<BroadPhase::Pair>& found, std::vector<ContactPair>& pairs) const {
   const std::vector<ContactPair>& fixed = surfaces_.obstacle_pairs();
+  const int edges = static_cast<int>(surfaces_.edges().size());
   pairs.assign(fixed.begin(), fixed.end());
   for (const BroadPhase::Pair& boxes : found) {
-    const int a = surfaces_.edges()[at(boxes.a)], b = surfaces_.edges()[at(boxes.b)];
+    if (boxes.a >= edges) continue;  // faces do not touch each other
+    const int a = surfaces_.edges()[at(boxes.a)];
+    if (boxes.b >= edges) {
+      surfaces_.add_face_pairs(a, surfaces_.faces()[at(boxes.b - edges)], pairs);
+      continue;
+    }
+    const int b = surfaces_.edges()[at(boxes.b)];
     if (surfaces_.may_touch(a, b)) pairs.push_back(surfaces_.pair(a, b));
   }
+  if (!surfaces_.faces().empty())
+    std::sort(pairs.begin() + static_cast<std::ptrdiff_t>(fixed.size()), pairs.end(),
+              [](const ContactPair& a, const ContactPair& b) { return a.key < b.key; });
 }
 
 std::vector<ContactKey> Candidates::near(const VectorX& q, const Bodies& bodies) const {
@@ -259,13 +302,12 @@ bool Candidates::missed(const VectorX& before, const VectorX& q, const Bodies& b
   for (std::size_t p = 0; p < bounds_.size(); ++p) {
     const ContactPair& pair = pairs_[p];
     // Who is as deep on the way, and apart at its ends, has gone farther than a radius.
-    if (way < pair.small_radius() || bounds_[p].clear - here >= way || bodies.flat(pair)) continue;
+    if (way < pair.scale || bounds_[p].clear - here >= way || bodies.flat(pair)) continue;
     const Vec3d moved = pair.key.b < 0 && !shift.empty() ? shift[at(-1 - pair.key.b)] : Vec3d{};
     const double touching = pair.radii();
     if (distance_of(bodies, pair, q, Vec3d{}) < touching || distance_of(bodies, pair, before, moved) < touching)
       continue;
-    if (allowed_of(bodies, pair, q, &back_, -moved, {1.0, touching - kMaxGrazingDepth * pair.small_radius()}) < 1.0)
-      return true;
+    if (allowed_of(bodies, pair, q, &back_, -moved, {1.0, touching - kMaxGrazingDepth * pair.scale}) < 1.0) return true;
   }
   return false;
 }

@@ -30,7 +30,7 @@ class Candidates {
     for (std::size_t p = 0; p < pairs_.size(); ++p) {
       if (bounds_[p].clear > moved_) continue;
       const Proximity proximity = bodies.proximity(pairs_[p], q);
-      set_bounds(proximity.distance, p);
+      set_bounds(proximity.apart(), p);
       if (proximity.distance < pairs_[p].reach()) add(pairs_[p], proximity);
     }
   }

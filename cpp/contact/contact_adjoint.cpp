@@ -107,7 +107,7 @@ Vec3<ByStart> start_slip(const FrictionSetting& f, const SlippingSurfaces<ByStar
     const ByStart inverse = 1.0 / sqrt(dot(edge, edge));
     const Vec3<ByStart> tangent = inverse * edge,
                         arm = pair.curve() ? piece_arm(pair, b, c.s, c.normal)
-                                           : contact_arm(pair, b, pair.rod_b < 0 ? c.normal : c.between);
+                                           : contact_arm(pair, b, pair.rod_b < 0 ? c.normal : c.between, c.whole);
     Vec3<ByStart> turn = inverse * cross(tangent, point(tail + 1) - point(tail));
     if (f.spatial) turn += way[12 + b] * tangent;
     slip += turn_sign(f, b) * cross(turn, arm);

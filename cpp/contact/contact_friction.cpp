@@ -58,7 +58,7 @@ bool regularises_friction(const Model& model) {
 }
 
 double anchor_stiffness(const ContactPair& pair, FrictionKind kind, double stiffness) {
-  const double pressing = stiffness * 2.0 * kDepth * pair.small_radius();
+  const double pressing = stiffness * 2.0 * kDepth * pair.scale;
   return coefficient(pair, kind) * pressing / (kAnchorSlip * pair.tolerance);
 }
 
@@ -129,7 +129,10 @@ bool add_friction(const ContactProblem& problem, const Touching& t, const Contac
     const FrictionSetting f = friction_setting(problem, t, kind, linearisation.regularisation, predicted);
     const SlippingSurfaces<double> surfaces = slipping_surfaces(f, t.now);
     add_friction_gradient(f, surfaces, out.gradient);
-    if (with_hessian) add_friction_jacobian(f, surfaces, out.hessian);
+    if (with_hessian && t.pair.face != nullptr)
+      add_face_friction_jacobian(f, t.now, out.hessian);
+    else if (with_hessian)
+      add_friction_jacobian(f, surfaces, out.hessian);
   });
   return true;
 }

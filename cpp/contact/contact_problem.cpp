@@ -34,9 +34,11 @@ ContactParameters::ContactParameters(const Surfaces& surfaces, const Parameters&
   edge_mass = parameters.edge_density.cwiseProduct(model.edge_arc);
   set_body_masses(model, parameters, edge_mass);
   for (int e = 0; e < model.edge_count && !(given > 0.0); ++e) {
-    const double r = surfaces.radius(e);
+    const double r = surfaces.scale(e);
     if (!(r > 0.0) || !std::isfinite(edge_mass(e))) continue;
-    const double weight = edge_mass(e) * parameters.gravity.norm();
+    // Bodies without weight have no stiffness either. They count as slowed by a depth from the slip tolerance.
+    const double slowed = model.is_surface(e) ? slip_tolerance * slip_tolerance / (2.0 * kDepth * r) : 0.0;
+    const double weight = edge_mass(e) * std::max(parameters.gravity.norm(), slowed);
     const double bends = parameters.edge_bend.row(e).minCoeff() / (kSlender * kSlender * r * r);
     double& firm = firm_stiffness(model.edge_rod[at(e)]);
     firm = std::max(firm, (weight / (light * light) + bends) / (2.0 * kDepth * r));
@@ -71,7 +73,7 @@ double ContactProblem::offset(const ContactPair& pair) const {
   const BodyOffset bodies{pair.rod_a, pair.key.b < 0 ? pair.key.b : pair.rod_b};
   const auto found = std::lower_bound(offsets.begin(), offsets.end(), bodies, by_bodies);
   if (found == offsets.end() || by_bodies(bodies, *found)) return 0.0;
-  return std::min(found->moment / found->force, 2.0 * kDepth * pair.small_radius());
+  return std::min(found->moment / found->force, 2.0 * kDepth * pair.scale);
 }
 
 double ContactProblem::at_own_depth(double firm, double stiffness, double power) const {
@@ -80,11 +82,11 @@ double ContactProblem::at_own_depth(double firm, double stiffness, double power)
 }
 
 double ContactProblem::stiffness_to_bear(const ContactPair& pair, double force) const {
-  return at_own_depth(firm_stiffness(pair), force / (2.0 * kDepth * pair.small_radius()), 1.0 / 2.0);
+  return at_own_depth(firm_stiffness(pair), force / (2.0 * kDepth * pair.scale), 1.0 / 2.0);
 }
 
 double ContactProblem::stiffness_to_store(const ContactPair& pair, double energy) const {
-  const double depth = kDepth * pair.small_radius();
+  const double depth = kDepth * pair.scale;
   return at_own_depth(firm_stiffness(pair), energy / (depth * depth), 1.0 / 3.0);
 }
 
@@ -126,6 +128,7 @@ ClosestPoints ContactProblem::closest_at_start(const ContactPair& pair, Vec3d (&
   const Vec3d way = shift_of(pair);
   x[2] -= way;
   x[3] -= way;
+  if (pair.face != nullptr) return face_points(pair, x);
   return closest_points(x[0], x[1], x[2], x[3], pair.weight_a, pair.weight_b);
 }
 

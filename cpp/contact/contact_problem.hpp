@@ -46,7 +46,7 @@ struct Touching {
     for (int i = 0; i < 4; ++i) x[i] = {now[3 * i], now[3 * i + 1], now[3 * i + 2]};
   }
   /// Depth of the surfaces in each other, less the yielded part, over the smaller radius.
-  double depth() const { return (pair.radii() - (proximity.distance + yielded)) / pair.small_radius(); }
+  double depth() const { return (pair.radii() - (proximity.distance + yielded)) / pair.scale; }
   /// True if no more than the tail of the contact law presses the surfaces.
   bool apart() const { return proximity.distance + yielded >= pair.radii(); }
 };

@@ -12,10 +12,22 @@
 namespace withe {
 namespace {
 
+// Greatest depth of entry, over the radius of a point: with the greatest depth of contact it stays on its side of a
+// face.
+constexpr double kMaxEntryDepth = 0.5;
+
+/// Of a point that comes to a face from beside it: as deep as it is. It presses on an edge there, and does not begin to
+/// press on the face too [m].
+double depth_of_entry(const ContactProblem& problem, const ContactRecord* record, const Touching& t) {
+  if (!t.pair.may_be_beyond() || problem.starting || (record && record->approach > 0.0)) return 0.0;
+  const bool beside = problem.bodies.proximity(t.pair, problem.start->q).beyond;
+  return beside ? std::clamp(t.pair.reach() - t.proximity.distance, 0.0, kMaxEntryDepth * t.pair.radius_a) : 0.0;
+}
+
 /// Sets the stored data of a contact, its energy and its pressing law.
 void set_from(const ContactProblem& problem, const ContactRecord* record, Touching& t) {
   t.stiffness = t.pair.share * (record ? record->stiffness : first_stiffness(problem, t.pair));
-  t.yielded = record ? record->yielded : problem.offset(t.pair);
+  t.yielded = std::max(record ? record->yielded : problem.offset(t.pair), depth_of_entry(problem, record, t));
   t.approach = record ? record->approach : first_approach(problem, t.pair);
   t.age = record ? record->age : 0.0;
   if (record) t.stick = record->stick, t.roll = record->roll;
@@ -39,6 +51,12 @@ Touching& ContactSet::add(const ContactProblem& problem, const ContactPair& pair
 
 void ContactSet::set_forces(const ContactProblem& problem, OrderedLookup& records, Touching& t) {
   set_from(problem, problem.record_of(t.pair.key, records), t);
+}
+
+/// True of a point whose foot is outside of a face. An impact on the face returns its energy there, within a radius.
+bool ContactSet::leaves_face(const ContactProblem& problem, const Touching& t) {
+  return t.proximity.beyond &&
+         !(t.approach > 0.0 && t.proximity.outside <= t.pair.radius_a && problem.record_of(t.pair.key) != nullptr);
 }
 
 void ContactSet::renew(const ContactProblem& problem, int i, const ContactRecord& record) {

@@ -21,7 +21,7 @@ class ContactSet {
     within_reach([&](const ContactPair& pair, const Proximity& proximity) {
       Touching& t = add(problem, pair, proximity);
       set_forces(problem, records, t);
-      if (!problem.touch(pair, proximity.distance, t.yielded)) touching_.pop_back();
+      if (!problem.touch(pair, proximity.distance, t.yielded) || leaves_face(problem, t)) touching_.pop_back();
     });
     add_leaving(problem, first);
   }
@@ -47,6 +47,7 @@ class ContactSet {
  private:
   Touching& add(const ContactProblem& problem, const ContactPair& pair, const Proximity& proximity);
   static void set_forces(const ContactProblem& problem, OrderedLookup& records, Touching& t);
+  static bool leaves_face(const ContactProblem& problem, const Touching& t);
   void add_leaving(const ContactProblem& problem, std::size_t first);
 
   VectorX q_;

@@ -52,7 +52,7 @@ double worn(const ContactProblem& problem, const Touching& t) {
 /// part, and slowly: they press at most about half as hard again after a step. Otherwise dissipated friction energy
 /// would throw them off.
 double faded(const ContactProblem& problem, const Touching& t) {
-  const double beyond = t.yielded - kDepth * t.pair.small_radius(), left = worn(problem, t);
+  const double beyond = t.yielded - kDepth * t.pair.scale, left = worn(problem, t);
   if (!(beyond > 0.0 && t.energy.second > 0.0)) return left;
   const double parted = t.proximity.distance - start_distance(problem, t.pair);
   if (parted > kMaxFadingSpeed * rest_speed(problem, t.pair) * problem.duration) return left;
@@ -277,6 +277,11 @@ double ContactStiffness::accept(const ContactSet& set, double spare, StiffnessSc
     const ContactPair& pair = t.pair;
     if (!presses(t)) continue;
     ContactRecord record = this->record(t);
+    if (t.proximity.beyond && (record.approach == 0.0 || t.proximity.outside > pair.radius_a)) {
+      // The next step begins without it.
+      put_in -= t.energy.value + anchor_energy(problem_, t);
+      continue;
+    }
     double ratio = source && !problem_.fixed(pair) ? common / record.stiffness : wanted_ratio(t, record);
     if (ratio > 1.0) {
       put_in += change_stiffness(t, ratio, yielded_at(t, ratio), record);
@@ -419,7 +424,7 @@ void ContactStiffness::renew(ContactSet& start, std::vector<ContactRecord>& reco
 /// depth beyond has yielded. A given stiffness keeps its law.
 bool ContactStiffness::begins_at_rest(const Touching& t, ContactRecord& record) const {
   if (problem_.fixed(t.pair)) return false;
-  const double most = record.force + kMaxDrawnForce * 2.0 * kDepth * t.pair.small_radius() * t.stiffness;
+  const double most = record.force + kMaxDrawnForce * 2.0 * kDepth * t.pair.scale * t.stiffness;
   if (!(-t.energy.first > most)) return false;
   record.yielded = distance_at(problem_, t, 1.0, true, most / t.stiffness) - t.proximity.distance;
   return true;

@@ -91,9 +91,11 @@ inline double arm_length(const ContactPair& pair, int side) {
   return (side == 0 ? pair.radius_a : pair.radius_b) / pair.radii();
 }
 
-/// That arm, by the lever that its length is over.
+/// That arm, by the lever that its length is over. Beside a face, `whole` goes from the tail of the normal of the face
+/// to the point that touches the face.
 template <class Scalar>
-Vec3<Scalar> contact_arm(const ContactPair& pair, int side, const Vec3<Scalar>& lever) {
+Vec3<Scalar> contact_arm(const ContactPair& pair, int side, const Vec3<Scalar>& lever, const Vec3<Scalar>& whole) {
+  if (pair.face != nullptr && side == 1) return whole - Scalar(arm_length(pair, 0)) * lever;
   const double length = arm_length(pair, side);
   return Scalar(side == 0 ? -length : length) * lever;
 }
@@ -130,6 +132,22 @@ Scalar slip_factor(const Scalar& square, double c) {
 /// too, and Newton's method would release one contact per iteration.
 inline bool holds(double square, double most) { return square <= (1.0 - 1e-12) * most * most; }
 
+/// limit * factor * S. The derivative is that of `ForceLaw::dual_slip`: where the factor changes with S, it multiplies
+/// the friction that is predicted.
+template <class Scalar>
+Vec3<Scalar> along_slip(const FrictionSetting& f, const Vec3<Scalar>& slip, const Scalar& limit, const Scalar& factor) {
+  const Vec3<Scalar> force = (limit * factor) * slip;
+  if constexpr (!std::is_same_v<Scalar, double>) {
+    const double share = value_of(factor);
+    if (f.predicted != nullptr && share > 0.0) {
+      const Scalar turns = value_of(limit) * (factor - Scalar(share));  // zero, with a derivative
+      const Vec3d dual = (1.0 / share) * *f.predicted - Vec3d{value_of(slip.x), value_of(slip.y), value_of(slip.z)};
+      return force + turns * Vec3<Scalar>{Scalar(dual.x), Scalar(dual.y), Scalar(dual.z)};
+    }
+  }
+  return force;
+}
+
 /// The force F for a slip S and a normal force N.
 template <class Scalar>
 FrictionForce<Scalar> friction_force(const FrictionSetting& f, const Vec3<Scalar>& normal, const Vec3<Scalar>& slip,
@@ -139,7 +157,7 @@ FrictionForce<Scalar> friction_force(const FrictionSetting& f, const Vec3<Scalar
   const double mu = f.friction;
   if (f.law != FrictionLaw::anchored) {
     const Scalar square = dot(slip, slip);
-    out.force = (mu * pressing * slip_factor(square, f.rate)) * slip;
+    out.force = along_slip(f, slip, mu * pressing, slip_factor(square, f.rate));
     out.sticking = f.rate * std::sqrt(value_of(square)) < 7.5;  // slower than the slip tolerance
     return out;
   }
@@ -149,7 +167,7 @@ FrictionForce<Scalar> friction_force(const FrictionSetting& f, const Vec3<Scalar
   const Scalar limit = (mu / f.tangential_stiffness) * pressing;
   const double most = std::max(value_of(limit), 0.0);
   out.sticking = holds(value_of(square), most);
-  if (!out.sticking) stick = (limit / sqrt(square)) * stick;
+  if (!out.sticking) stick = along_slip(f, stick, limit, 1.0 / sqrt(square));
   out.stick = stick;
   out.force = Scalar(f.tangential_stiffness) * stick;
   return out;
@@ -211,6 +229,7 @@ struct SlippingSurfaces {
   int bodies = 0;                  ///< number of bodies with an arm
   Scalar s, t, distance;           ///< a curve has no t
   Vec3<Scalar> normal, between{};  ///< normal and vector between the centrelines; zero beside a plane
+  Vec3<Scalar> whole{};            ///< from the tail of a face's normal to the point that touches it
   Vec3<Scalar> lever;              ///< between them where edges turn; the normal of an obstacle
   Scalar inverse = 0.0;            ///< inverse of the length of `between` [1/m]; 0: no such vector
   Scalar pressing;                 ///< N
@@ -256,6 +275,15 @@ void find_contact(const FrictionSetting& f, const SlipStart<Scalar>& start, cons
     c.s = d.s;
     c.distance = d.distance;
     c.normal = distance_to(*f.obstacle, curve_point(*pair.piece.weights, x, c.s)).normal;
+  } else if (pair.face != nullptr) {
+    const FaceVectors<Scalar> v(x, pair.point);
+    const double over = v.over(*pair.face);
+    c.s = Scalar(pair.point);
+    c.t = Scalar(0.0);
+    c.whole = v.point;
+    c.normal = Scalar(over) * v.edge;
+    c.distance = dot(v.point, c.normal);
+    c.between = c.distance * c.normal;
   } else {
     const Vec3<Scalar> r = x[0] - x[2], &u = c.sides[0].edge, &v = c.sides[1].edge;
     solve_parameters(r, u, v, pair.weight_a, pair.weight_b, f.points.s_free, f.points.t_free, c.s, c.t);
@@ -362,12 +390,16 @@ SlippingSurfaces<Scalar> slipping_surfaces(const FrictionSetting& f, const SlipS
   for (int i = 0; i < 4 && !f.rolling; ++i) c.way += c.w[i] * (x[i] - start.point(i));
   c.bodies = f.centreline ? 0 : curve ? f.pair->piece.weights->edges : f.pair->rod_b < 0 ? 1 : 2;
   c.lever = f.pair->rod_b < 0 ? c.normal : f.middle ? c.between - 0.5 * c.way : c.between;
+  if (f.pair->face != nullptr) {
+    if (f.middle) c.whole = c.whole - 0.5 * c.way;
+    c.lever = dot(c.whole, c.normal) * c.normal;
+  }
   for (int b = 0; b < c.bodies; ++b) {
     SlippingEdge<Scalar>& side = c.sides[b];
     const Vec3<Scalar> edge = f.middle ? side.edge - 0.5 * side.change : side.edge;
     side.inverse = 1.0 / sqrt(dot(edge, edge));
     side.tangent = side.inverse * edge;
-    side.arm = curve ? piece_arm(*f.pair, b, c.s, c.normal) : contact_arm(*f.pair, b, c.lever);
+    side.arm = curve ? piece_arm(*f.pair, b, c.s, c.normal) : contact_arm(*f.pair, b, c.lever, c.whole);
     side.turn = side.inverse * cross(side.tangent, side.change);
     if (f.spatial) {
       side.angle = unknown[12 + b] - start.unknown[12 + b];

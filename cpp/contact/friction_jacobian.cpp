@@ -186,6 +186,16 @@ void add_rows(const FrictionSetting& f, const SlippingSurfaces<double>& c, int b
 
 }  // namespace
 
+void add_face_friction_jacobian(const FrictionSetting& f, const double (&unknown)[kContactUnknowns],
+                                double (&jacobian)[kContactUnknowns][kContactUnknowns]) {
+  using ByUnknown = Dual<kContactUnknowns>;
+  ByUnknown x[kContactUnknowns], gradient[kContactUnknowns];
+  for (int i = 0; i < kContactUnknowns; ++i) x[i] = ByUnknown::unknown(unknown[i], i);
+  friction_gradient(f, x, gradient);
+  for (int i = 0; i < kContactUnknowns; ++i)
+    for (int j = 0; j < kContactUnknowns; ++j) jacobian[i][j] += gradient[i].slope[j];
+}
+
 void add_friction_jacobian(const FrictionSetting& f, const SlippingSurfaces<double>& c,
                            double (&jacobian)[kContactUnknowns][kContactUnknowns]) {
   if (f.pair->curve()) {

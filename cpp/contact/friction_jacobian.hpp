@@ -35,4 +35,8 @@ namespace withe {
 void add_friction_jacobian(const FrictionSetting& f, const SlippingSurfaces<double>& c,
                            double (&jacobian)[kContactUnknowns][kContactUnknowns]);
 
+/// The same of a point on a face, by dual numbers.
+void add_face_friction_jacobian(const FrictionSetting& f, const double (&unknown)[kContactUnknowns],
+                                double (&jacobian)[kContactUnknowns][kContactUnknowns]);
+
 }  // namespace withe

@@ -95,7 +95,7 @@ bool rolls(const ContactProblem& problem, const Touching& t) {
   if (!(t.approach > 0.0) || !pair.curve() || pair.piece.weights->edges < 2) return false;
   const CurveDistance<double> start = problem.curve_at_start(pair);
   const double rate = curve_rate(problem, pair, curve_slopes(pair.piece, start).slope);
-  const double depth = kDepth * pair.small_radius(), pieces = std::sqrt(2.0 * depth / std::abs(start.bend));
+  const double depth = kDepth * pair.scale, pieces = std::sqrt(2.0 * depth / std::abs(start.bend));
   return std::abs(rate) * std::clamp(pieces, 1.0, kMaxPiecesToEnd) > kMinRollingSpeed * rest_speed(problem, pair) &&
          std::abs(rate) * t.age < kRolledOffSlope * start.stiff;
 }
@@ -131,8 +131,7 @@ double start_distance(const ContactProblem& problem, const ContactPair& pair) {
 }
 
 double rest_speed(const ContactProblem& problem, const ContactPair& pair) {
-  return std::max(std::sqrt(problem.parameters->gravity * kDepth * pair.small_radius()),
-                  problem.parameters->slip_tolerance);
+  return std::max(std::sqrt(problem.parameters->gravity * kDepth * pair.scale), problem.parameters->slip_tolerance);
 }
 
 double least_approach(const ContactProblem& problem, const ContactPair& pair) {
@@ -190,6 +189,13 @@ double nearing(const ContactProblem& problem, const ContactPair& pair) {
   problem.bodies.end_points(pair, problem.start->v, v);
   if (pair.key.b < 0) v[2] = v[3] = problem.velocity_of(pair);
   const ClosestPoints c = problem.closest_at_start(pair, x);
+  if (pair.face != nullptr) {
+    const FaceVectors<double> place(x, pair.point);
+    double slope[12], rate = 0.0;
+    face_gradient(place, pair.point, place.over(*pair.face), slope);
+    for (int i = 0; i < 12; ++i) rate += slope[i] * v[i / 3][i % 3];
+    return -rate;
+  }
   double w[4];
   end_weights(c.s, c.t, w);
   Vec3d rate{};

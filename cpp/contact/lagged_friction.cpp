@@ -35,10 +35,11 @@ void set_slip(const ContactProblem& problem, const Touching& t, LaggedFriction& 
   t.end_points(x);
   for (int i = 0; i < (pair.curve() ? 9 : obstacle ? 6 : 12); ++i) column[i] = w[i / 3] * kUnitVectors[i % 3];
   const int edges = centreline ? 0 : pair.curve() ? pair.piece.weights->edges : obstacle ? 1 : 2;
+  const Vec3d whole = pair.face != nullptr ? FaceVectors<double>(x, pair.point).point : Vec3d{};
   for (int side = 0; side < edges; ++side) {
-    const Vec3d arm = pair.curve()
-                          ? piece_arm(pair, side, points.s, normal)
-                          : (side == 0 ? 1.0 : -1.0) * contact_arm(pair, side, obstacle ? normal : points.between);
+    const Vec3d arm =
+        pair.curve() ? piece_arm(pair, side, points.s, normal)
+                     : (side == 0 ? 1.0 : -1.0) * contact_arm(pair, side, obstacle ? normal : points.between, whole);
     add_turning(x, pair.curve() ? side : 2 * side, 12 + side, arm, !problem.model().planar(), column);
   }
   for (int i = 0; i < kContactUnknowns; ++i) {

@@ -43,6 +43,20 @@ void add_end_pressing(const Touching& t, bool with_hessian, bool geometric, Cont
     for (int j = 0; j < 12; ++j) out.hessian[i][j] += turn * H[i][j] + (t.pressing.by_end - turn) * g[i] * g[j];
 }
 
+/// Pressing of a point on a face: along the gradient of D at the end of the step, or in the mean of a step. Then the
+/// work is the change of D, and the forces are in balance.
+void add_face_pressing(const ContactProblem& problem, const Touching& t, bool with_hessian, bool geometric,
+                       ContactLocal& out) {
+  const ContactPair& pair = t.pair;
+  const FacePressing f(problem, t);
+  for (int i = 0; i < 12; ++i) {
+    out.gradient[i] += t.pressing.first * f.along[i];
+    for (int j = 0; j < 12 && with_hessian; ++j)
+      out.hessian[i][j] += t.pressing.by_end * (geometric ? f.along : f.end)[i] * f.end[j];
+  }
+  if (with_hessian && geometric) add_face_hessian(pair.point, f.share * t.pressing.first * f.over, out.hessian);
+}
+
 /// From the gradient of D at the end of the step to the mean of `add_curve_pressing`.
 void add_curve_start(const ContactProblem& problem, const Touching& t, bool geometric, double (&along)[9],
                      double (*derivative)[9]) {
@@ -122,11 +136,36 @@ void add_mean_pressing(const ContactProblem& problem, const Touching& t, bool wi
 
 }  // namespace
 
+FacePressing::FacePressing(const ContactProblem& problem, const Touching& t) {
+  const Face& face = *t.pair.face;
+  const double point = t.pair.point;
+  Vec3d x[4];
+  t.end_points(x);
+  FaceVectors<double> v(x, point);
+  over = v.over(face);
+  face_gradient(v, point, over, end);
+  std::copy(std::begin(end), std::end(end), along);
+  if (!problem.turns(t.pair)) return;
+  share = 0.5;
+  problem.bodies.end_points(t.pair, problem.start->q, x);
+  const FaceVectors<double> start(x, point);
+  v.point = 0.5 * (v.point + start.point);
+  v.edge = 0.5 * (v.edge + start.edge);
+  face_gradient(v, point, over, along);
+}
+
 void distance_slope(const Touching& t, double (&out)[12]) {
   std::fill(std::begin(out), std::end(out), 0.0);
   if (t.pair.curve()) {
     const CurveSlopes slopes = curve_slopes(t.pair.piece, t.proximity.curve);
     std::copy(slopes.distance, slopes.distance + 9, out);
+    return;
+  }
+  if (t.pair.face != nullptr) {
+    Vec3d x[4];
+    t.end_points(x);
+    const FaceVectors<double> v(x, t.pair.point);
+    face_gradient(v, t.pair.point, v.over(*t.pair.face), out);
     return;
   }
   double w[4];
@@ -143,6 +182,10 @@ void add_pressing(const ContactProblem& problem, const Touching& t, bool with_he
   }
   if (t.pair.curve()) {
     add_curve_pressing(problem, t, with_hessian, geometric, out);
+    return;
+  }
+  if (t.pair.face != nullptr) {
+    add_face_pressing(problem, t, with_hessian, geometric, out);
     return;
   }
   if (!problem.turns(t.pair)) {

@@ -68,6 +68,15 @@ void add_start_direction(const double (&first)[N], const double (&way)[N], doubl
 void add_pressing(const ContactProblem& problem, const Touching& t, bool with_hessian, bool geometric,
                   ContactLocal& out);
 
+/// Directions in which a point and a face press on each other, over the end points: the gradient of their distance.
+struct FacePressing {
+  double end[12], along[12];  ///< at the end of the step; and by which they press, there or in the mean of the step
+  double over = 0;            ///< see FaceVectors
+  double share = 1;           ///< of the derivative of `along` in that of `end`
+
+  FacePressing(const ContactProblem& problem, const Touching& t);
+};
+
 /// Derivative of a contact's distance by its unknowns but angles, at the end of the step.
 void distance_slope(const Touching& t, double (&out)[12]);
 

@@ -5,6 +5,7 @@
 #include <functional>
 #include <numbers>
 #include <queue>
+#include <set>
 #include <tuple>
 #include <utility>
 
@@ -37,6 +38,11 @@ bool comes_before(const ContactKey& a, const ContactKey& b) {
   return a < b;
 }
 
+FaceAxes axes_of(const Model& model, const VectorX& q, const Face& face) {
+  return {local_vector(model, q, model.tail_dof[at(face.edge)]), local_vector(model, q, model.head_dof[at(face.edge)]),
+          local_position(model, q, face.aside)};
+}
+
 Surfaces::Surfaces(const Model& model) : model_(model) {
   const ContactDescription& contact = model.description.contact;
   Parameters drawn;
@@ -51,7 +57,14 @@ Surfaces::Surfaces(const Model& model) : model_(model) {
   if (contact.rods) {
     for (int e = 0; e < model.edge_count; ++e)
       if (radius(e) > 0.0) edges_.push_back(e);
-    for (int e : edges_) greatest_reach_ = std::max(greatest_reach_, 2.0 * radius(e) + tolerance(e));
+    for (int e : edges_) {
+      greatest_reach_ = std::max(greatest_reach_, 2.0 * radius(e) + tolerance(e));
+      greatest_tolerance_ = std::max(greatest_tolerance_, tolerance(e));
+    }
+  }
+  add_points();
+  if (contact.rods) {
+    add_faces();
     find_neighbours();
   }
   add_obstacles();
@@ -152,7 +165,7 @@ FrictionOwner Surfaces::friction_owner(const ContactPair& pair) const {
 
 double Surfaces::tolerance(int edge) const {
   const double given = model_.description.contact.distance_tolerance;
-  return given > 0.0 ? given : 0.1 * radius(edge);
+  return given > 0.0 ? given : 0.1 * scale(edge);
 }
 
 bool Surfaces::may_meet(int first, int second) const {
@@ -161,21 +174,105 @@ bool Surfaces::may_meet(int first, int second) const {
   return last == pairs.rend() || !last->ignored;
 }
 
+void Surfaces::add_points() {
+  points_.resize(at(model_.edge_count));
+  std::vector<int> edges_of(at(model_.node_count), 0);
+  for (int e = 0; e < model_.edge_count; ++e)
+    for (int node : {model_.edge_tail[at(e)], model_.edge_head[at(e)]}) edges_of[at(node)] += body_of(e) < 0;
+  std::vector<bool> known(at(model_.node_count), false);
+  std::set<std::array<double, 4>> corners;  // of bodies, where ends of edges lie in one place
+  for (int e = 0; e < model_.edge_count; ++e) {
+    if (!(radius(e) > 0.0)) continue;
+    if (ball(e)) {
+      points_[at(e)].push_back({0.5, 2, 1.0});
+      continue;
+    }
+    for (int end : {0, 1}) {
+      const int node = end == 0 ? model_.edge_tail[at(e)] : model_.edge_head[at(e)];
+      const Vec3d x = local_position(model_, model_.initial_q, node);
+      if (body_of(e) >= 0 ? !corners.insert({static_cast<double>(body_of(e)), x.x, x.y, x.z}).second : known[at(node)])
+        continue;
+      known[at(node)] = true;
+      points_[at(e)].push_back({static_cast<double>(end), end, edges_of[at(node)] == 1 ? 0.5 : 1.0});
+    }
+  }
+}
+
+void Surfaces::add_faces() {
+  const auto& rods = model_.description.rods;
+  for (std::size_t r = 0; r < rods.size(); ++r)
+    for (const FaceDescription& face : rods[r].faces) {
+      const int edge = model_.rod_first_edge[r] + face.edge;
+      faces_.emplace_back(face, edge, rods[r].nodes[at(face.aside)], model_.edge_length(edge));
+    }
+  if (faces_.empty()) return;
+  edge_faces_.resize(at(model_.edge_count));
+  std::size_t first = 0;
+  for (std::size_t r = 0; r < rods.size(); ++r) {
+    const auto face = [&](int index) { return index < 0 ? nullptr : &faces_[first + at(index)]; };
+    for (std::size_t e = 0; e < rods[r].edge_faces.size(); ++e) {
+      const auto [left, right] = rods[r].edge_faces[e];
+      edge_faces_[at(model_.rod_first_edge[r]) + e] = {face(left), face(right)};
+    }
+    first += rods[r].faces.size();
+  }
+}
+
+void Surfaces::add_face_pairs(int edge, const Face& face, std::vector<ContactPair>& pairs) const {
+  if (points_[at(edge)].empty() || !may_touch(edge, face.edge)) return;
+  ContactPair p;
+  p.face = &face;
+  p.rod_a = model_.edge_rod[at(edge)];
+  p.rod_b = model_.edge_rod[at(face.edge)];
+  p.radius_a = radius(edge);
+  p.radius_b = face.depth;
+  p.tolerance = tolerance(edge);
+  p.scale = scale(edge);
+  p.of_body = true;
+  set_parameters(p);
+  for (const TouchingPoint& point : points_[at(edge)]) {
+    p.key = {edge, face.edge, point.end};
+    p.point = point.along;
+    p.share = point.share;
+    pairs.push_back(p);
+  }
+}
+
 std::vector<Surfaces::SurfaceNode> Surfaces::surface_nodes() const {
   std::vector<SurfaceNode> out;
   const auto place = [&](int node) { return local_position(model_, model_.initial_q, node); };
+  const auto& rods = model_.description.rods;
+  std::vector<bool> drawn(at(model_.node_count), false);  // nodes of surfaces
+  for (const RodDescription& rod : rods)
+    for (int node : rod.nodes) drawn[at(node)] = drawn[at(node)] || rod.is_surface();
   for (const CarriedPart& surface : model_.carried) {
-    if (surface.edge < 0) continue;
-    const Vec3d tail = place(model_.edge_tail[at(surface.edge)]),
-                way = place(model_.edge_head[at(surface.edge)]) - tail;
+    if (surface.edge < 0 || surface.edge != model_.rod_first_edge[at(model_.edge_rod[at(surface.edge)])]) continue;
+    const int rod = model_.edge_rod[at(surface.edge)];
     const auto add = [&](int node) {
-      const Vec3d apart = place(node) - tail;
-      const double s = std::clamp(dot(apart, way) / dot(way, way), 0.0, 1.0);
-      out.push_back({surface.edge, node, std::max(0.0, norm(apart - s * way) - radius(surface.edge))});
+      const Vec3d x = place(node);
+      double nearest = INFINITY, sign = 1.0;
+      for (const Face& face : faces_) {
+        if (model_.edge_rod[at(face.edge)] != rod) continue;
+        const FaceDistance d = distance_from(face, axes_of(model_, model_.initial_q, face), x);
+        if (d.distance >= nearest) continue;
+        nearest = d.distance;
+        sign = d.height < 0.0 ? -1.0 : 1.0;
+      }
+      for (int e = surface.edge; e < model_.rod_first_edge[at(rod + 1)]; ++e) {
+        if (!(radius(e) > 0.0)) continue;
+        const Vec3d tail = place(model_.edge_tail[at(e)]), way = place(model_.edge_head[at(e)]) - tail,
+                    apart = x - tail;
+        const double s = std::clamp(dot(apart, way) / dot(way, way), 0.0, 1.0);
+        out.push_back({e, node, sign * std::max(0.0, norm(apart - s * way) - radius(e))});
+      }
+      for (const Face& face : faces_)
+        if (model_.edge_rod[at(face.edge)] == rod)
+          out.push_back(
+              {face.edge, node, sign * distance_from(face, axes_of(model_, model_.initial_q, face), x).distance});
     };
     add(surface.base);
     for (const CarriedPart& part : model_.carried)
-      if (part.is_node() && part.frame == surface.frame) add(part.node);
+      if (part.is_node() && part.frame == surface.frame && !drawn[at(part.node)]) add(part.node);
   }
   return out;
 }
@@ -231,7 +328,7 @@ bool Surfaces::may_touch(int a, int b) const {
   if (a == b || std::binary_search(neighbours_[at(a)].begin(), neighbours_[at(a)].end(), b) ||
       std::binary_search(neighbours_[at(b)].begin(), neighbours_[at(b)].end(), a))
     return false;
-  if (held(a) && held(b)) return false;
+  if ((held(a) && held(b)) || (body_of(a) >= 0 && body_of(a) == body_of(b))) return false;
   return may_meet(model_.edge_rod[at(a)], model_.edge_rod[at(b)]);
 }
 
@@ -251,9 +348,14 @@ ContactPair Surfaces::pair(int a, int b) const {
   p.radius_a = radius(a);
   p.radius_b = radius(b);
   p.tolerance = std::min(tolerance(a), tolerance(b));
+  p.scale = scale(p.key);
   p.of_body = model_.is_surface(a) || model_.is_surface(b);
   p.weight_a = weight(a, p.radii());
   p.weight_b = weight(b, p.radii());
+  if (!edge_faces_.empty() && edge_faces_[at(a)].left != nullptr && edge_faces_[at(b)].left != nullptr) {
+    p.beside_a = edge_faces_[at(a)];
+    p.beside_b = edge_faces_[at(b)];
+  }
   set_parameters(p);
   return p;
 }
@@ -340,6 +442,7 @@ void Surfaces::add_edges(const ContactPair& prototype, const Obstacle& obstacle)
     p.key.a = e;
     p.radius_a = radius(e);
     p.tolerance = tolerance(e);
+    p.scale = scale(e);
     p.weight_a = parallel_weight(model_.edge_length(e), p.radii());
     p.weight_b = parallel_weight(norm(obstacle.other - obstacle.point), p.radii());
     if (p.weight_b == 0.0) p.weight_b = p.weight_a;  // a sphere: any point of its segment is the same
@@ -349,13 +452,14 @@ void Surfaces::add_edges(const ContactPair& prototype, const Obstacle& obstacle)
 
 void Surfaces::add_pieces(const ContactPair& prototype, const Obstacle& obstacle, int rod) {
   const int first = model_.rod_first_edge[at(rod)], end = model_.rod_first_edge[at(rod + 1)];
-  const bool closed = model_.description.rods[at(rod)].closed;
+  const bool closed = model_.description.rods[at(rod)].closed, surface = model_.description.rods[at(rod)].is_surface();
   const auto add = [&](const CurveWeights& weights, int before, int behind, int which) {
     ContactPair p = prototype;
     p.key.a = before;
     p.key.end = which;
     p.radius_a = 0.5 * (radius(before) + radius(behind));
     p.tolerance = std::min(tolerance(before), tolerance(behind));
+    p.scale = 0.5 * (scale(before) + scale(behind));
     p.piece = {&weights,
                {model_.edge_tail[at(before)], model_.edge_head[at(before)], -1},
                {before, -1},
@@ -371,8 +475,9 @@ void Surfaces::add_pieces(const ContactPair& prototype, const Obstacle& obstacle
   };
   const auto neighbour = [&](int edge, bool behind) {
     const int next = behind ? edge + 1 : edge - 1;
-    if (next >= first && next < end) return next;
+    if (!surface && next >= first && next < end) return next;
     if (closed) return behind ? first : end - 1;
+    if (surface) return -1;
     // The rod that continues this one, if it may touch the obstacle. The piece between both has the friction of the rod
     // before it.
     const int in_row = next_in_row(model_, edge, behind);
@@ -383,6 +488,16 @@ void Surfaces::add_pieces(const ContactPair& prototype, const Obstacle& obstacle
     if (!smooth(obstacle, e)) continue;
     if (ball(e)) {
       add(kCurveMiddle, e, e, 0);
+      continue;
+    }
+    // The edges of a body share its corners.
+    const auto has_corner = [&](int which) {
+      return std::any_of(points_[at(e)].begin(), points_[at(e)].end(),
+                         [&](const TouchingPoint& point) { return point.end == which; });
+    };
+    if (surface && flat) {
+      if (has_corner(0)) add(kCurveFirst, e, e, 0);
+      if (has_corner(1)) add(kCurveLast, e, e, 1);
       continue;
     }
     const int before = neighbour(e, false), behind = neighbour(e, true);

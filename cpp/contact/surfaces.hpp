@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "contact/curve.hpp"
+#include "contact/face.hpp"
 #include "geometry/vec3.hpp"
 #include "model/state.hpp"
 
@@ -24,6 +25,10 @@ inline constexpr double kMinDistance = 0.5;
 /// the sum of their radii. Farther pairs need no exact distance.
 inline constexpr double kMaxPatternDistance = 0.5;
 
+/// Scale of the depth of the rounded edges of bodies, over their radius. Depth, yielded depth and distance tolerance,
+/// which is a tenth of the scale, stay below the radius together, so that a corner stays on its side of a face.
+inline constexpr double kSharp = 4.0;
+
 /// Unknowns of a contact: a0, a1, b0, b1 (3 each), angle of a, angle of b; of a piece of a curve: its nodes (3 each),
 /// three unused ones, the angles of its edges.
 inline constexpr int kContactUnknowns = 14;
@@ -34,10 +39,14 @@ inline constexpr int kPlaneUnknowns = 6;
 struct ContactPair {
   ContactKey key;    ///< for a piece of a curve: the edge before its node (at the first node: after it), and its end
   CurvePiece piece;  ///< of the curve of a, beside an obstacle larger than an edge
+  const Face* face = nullptr;         ///< of b, touched by a point of a; null: edges touch
+  double point = 0;                   ///< share of the edge a at which that point is
+  EdgeFaces beside_a, beside_b;       ///< of two edges of bodies with faces
   int rod_a = 0, rod_b = -1;          ///< -1: an obstacle
   double radius_a = 0, radius_b = 0;  ///< [m]
   double tolerance = 0;               ///< delta [m]
   double weight_a = 0, weight_b = 0;  ///< for closest_points [m^2]
+  double scale = 0;                   ///< in proportion to which surfaces penetrate each other [m]
   double share = 1;                   ///< share of the stiffness of a contact
   double friction = 0;                ///< [-]; greatest coefficient of all directions
   double forward = 1, backward = 1;   ///< if rod a slides towards its end or start, over `friction`
@@ -50,8 +59,14 @@ struct ContactPair {
   double radii() const { return radius_a + radius_b; }
   double reach() const { return radii() + tolerance; }
   /// A ball that came as near as rods may would pass between two rods.
-  double nearest() const { return of_body ? radii() - kMinDistance * small_radius() : kMinDistance * radii(); }
-  double small_radius() const { return rod_b < 0 || radius_a < radius_b ? radius_a : radius_b; }
+  double nearest() const {
+    const double smaller = rod_b < 0 || radius_a < radius_b ? radius_a : radius_b;
+    return narrow() ? radii() - kMinDistance * smaller : kMinDistance * radii();
+  }
+  /// True if surfaces may not come as near as rods may.
+  bool narrow() const { return of_body && face == nullptr; }
+  /// True if surfaces that are near may not touch, see `Proximity::beyond`.
+  bool may_be_beyond() const { return face != nullptr || beside_a.left != nullptr; }
   bool curve() const { return piece.weights != nullptr; }
   bool isotropic() const { return forward == across && backward == across; }
   /// Friction coefficient along a rod, relative to `friction`, for a slip that is positive towards the end of the rod.
@@ -76,6 +91,9 @@ struct FrictionOwner {
 /// edges.
 bool comes_before(const ContactKey& a, const ContactKey& b);
 
+/// Places of faces in the axes of the unknowns.
+FaceAxes axes_of(const Model& model, const VectorX& q, const Face& face);
+
 class Surfaces {
  public:
   explicit Surfaces(const Model& model);
@@ -90,13 +108,28 @@ class Surfaces {
   const ContactPair& obstacle_pair(const ContactKey& key) const;
   /// Edges that may touch other edges.
   const std::vector<int>& edges() const { return edges_; }
+  /// Faces of bodies.
+  const std::vector<Face>& faces() const { return faces_; }
+  /// Adds the pairs of an edge's points with a face.
+  void add_face_pairs(int edge, const Face& face, std::vector<ContactPair>& pairs) const;
   double radius(int edge) const { return radius_[static_cast<std::size_t>(edge)]; }
   double tolerance(int edge) const;
+  /// In proportion to which the surface of an edge is penetrated: its radius, or kSharp times the radius of a rounded
+  /// edge [m].
+  double scale(int edge) const {
+    return (model_.description.rods[at(model_.edge_rod[at(edge)])].faces.empty() ? 1.0 : kSharp) * radius(edge);
+  }
+  /// The smaller one of two surfaces; obstacles and faces have none [m].
+  double scale(const ContactKey& key) const {
+    const double other = key.b < 0 ? 0.0 : scale(key.b);
+    return other > 0.0 ? std::min(scale(key.a), other) : scale(key.a);
+  }
   /// True if two edges may touch: not neighbours along rods and joints nearer than (pi / 2) (2 h + delta), not ignored,
   /// not surfaces of one body or of held bodies.
   bool may_touch(int a, int b) const;
   ContactPair pair(int a, int b) const;
   double greatest_reach() const { return greatest_reach_; }
+  double greatest_tolerance() const { return greatest_tolerance_; }
   /// Coefficients of contact and friction.
   const SurfaceParameters& parameters() const { return parameters_; }
   /// Sets the parameters. Returns true if any of them differs from before.
@@ -144,18 +177,31 @@ class Surfaces {
     int edge, node;
     double distance;
   };
-  /// For each surface and each node of its body, surface by surface.
+  /// For each edge of a surface and each node that its body has on rods or joints, edge by edge.
   std::vector<SurfaceNode> surface_nodes() const;
+  void add_points();
+  void add_faces();
+  /// Body of an edge of a surface; -1: an edge of a rod.
+  int body_of(int edge) const { return model_.description.rods[at(model_.edge_rod[at(edge)])].body; }
   void unknowns_of_edges(const ContactKey& key, int (&dofs)[kContactUnknowns]) const;
 
   const Model& model_;
   std::vector<double> radius_;
   std::vector<bool> held_;  ///< per edge
   std::vector<int> edges_;
-  std::vector<std::vector<int>> neighbours_;  ///< per edge, sorted
+  std::vector<Face> faces_;
+  std::vector<EdgeFaces> edge_faces_;  ///< per edge; empty: there are no faces
+  /// A point of an edge that touches faces.
+  struct TouchingPoint {
+    double along;  ///< share of the edge
+    int end;       ///< ContactKey::end
+    double share;  ///< ContactPair::share
+  };
+  std::vector<std::vector<TouchingPoint>> points_;  ///< per edge; points that edges share belong to the first
+  std::vector<std::vector<int>> neighbours_;        ///< per edge, sorted
   std::vector<Obstacle> obstacles_;
   std::vector<ContactPair> obstacle_pairs_;
-  double greatest_reach_ = 0;
+  double greatest_reach_ = 0, greatest_tolerance_ = 0;
   SurfaceParameters parameters_;
   bool frictional_ = false;
 };

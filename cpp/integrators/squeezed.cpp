@@ -19,7 +19,7 @@ constexpr double kMaxDrawnDepth = 1e-4;
 
 /// Depth of two surfaces in each other beyond `allowed`, a share of the smaller radius [m].
 double excess(const Touching& t, double allowed) {
-  return t.pair.radii() - t.proximity.distance - allowed * t.pair.small_radius();
+  return t.pair.radii() - t.proximity.distance - allowed * t.pair.scale;
 }
 
 /// Derivative of a distance by the free unknowns; returns the size of the whole slope.

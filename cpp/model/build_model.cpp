@@ -329,11 +329,13 @@ class Builder {
     }
     for (int r = 0; r < static_cast<int>(scene_.rods.size()); ++r) {
       if (rod(r).body != index) continue;
-      CarriedPart part;
-      part.frame = frame;
-      part.base = body.node;
-      part.edge = first_edge(r);
-      model_.carried.push_back(part);
+      for (int e = first_edge(r); e < first_edge(r) + edges_of(r); ++e) {
+        CarriedPart part;
+        part.frame = frame;
+        part.base = body.node;
+        part.edge = e;
+        model_.carried.push_back(part);
+      }
     }
     if (mass > 0.0) model_.length_scale = std::max(model_.length_scale, std::sqrt(body.inertia.trace() / mass));
   }
@@ -467,6 +469,7 @@ class Builder {
       const int index = static_cast<int>(r), n = edges_of(index), shift = rod(index).closed ? 0 : 1;
       model_.place.emplace_back(static_cast<std::size_t>(rod(index).natural_twist.size()));
       model_.wall_half.push_back({-1, -1});
+      if (rod(index).is_surface()) continue;
       for (int node = 0; node < n + shift; ++node) {
         const RodPass pass{index, node};
         const auto [in, out] = edges_at(pass);

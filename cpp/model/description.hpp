@@ -11,6 +11,15 @@
 
 namespace withe {
 
+/// A face of the surface of a rigid body: a region of the plane through the tail of an edge, which is normal to it. It
+/// touches at a distance from that plane.
+struct FaceDescription {
+  int edge = 0;      ///< index of that edge of the surface
+  int aside = 0;     ///< index of a node of the surface; from the tail to its foot in the plane is the first axis
+  double depth = 0;  ///< of the plane below the surface [m]
+  MatrixX4 outline;  ///< segments x0, y0, x1, y1 about the tail; the second axis is normal x first [m]
+};
+
 /// A rod as a chain of nodes. Arrays have one row per edge, unless their comment names stencils. An open rod of N nodes
 /// has N - 1 edges and N - 2 stencils, which are the inner nodes. A closed rod has N edges and N stencils, where
 /// stencil i sits at node i, between edges i - 1 and i.
@@ -32,10 +41,13 @@ struct RodDescription {
   VectorX natural_twist;       ///< per stencil [rad/m]
   VectorX contact_radius;      ///< radius of the round contact surface [m]; empty: no contact
   VectorX fluid_radius;        ///< radius in the fluid [m]
-  // The surface of a rigid body is an edge without mass and stiffness. The body carries its nodes and its angle.
-  int body = -1;            ///< that body; -1: a rod
-  double friction = -1;     ///< coefficient [-]; negative: that of the scene
-  double restitution = -1;  ///< coefficient [-]; negative: that of the scene
+  // The surface of a rigid body is a chain of edges without mass and stiffness. The body carries their nodes and
+  // angles. Edges without a contact radius only connect others, or are normals of faces.
+  int body = -1;  ///< that body; -1: a rod
+  std::vector<FaceDescription> faces;
+  std::vector<std::array<int, 2>> edge_faces;  ///< per edge: faces on its left and right, from outside; -1: none
+  double friction = -1;                        ///< coefficient [-]; negative: that of the scene
+  double restitution = -1;                     ///< coefficient [-]; negative: that of the scene
 
   bool is_surface() const { return body >= 0; }
 };

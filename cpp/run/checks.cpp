@@ -116,9 +116,7 @@ void check_overlap(const Model& model, const Parameters& parameters, const State
   for (const ContactReport& r : reports) {
     const auto goes_on = [&](const ContactRecord& record) { return bodies(record.key) == bodies(r.key); };
     if (std::any_of(state.contacts.begin(), state.contacts.end(), goes_on)) continue;
-    const double radius = r.key.b < 0
-                              ? contact->surfaces().radius(r.key.a)
-                              : std::min(contact->surfaces().radius(r.key.a), contact->surfaces().radius(r.key.b));
+    const double radius = contact->surfaces().scale(r.key);
     const double drawn = bars ? -r.gap : r.drawn_depth();
     if (drawn <= depth * radius && !(bars && r.gap <= 0.0)) continue;
     depth = drawn / radius;

@@ -45,7 +45,7 @@ void fail_squeezed(const Model& model, const Equations& system, const State& sta
   };
   const int node = model.edge_tail[at(t.pair.key.a)];
   const Place place = place_of_node(model, t.proximity.points.s > 0.5 ? model.edge_head[at(t.pair.key.a)] : node);
-  const auto share = [&](double length) { return text(100.0 * length / t.pair.small_radius(), 2); };
+  const auto share = [&](double length) { return text(100.0 * length / t.pair.scale, 2); };
   const std::string when = place.words + " (time " + text(state.time, 6) + " s, step " + text(dt) + " s)";
   std::string what = rod_of(t.pair.key.a);
   if (squeezed.against < 0) {

@@ -150,6 +150,7 @@ std::uint64_t fingerprint(const SceneDescription& scene) {
     w(rod.contact_radius);
     w(rod.fluid_radius);
     if (rod.is_surface()) w(rod.body);
+    for (const FaceDescription& face : rod.faces) w(face.outline);
   }
   for (const BodyDescription& body : scene.bodies) {
     w(body.node);

@@ -39,6 +39,12 @@ constexpr Words<FluidModel, 3> kFluidModels{
 constexpr Words<ObstacleKind, 2> kObstacleKinds{{{"plane", ObstacleKind::plane}, {"capsule", ObstacleKind::capsule}}};
 
 void register_rod(py::module_& module) {
+  py::class_<FaceDescription>(module, "FaceDescription", "A face of the surface of a rigid body.")
+      .def(py::init<>())
+      .def_readwrite("edge", &FaceDescription::edge)
+      .def_readwrite("aside", &FaceDescription::aside)
+      .def_readwrite("depth", &FaceDescription::depth)
+      .def_readwrite("outline", &FaceDescription::outline);
   py::class_<RodDescription>(module, "RodDescription", "A rod as a chain of nodes.")
       .def(py::init<>())
       .def_readwrite("name", &RodDescription::name)
@@ -59,6 +65,8 @@ void register_rod(py::module_& module) {
       .def_readwrite("contact_radius", &RodDescription::contact_radius)
       .def_readwrite("fluid_radius", &RodDescription::fluid_radius)
       .def_readwrite("body", &RodDescription::body)
+      .def_readwrite("faces", &RodDescription::faces)
+      .def_readwrite("edge_faces", &RodDescription::edge_faces)
       .def_readwrite("friction", &RodDescription::friction)
       .def_readwrite("restitution", &RodDescription::restitution);
 }

@@ -21,6 +21,7 @@ __all__: list[str] = [
     "EquilibriumGradient",
     "EquilibriumPath",
     "EquilibriumResult",
+    "FaceDescription",
     "FluidDescription",
     "GraspTable",
     "HandDescription",
@@ -72,6 +73,28 @@ __all__: list[str] = [
     "trace_lines",
 ]
 
+class FaceDescription:
+    """
+    A face of the surface of a rigid body.
+    """
+    def __init__(self) -> None: ...
+    @property
+    def aside(self) -> int: ...
+    @aside.setter
+    def aside(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    @property
+    def depth(self) -> float: ...
+    @depth.setter
+    def depth(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def edge(self) -> int: ...
+    @edge.setter
+    def edge(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    @property
+    def outline(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 4]"]: ...
+    @outline.setter
+    def outline(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 4]"]) -> None: ...
+
 class RodDescription:
     """
     A rod as a chain of nodes.
@@ -104,6 +127,19 @@ class RodDescription:
     def drag(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
     @drag.setter
     def drag(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None: ...
+    @property
+    def edge_faces(self) -> list[typing.Annotated[list[int], "FixedSize(2)"]]: ...
+    @edge_faces.setter
+    def edge_faces(
+        self,
+        arg0: collections.abc.Sequence[
+            typing.Annotated[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(2)"]
+        ],
+    ) -> None: ...
+    @property
+    def faces(self) -> list[FaceDescription]: ...
+    @faces.setter
+    def faces(self, arg0: collections.abc.Sequence[FaceDescription]) -> None: ...
     @property
     def fluid_radius(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
     @fluid_radius.setter

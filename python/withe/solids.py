@@ -10,19 +10,25 @@ Give one of them to `Scene.add_body`, with a density:
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
-from typing import Protocol
+from pathlib import Path
+from typing import Protocol, cast
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial import ConvexHull
 
-from withe.common import validation
+from withe.common import extras, validation
+from withe.common.polyhedra import Core, polyhedron_core
 
-__all__ = ["Box", "Capsule", "Cylinder", "Mesh", "Sphere"]
+__all__ = ["Box", "Capsule", "Cylinder", "Hull", "Mesh", "Sphere"]
 
 FloatArray = npt.NDArray[np.float64]
 # Length of the core of a ball over its radius: the ball turns with it, and it must not show.
 _POINT = 1e-3
+# Default radius of rounded edges over the thinnest side.
+_SHARP = 2e-4
 
 
 class Solid(Protocol):
@@ -95,15 +101,14 @@ class Sphere:
         return 0.4 * float(self.radius) ** 2 * np.eye(3)
 
     @property
-    def core(self) -> tuple[FloatArray, float]:
-        """Middle of the ball, as a segment too short to show: its ends, shape (2, 3), and the radius [m].
+    def core(self) -> Core:
+        """Segment by which it touches: the middle, too short to show.
 
         Returns
         -------
-        ends : ndarray of shape (2, 3) [m]
-        radius : float [m]
+        withe.common.polyhedra.Core
         """
-        return _along_z(_POINT * float(self.radius)), float(self.radius)
+        return _segment(_POINT * float(self.radius), float(self.radius))
 
     def surface(self) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         """Return the surface for pictures.
@@ -126,19 +131,23 @@ class Box:
     ----------
     size : tuple of three floats [m]
         Lengths of the edges along x, y and z.
+    rounding : float [m]
+        Radius of the edges where the box touches. By default 0.0002 of the thinnest side.
 
     Raises
     ------
     ValueError
-        A length that is not positive.
+        A length that is not positive, or a rounding of half of the thinnest side and more.
     """
 
     size: tuple[float, float, float]
+    rounding: float | None = None
 
     def __post_init__(self) -> None:
         sides = validation.vector(self.size, "size of the box")
         if not (sides > 0.0).all():
             raise ValueError(f"size of the box must be positive, got {tuple(map(float, sides))}")
+        _rounding(self.rounding, float(sides.min()), "box")
 
     @property
     def volume(self) -> float:
@@ -155,6 +164,16 @@ class Box:
         """Moment of inertia about the centre of mass over the mass, shape (3, 3) [m^2]."""
         squares = np.asarray(self.size, dtype=float) ** 2
         return np.diag(squares.sum() - squares) / 12.0
+
+    @property
+    def core(self) -> Core:
+        """Edges and faces by which it touches.
+
+        Returns
+        -------
+        withe.common.polyhedra.Core
+        """
+        return polyhedron_core(*self.surface(), _rounding(self.rounding, float(min(self.size)), "box"))
 
     def surface(self) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         """Return the surface for pictures.
@@ -264,15 +283,14 @@ class Capsule:
         return np.diag([across, across, along]) / (barrel + caps)
 
     @property
-    def core(self) -> tuple[FloatArray, float]:
-        """Segment at the distance of a radius from the surface: its ends, shape (2, 3), and the radius [m].
+    def core(self) -> Core:
+        """Segment by which it touches: the axis, at the distance of a radius from the surface.
 
         Returns
         -------
-        ends : ndarray of shape (2, 3) [m]
-        radius : float [m]
+        withe.common.polyhedra.Core
         """
-        return _along_z(float(self.length)), float(self.radius)
+        return _segment(float(self.length), float(self.radius))
 
     def surface(self) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         """Return the surface for pictures.
@@ -297,15 +315,19 @@ class Mesh:
     vertices : array_like of shape (n, 3) [m]
     triangles : array_like of shape (m, 3)
         Rows of `vertices`, counter-clockwise when seen from outside.
+    rounding : float [m]
+        Radius of the edges where the mesh touches. By default 0.0002 of its thinnest extent along an axis.
 
     Raises
     ------
     ValueError
-        A surface that is not closed, triangles that face inwards, or rows that are not those of vertices.
+        A surface that is not closed, triangles that face inwards or have no area, rows that are not those of vertices,
+        or a rounding of half of the thinnest extent and more.
     """
 
     vertices: npt.ArrayLike
     triangles: npt.ArrayLike
+    rounding: float | None = None
 
     def __post_init__(self) -> None:
         vertices = validation.number_array(self.vertices, "vertices of the mesh", ("n", 3))
@@ -314,16 +336,50 @@ class Mesh:
             raise ValueError(f"triangles must be whole numbers of shape (m, 3), got shape {triangles.shape}")
         if triangles.size == 0 or triangles.min() < 0 or triangles.max() >= len(vertices):
             raise ValueError("triangles must be rows of vertices")
-        edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-        forth, back = {tuple(edge) for edge in edges.tolist()}, {(b, a) for a, b in edges.tolist()}
-        if len(forth) != len(edges) or forth != back:
-            raise ValueError(
-                "the mesh must be closed and its triangles equally oriented: each edge belongs to two of them"
-            )
+        _check_closed(vertices, triangles)
         object.__setattr__(self, "vertices", vertices)
         object.__setattr__(self, "triangles", triangles)
-        if self.volume <= 0.0:
-            raise ValueError("triangles must be counter-clockwise when seen from outside: the volume is negative")
+        if not self.volume > 0.0:
+            raise ValueError(
+                f"triangles of the mesh must be counter-clockwise when seen from outside, and enclose a volume, got "
+                f"{self.volume:.3g} m^3: swap two columns of triangles if it is negative"
+            )
+        _rounding(self.rounding, self._thinnest(), "mesh")
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str], *, scale: float = 1.0, rounding: float | None = None) -> Mesh:
+        """Read a mesh from a file, with the extra ``view``.
+
+        Parameters
+        ----------
+        path : path-like
+            STL, OBJ or PLY file, or another one that PyVista reads.
+        scale : float
+            Metres per unit of the file, for example 1e-3 of a file in millimetres.
+        rounding : float [m]
+            Radius of the edges where the mesh touches.
+
+        Returns
+        -------
+        Mesh
+
+        Raises
+        ------
+        FileNotFoundError
+            No such file.
+        ValueError
+            A file without triangles, or a surface that `Mesh` refuses.
+        ImportError
+            PyVista is not installed.
+        """
+        file = Path(path)
+        if not file.is_file():
+            raise FileNotFoundError(f"no such file: {file}")
+        read = extras.require("pyvista", "view").read(str(file)).extract_surface().triangulate().clean()
+        if read.n_cells == 0:
+            raise ValueError(f"{file} has no triangles")
+        triangles = np.asarray(read.faces).reshape(-1, 4)[:, 1:].astype(np.int64)
+        return cls(validation.positive(scale, "scale") * np.asarray(read.points, dtype=float), triangles, rounding)
 
     def _corners(self) -> tuple[FloatArray, FloatArray]:
         """Return the corners of the tetrahedra from the origin to each triangle, and their signed volumes."""
@@ -351,6 +407,20 @@ class Mesh:
         second = second / 20.0 / volumes.sum() - np.outer(self.center, self.center)
         return np.asarray(np.trace(second) * np.eye(3) - second)
 
+    def _thinnest(self) -> float:
+        """Return the smallest extent along an axis [m]."""
+        return float(np.ptp(np.asarray(self.vertices), axis=0).min())
+
+    @property
+    def core(self) -> Core:
+        """Edges and faces by which it touches.
+
+        Returns
+        -------
+        withe.common.polyhedra.Core
+        """
+        return polyhedron_core(*self.surface(), _rounding(self.rounding, self._thinnest(), "mesh"))
+
     def surface(self) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         """Return the surface for pictures.
 
@@ -363,9 +433,120 @@ class Mesh:
         return np.asarray(self.vertices), np.asarray(self.triangles)
 
 
-def _along_z(length: float) -> FloatArray:
-    """Return the ends of a segment along z, about the origin."""
-    return np.array([[0.0, 0.0, -0.5 * length], [0.0, 0.0, 0.5 * length]])
+@dataclass(frozen=True, eq=False)
+class Hull:
+    """The convex hull of points.
+
+    Parameters
+    ----------
+    points : array_like of shape (n, 3) [m]
+        At least four points that are not in one plane.
+    rounding : float [m]
+        Radius of the edges where the hull touches. By default 0.0002 of its thinnest extent along an axis.
+
+    Raises
+    ------
+    ValueError
+        Points in one plane, or a rounding of half of the thinnest extent and more.
+    """
+
+    points: npt.ArrayLike
+    rounding: float | None = None
+
+    def __post_init__(self) -> None:
+        points = validation.number_array(self.points, "points of the hull", ("n", 3))
+        object.__setattr__(self, "points", points)
+        spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+        if len(points) < 4 or spread[2] < 1e-9 * spread[0]:
+            raise ValueError("points of the hull must be at least four that are not in one plane")
+        hull = ConvexHull(points)
+        corners = points[hull.simplices]
+        ways = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        inward = np.einsum("ij,ij->i", ways, hull.equations[:, :3]) < 0.0
+        triangles = np.where(inward[:, None], hull.simplices[:, ::-1], hull.simplices)
+        used, rows = np.unique(triangles, return_inverse=True)
+        object.__setattr__(self, "_mesh", Mesh(points[used], rows.reshape(-1, 3), self.rounding))
+
+    @property
+    def _shape(self) -> Mesh:
+        return cast(Mesh, self.__dict__["_mesh"])
+
+    @property
+    def volume(self) -> float:
+        """Volume [m^3]."""
+        return self._shape.volume
+
+    @property
+    def center(self) -> FloatArray:
+        """Centre of mass, shape (3,) [m]."""
+        return self._shape.center
+
+    @property
+    def inertia_per_mass(self) -> FloatArray:
+        """Moment of inertia about the centre of mass over the mass, shape (3, 3) [m^2]."""
+        return self._shape.inertia_per_mass
+
+    @property
+    def core(self) -> Core:
+        """Edges and faces by which it touches.
+
+        Returns
+        -------
+        withe.common.polyhedra.Core
+        """
+        return self._shape.core
+
+    def surface(self) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+        """Return the surface for pictures.
+
+        Returns
+        -------
+        vertices : ndarray of shape (n, 3) [m]
+        triangles : ndarray of int, shape (m, 3)
+            Rows of the vertices, counter-clockwise from outside.
+        """
+        return self._shape.surface()
+
+
+def _check_closed(vertices: FloatArray, triangles: npt.NDArray[np.int64]) -> None:
+    """Refuse a surface that is open or that has triangles without area, and name triangles."""
+    corners = vertices[triangles]
+    double_areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    flat = np.flatnonzero(double_areas <= 1e-12 * sides**2)
+    if len(flat):
+        raise ValueError(f"triangles {flat[:5].tolist()} of the mesh have no area: remove them and their vertices")
+    owners: dict[tuple[int, int], int] = {}
+    twice = set()
+    for k, triangle in enumerate(triangles.tolist()):
+        for i in range(3):
+            edge = (triangle[i], triangle[(i + 1) % 3])
+            if edge in owners:
+                twice |= {owners[edge], k}
+            owners[edge] = k
+    wrong = sorted({k for (a, b), k in owners.items() if (b, a) not in owners} | twice)
+    if wrong:
+        raise ValueError(
+            "the mesh must be closed and its triangles equally oriented: each edge belongs to two of them, with "
+            f"opposite directions. Edges of triangles {wrong[:5]} do not. Vertices at one place must be one vertex"
+        )
+
+
+def _segment(length: float, radius: float) -> Core:
+    """Return the core of a ball or capsule along z, about the origin."""
+    return Core(np.array([[0.0, 0.0, -0.5 * length], [0.0, 0.0, 0.5 * length]]), np.array([[0, 1]]), radius)
+
+
+def _rounding(given: float | None, size: float, owner: str) -> float:
+    """Return the radius of rounded edges, by default from the thinnest side."""
+    if given is None:
+        return _SHARP * size
+    radius = validation.positive(given, f"rounding of the {owner}")
+    if radius >= 0.5 * size:
+        raise ValueError(
+            f"rounding of the {owner} must be less than half of its thinnest side, {size:g} m, got {radius:g} m"
+        )
+    return radius
 
 
 def _turned(radii: FloatArray, heights: FloatArray, sides: int = 48) -> tuple[FloatArray, npt.NDArray[np.int64]]:

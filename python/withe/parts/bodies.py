@@ -9,12 +9,13 @@ import numpy.typing as npt
 
 from withe import _core
 from withe.common import validation
+from withe.parts.body_surfaces import make_surface
 from withe.parts.directory import Directory
 from withe.parts.handles import UnionFind
-from withe.parts.kinds import BodyPart, BodySurface, JoinPart, ObstaclePart, SupportPart
+from withe.parts.kinds import BodyPart, JoinPart, SupportPart
 from withe.solids import Solid
 
-__all__ = ["describe_bodies", "describe_surfaces", "make_body", "surfaces_of"]
+__all__ = ["describe_bodies", "make_body"]
 
 FloatArray = npt.NDArray[np.float64]
 _OF_SOLIDS = ("volume", "center", "inertia_per_mass", "surface")
@@ -66,67 +67,14 @@ def make_body(
     surface = None
     core = getattr(solid, "core", None)
     if validation.truth(touches, f"touches of {owner}") and core is not None:
-        ends, radius = core
-        surface = BodySurface(
-            origin + ends @ axes.T,
-            radius,
-            None if friction is None else validation.non_negative(friction, f"friction of {owner}"),
-            None if restitution is None else validation.share(restitution, f"restitution of {owner}"),
-        )
+        surface = make_surface(core, owner, origin, axes, friction, restitution)
     elif friction is not None or restitution is not None:
         word = "restitution" if friction is None else "friction"
-        raise ValueError(f"{word} of {owner} has no effect, because it touches nothing: use a sphere or a capsule")
+        raise ValueError(
+            f"{word} of {owner} has no effect, because it touches nothing: use a sphere, capsule, box, hull or mesh"
+        )
     turned = axes @ moment @ axes.T
     return BodyPart(name, index, kilograms, turned, origin + axes @ middle, origin, axes, solid, surface)
-
-
-def surfaces_of(directory: Directory) -> list[BodyPart]:
-    """Bodies that touch others, in the order in which the engine has their surfaces after all rods."""
-    return [body for body in directory.all(BodyPart) if body.surface is not None]
-
-
-def describe_surfaces(directory: Directory) -> list[_core.RodDescription]:
-    """Surfaces of bodies for the engine: edges without mass and stiffness that their bodies carry.
-
-    Empty where they cannot touch anything, so that such a scene may be planar.
-    """
-    found = []
-    for body in surfaces_of(directory) if _may_touch(directory) else ():
-        surface = body.surface
-        assert surface is not None
-        way = surface.ends[1] - surface.ends[0]
-        length = float(np.linalg.norm(way))
-        description = _core.RodDescription()
-        description.name, description.body = body.name, body.index
-        description.nodes = [directory.row(node) for node in surface.nodes]
-        aside = np.cross(way, np.eye(3)[np.abs(way).argmin()])
-        description.directors = (aside / np.linalg.norm(aside))[None]
-        description.rest_lengths = description.arc_lengths = np.array([length])
-        description.contact_radius = np.array([surface.radius])
-        for word in ("stretch_stiffness", "twist_stiffness", "line_density", "rotary_inertia", "viscous_time", "drag"):
-            setattr(description, word, np.zeros(1))
-        description.bend_stiffness = np.zeros((1, 2))
-        description.fluid_radius = np.zeros(1)
-        description.natural_curvature, description.natural_twist = np.zeros((0, 2)), np.zeros(0)
-        description.friction = -1.0 if surface.friction is None else surface.friction
-        description.restitution = -1.0 if surface.restitution is None else surface.restitution
-        found.append(description)
-    return found
-
-
-def _may_touch(directory: Directory) -> bool:
-    """Return True if there is contact, or if parts that are not joined may pass through each other without it."""
-    contact = directory.contact
-    if contact.rods or contact.pairs or directory.all(ObstaclePart):
-        return True
-    if contact.rods is not None:
-        return False
-    rods = len(directory.layout.rods)
-    parts = UnionFind(rods + len(directory.all(BodyPart)))
-    place = [owner if owner >= 0 else rods - 1 - owner for join in directory.all(JoinPart) for owner, _ in join.nodes]
-    for first, second in zip(place[::2], place[1::2], strict=True):
-        parts.unite(first, second)
-    return len({parts.find(i) for i in range(rods + len(directory.all(BodyPart)))}) > 1
 
 
 def _inertia(value: npt.ArrayLike, owner: str) -> FloatArray:

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from withe import _core
 from withe.common import validation
-from withe.parts.bodies import surfaces_of
+from withe.parts.body_surfaces import surfaces_of
 from withe.parts.directory import Directory
 from withe.parts.friction import Coefficients, Friction, check_law, check_rolling, coefficients
 from withe.parts.handles import Body, Obstacle, Rod

@@ -8,7 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from withe import _core
-from withe.parts.bodies import describe_bodies, describe_surfaces
+from withe.parts.bodies import describe_bodies
+from withe.parts.body_surfaces import check_surfaces, describe_surfaces
 from withe.parts.contacts import describe_contact
 from withe.parts.directory import Directory
 from withe.parts.fluid import describe_fluid
@@ -60,6 +61,7 @@ def describe(directory: Directory, gravity: FloatArray, bending: Bending = "angl
     scene.added_mass = added_mass(directory, {mass.name: mass.mass for mass in directory.all(MassPart)})
     coefficients = {part.name: part.coefficient for part in directory.all(DragPart)}
     scene.rods = [_describe_rod(directory, rod, drag(directory, coefficients, rod)) for rod in rods]
+    check_surfaces(directory)
     scene.rods += describe_surfaces(directory)
     scene.bodies = describe_bodies(directory)
     scene.joints = [describe_joint(group) for group in groups(directory.all(JoinPart))]

@@ -114,14 +114,26 @@ class RodPart(Part):
 
 
 @dataclass(frozen=True, eq=False)
-class BodySurface:
-    """The surface of a rigid body that touches others: all points at a distance from a segment."""
+class BodyFace:
+    """A flat face of the surface of a body."""
 
-    ends: FloatArray  # of the segment as drawn, (2, 3) [m]
-    radius: float  # [m]
+    edge: int  # of the chain, along the normal, from a plane outwards
+    aside: int  # node of the chain; from the tail of that edge to its foot is the first axis of the outline
+    depth: float  # of that plane below the surface [m]
+    outline: FloatArray  # segments x0, y0, x1, y1; the second axis is normal x first, (k, 4) [m]
+
+
+@dataclass(frozen=True, eq=False)
+class BodySurface:
+    """The surface of a rigid body that touches others: all points at a distance from edges, and flat faces."""
+
+    points: FloatArray  # a chain of nodes as drawn, (n, 3) [m]
+    radii: FloatArray  # of its edges; 0: an edge that touches nothing, (n - 1,) [m]
+    faces: tuple[BodyFace, ...]
+    beside: list[list[int]]  # faces on the left and on the right of each edge; -1: none; empty without faces
     friction: float | None  # [-]; None: that of the scene
     restitution: float | None  # [-]
-    nodes: tuple[Pass, Pass] = ((-1, 0), (-1, 0))  # the ends among the points of the body
+    nodes: tuple[Pass, ...] = ()  # the chain among the points of the body
 
 
 @dataclass(frozen=True, eq=False)

@@ -346,8 +346,8 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         layout = self._directory.layout
         layout.add_body(part.center)
         if part.surface is not None:
-            first, second = (layout.body_point(index, end, -1.0) for end in part.surface.ends)
-            part = replace(part, surface=replace(part.surface, nodes=(first, second)))
+            nodes = tuple(layout.body_point(index, point, -1.0) for point in part.surface.points)
+            part = replace(part, surface=replace(part.surface, nodes=nodes))
         return cast(Body, self._directory.add(part))
 
     def add_robot(

@@ -1,0 +1,187 @@
+"""Edges and flat faces of closed surfaces of triangles, by which bodies touch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["Core", "inside", "polyhedron_core", "trails"]
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+# Sine of the angle between two triangles up to which they are one flat face.
+_FLAT = 1e-6
+# Depth of the planes of faces over the thinnest extent.
+_DEPTH = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Core:
+    """What a solid touches by: all points at a distance from segments, and flat faces.
+
+    Parameters
+    ----------
+    points : ndarray of shape (n, 3) [m]
+        Ends of segments.
+    segments : ndarray of int, shape (m, 2)
+        Rows of the ends.
+    radius : float [m]
+        Distance of the surface from the segments.
+    faces : tuple of (ndarray of shape (k, 2, 3) [m], ndarray of shape (3,))
+        Outline of each face as segments in the plane of the face, and the normal of the face.
+    depth : float [m]
+        Distance of the faces from planes inside of the solid that nothing may come to.
+    beside : ndarray of int, shape (m, 2)
+        Faces on the left and on the right of each segment, as seen from outside; empty without faces.
+    """
+
+    points: FloatArray
+    segments: IntArray
+    radius: float
+    faces: tuple[tuple[FloatArray, FloatArray], ...] = ()
+    depth: float = 0.0
+    beside: IntArray = field(default_factory=lambda: np.zeros((0, 2), dtype=np.int64))
+
+
+def polyhedron_core(vertices: FloatArray, triangles: IntArray, rounding: float) -> Core:
+    """Return the core of a closed surface whose convex edges are rounded.
+
+    Parameters
+    ----------
+    vertices : ndarray of shape (n, 3) [m]
+    triangles : ndarray of int, shape (m, 3)
+        Counter-clockwise from outside.
+    rounding : float [m]
+        Radius of the rounded edges.
+
+    Returns
+    -------
+    Core
+        Its segments are the convex edges, moved inwards so that rounded edges end where faces are. Its faces are as
+        drawn: the corners of equal boxes on each other lie within them.
+    """
+    vertices, triangles = _welded(vertices, triangles)
+    corners = vertices[triangles]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    owner = {(int(t[i]), int(t[(i + 1) % 3])): k for k, t in enumerate(triangles) for i in range(3)}
+    face = np.arange(len(triangles))
+    for (a, b), k in owner.items():
+        other = owner[b, a]
+        if a < b and np.linalg.norm(np.cross(normals[k], normals[other])) < _FLAT and normals[k] @ normals[other] > 0.0:
+            _unite(face, k, other)
+    face = np.array([_root(face, k) for k in range(len(face))])
+    inset = vertices + _offsets(vertices, triangles, normals, face, -rounding)
+    sharp = [
+        (a, b)
+        for (a, b), k in owner.items()
+        if a < b
+        and face[k] != face[owner[b, a]]
+        and np.cross(normals[k], normals[owner[b, a]]) @ (vertices[b] - vertices[a]) > 0.0
+    ]
+    roots = np.unique(face)
+    outlines = []
+    for root in roots:
+        ways = [way for way, k in owner.items() if face[k] == root and face[owner[way[1], way[0]]] != root]
+        outlines.append((vertices[np.array(ways)], normals[root]))
+    beside = np.searchsorted(roots, np.array([(face[owner[a, b]], face[owner[b, a]]) for a, b in sharp]).reshape(-1, 2))
+    return Core(
+        inset,
+        np.array(sharp, dtype=np.int64).reshape(-1, 2),
+        rounding,
+        tuple(outlines),
+        _DEPTH * float(np.ptp(vertices, axis=0).min()),
+        beside,
+    )
+
+
+def trails(segments: IntArray) -> list[int]:
+    """Return segments as one walk, as few steps longer as is easy.
+
+    Parameters
+    ----------
+    segments : ndarray of int, shape (m, 2)
+
+    Returns
+    -------
+    list of int
+        Points of the walk, one after the other. Two points that follow each other are a segment the first time that
+        they are one of `segments`, else a jump.
+    """
+    left: dict[int, set[int]] = {point: set() for point in segments.ravel().tolist()}
+    for a, b in segments.tolist():
+        left[a].add(b)
+        left[b].add(a)
+    starts = sorted(left, key=lambda point: len(left[point]) % 2 == 0)  # a walk from an odd point is longer
+    walk: list[int] = []
+    for start in starts:
+        while left[start]:
+            here = start
+            walk.append(here)
+            while left[here]:
+                there = min(left[here])
+                left[here].discard(there)
+                left[there].discard(here)
+                walk.append(there)
+                here = there
+    return walk
+
+
+def inside(vertices: FloatArray, triangles: IntArray, points: FloatArray) -> npt.NDArray[np.bool_]:
+    """Return which points are inside of a closed surface.
+
+    Parameters
+    ----------
+    vertices : ndarray of shape (n, 3) [m]
+    triangles : ndarray of int, shape (m, 3)
+    points : ndarray of shape (k, 3) [m]
+
+    Returns
+    -------
+    ndarray of bool, shape (k,)
+
+    References
+    ----------
+    A. van Oosterom and J. Strackee, The solid angle of a plane triangle, IEEE Trans. Biomed. Eng. 30 (1983) 125-126.
+    """
+    found = np.zeros(len(points), dtype=bool)
+    near = ((points > vertices.min(axis=0)) & (points < vertices.max(axis=0))).all(axis=1)
+    for k in np.flatnonzero(near):
+        a, b, c = np.moveaxis(vertices[triangles] - points[k], 1, 0)
+        la, lb, lc = (np.linalg.norm(side, axis=1) for side in (a, b, c))
+        volume = np.einsum("ij,ij->i", a, np.cross(b, c))
+        scale = la * lb * lc + (a * b).sum(1) * lc + (b * c).sum(1) * la + (c * a).sum(1) * lb
+        found[k] = 2.0 * np.arctan2(volume, scale).sum() > 2.0 * np.pi
+    return found
+
+
+def _welded(vertices: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray]:
+    """Return a surface without repeated vertices."""
+    places, rows = np.unique(vertices, axis=0, return_inverse=True)
+    return places, np.asarray(rows).reshape(-1)[triangles]
+
+
+def _offsets(vertices: FloatArray, triangles: IntArray, normals: FloatArray, face: IntArray, by: float) -> FloatArray:
+    """Return how far vertices move as all faces move along their normals."""
+    around: list[set[int]] = [set() for _ in vertices]
+    for k, triangle in enumerate(triangles):
+        for vertex in triangle:
+            around[vertex].add(int(face[k]))
+    moved = np.zeros_like(vertices)
+    for i, faces in enumerate(around):
+        of_faces = normals[sorted(faces)]
+        moved[i] = np.linalg.pinv(of_faces, rcond=0.1) @ np.full(len(of_faces), by)
+    return moved
+
+
+def _root(parents: IntArray, k: int) -> int:
+    while parents[k] != k:
+        k = int(parents[k])
+    return k
+
+
+def _unite(parents: IntArray, a: int, b: int) -> None:
+    a, b = _root(parents, a), _root(parents, b)
+    parents[max(a, b)] = min(a, b)

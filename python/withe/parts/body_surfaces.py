@@ -1,0 +1,167 @@
+"""Surfaces of rigid bodies that touch: how they are made, and described to the engine."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import numpy.typing as npt
+
+from withe import _core
+from withe.common import validation
+from withe.common.polyhedra import Core, inside, trails
+from withe.parts.directory import Directory
+from withe.parts.handles import UnionFind
+from withe.parts.kinds import BodyFace, BodyPart, BodySurface, JoinPart, ObstaclePart, RodPart
+
+__all__ = ["check_surfaces", "describe_surfaces", "make_surface", "surfaces_of"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def make_surface(
+    core: Core, owner: str, origin: FloatArray, axes: FloatArray, friction: float | None, restitution: float | None
+) -> BodySurface:
+    """Make the surface of a body from the core of its solid; see `Scene.add_body`.
+
+    It is one chain of nodes: a walk along the segments of the core, and the normals of its faces. Edges that only
+    connect others have no radius.
+    """
+    walk = trails(core.segments)
+    left = {frozenset(segment): k for k, segment in enumerate(core.segments.tolist())}
+    radii, beside = [], []
+    for tail, head in itertools.pairwise(walk):
+        segment = left.pop(frozenset((tail, head)), None)
+        radii.append(0.0 if segment is None else core.radius)
+        faces_beside = [-1, -1] if segment is None or not core.faces else core.beside[segment].tolist()
+        is_reversed = segment is not None and core.segments[segment, 0] != tail
+        beside.append(faces_beside[::-1] if is_reversed else faces_beside)
+    points = [core.points[walk]]
+    faces = []
+    for surface, normal in core.faces:
+        outline = surface - core.depth * normal
+        middle = 0.5 * (outline.min(axis=(0, 1)) + outline.max(axis=(0, 1)))
+        middle += ((outline[0, 0] - middle) @ normal) * normal
+        size = float(np.linalg.norm(outline - middle, axis=-1).max())
+        ways = core.points[walk] - middle
+        flat = ways - (ways @ normal)[:, None] * normal
+        aside = int(np.linalg.norm(flat, axis=1).argmax())
+        first = flat[aside] / np.linalg.norm(flat[aside])
+        plane = (outline - middle) @ np.column_stack([first, np.cross(normal, first)])
+        radii += [0.0, 0.0]
+        beside += [[-1, -1], [-1, -1]]
+        points.append(np.array([middle, middle + size * normal]))
+        faces.append(BodyFace(len(radii) - 1, aside, core.depth, plane.reshape(-1, 4)))
+    return BodySurface(
+        origin + np.concatenate(points) @ axes.T,
+        np.array(radii),
+        tuple(faces),
+        beside if faces else [],
+        None if friction is None else validation.non_negative(friction, f"friction of {owner}"),
+        None if restitution is None else validation.share(restitution, f"restitution of {owner}"),
+    )
+
+
+def surfaces_of(directory: Directory) -> list[BodyPart]:
+    """Bodies that touch others, in the order in which the engine has their surfaces after all rods."""
+    return [body for body in directory.all(BodyPart) if body.surface is not None]
+
+
+def describe_surfaces(directory: Directory) -> list[_core.RodDescription]:
+    """Surfaces of bodies for the engine: edges without mass and stiffness that their bodies carry.
+
+    Empty where they cannot touch anything, so that such a scene may be planar.
+    """
+    found = []
+    for body in surfaces_of(directory) if _may_touch(directory) else ():
+        surface = body.surface
+        assert surface is not None
+        ways = np.diff(surface.points, axis=0)
+        lengths = np.linalg.norm(ways, axis=1)
+        aside = np.cross(ways, np.eye(3)[np.abs(ways).argmin(axis=1)])
+        edges = len(ways)
+        description = _core.RodDescription()
+        description.name, description.body = body.name, body.index
+        description.nodes = [directory.row(node) for node in surface.nodes]
+        description.directors = aside / np.linalg.norm(aside, axis=1)[:, None]
+        description.rest_lengths = description.arc_lengths = lengths
+        description.contact_radius = surface.radii
+        for word in ("stretch_stiffness", "twist_stiffness", "line_density", "rotary_inertia", "viscous_time", "drag"):
+            setattr(description, word, np.zeros(edges))
+        description.bend_stiffness = np.zeros((edges, 2))
+        description.fluid_radius = np.zeros(edges)
+        description.natural_curvature, description.natural_twist = np.zeros((edges - 1, 2)), np.zeros(edges - 1)
+        description.friction = -1.0 if surface.friction is None else surface.friction
+        description.restitution = -1.0 if surface.restitution is None else surface.restitution
+        description.faces = [_describe_face(face) for face in surface.faces]
+        description.edge_faces = surface.beside
+        found.append(description)
+    return found
+
+
+def check_surfaces(directory: Directory) -> None:
+    """Refuse what faces of bodies do not touch, and rods that are drawn inside of bodies.
+
+    Raises
+    ------
+    ValueError
+        A sphere or capsule as an obstacle beside a body with faces, or a rod inside of such a body.
+    """
+    with_faces = [body for body in surfaces_of(directory) if body.surface is not None and body.surface.faces]
+    for body in with_faces:
+        for obstacle in directory.all(ObstaclePart):
+            if obstacle.kind == "capsule" and not _ignored(directory, body.name, obstacle.name):
+                raise ValueError(
+                    f"obstacle {obstacle.name!r} does not touch the faces of body {body.name!r}. Add it as a body, by "
+                    "add_body and a sphere or capsule of withe.solids, and hold it with clamp; or leave the pair out "
+                    "with ignore_contact"
+                )
+    if not directory.contact.rods:
+        return
+    joined = {
+        frozenset((first, second))
+        for join in directory.all(JoinPart)
+        for first, second in itertools.pairwise(owner for owner, _ in join.nodes)
+    }
+    for body in with_faces:
+        vertices, triangles = body.solid.surface()
+        for rod in directory.all(RodPart):
+            if frozenset((rod.index, -1 - body.index)) in joined or _ignored(directory, body.name, rod.name):
+                continue
+            places = (rod.points - body.position) @ body.rotation
+            nodes = np.flatnonzero(inside(vertices, triangles, places))
+            if len(nodes):
+                raise ValueError(
+                    f"node {nodes[0]} of rod {rod.name!r} is drawn inside of body {body.name!r}: draw them apart, join "
+                    "them, or leave the pair out with ignore_contact"
+                )
+
+
+def _ignored(directory: Directory, first: str, second: str) -> bool:
+    """Return True if two parts may not touch each other."""
+    contact = directory.contact
+    pair = contact.pairs.get((first, second)) or contact.pairs.get((second, first))
+    groups = contact.groups
+    return (pair is not None and pair.ignored) or (first in groups and groups.get(first) == groups.get(second))
+
+
+def _describe_face(face: BodyFace) -> _core.FaceDescription:
+    description = _core.FaceDescription()
+    description.edge, description.aside = face.edge, face.aside
+    description.depth, description.outline = face.depth, face.outline
+    return description
+
+
+def _may_touch(directory: Directory) -> bool:
+    """Return True if there is contact, or if parts that are not joined may pass through each other without it."""
+    contact = directory.contact
+    if contact.rods or contact.pairs or directory.all(ObstaclePart):
+        return True
+    if contact.rods is not None:
+        return False
+    rods = len(directory.layout.rods)
+    parts = UnionFind(rods + len(directory.all(BodyPart)))
+    place = [owner if owner >= 0 else rods - 1 - owner for join in directory.all(JoinPart) for owner, _ in join.nodes]
+    for first, second in zip(place[::2], place[1::2], strict=True):
+        parts.unite(first, second)
+    return len({parts.find(i) for i in range(rods + len(directory.all(BodyPart)))}) > 1

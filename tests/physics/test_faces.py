@@ -1,0 +1,318 @@
+"""Bodies with flat faces: boxes that slide, tip, rock, stack and meet, and what lies on them."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import withe
+from cases import measured
+
+Array = npt.NDArray[np.float64]
+G = 9.81
+BLOCK = (0.04, 0.04, 0.10)
+
+
+def on_slope(degrees: float) -> Array:
+    """Return gravity on a slope that falls along x."""
+    angle = np.radians(degrees)
+    return G * np.array([np.sin(angle), 0.0, -np.cos(angle)])
+
+
+def table(scene: withe.Scene, friction: float) -> withe.Body:
+    """Add a held box whose upper face is at z = 0."""
+    body = scene.add_body(withe.solids.Box((1.0, 1.0, 0.1)), density=1000, position=(0, 0, -0.05))
+    scene.clamp(body)
+    scene.enable_contact(friction=friction)
+    return body
+
+
+def ground(scene: withe.Scene, kind: str, friction: float) -> None:
+    """Add a floor, or a table."""
+    if kind == "floor":
+        scene.add_floor(friction=friction)
+    else:
+        table(scene, friction)
+
+
+@pytest.mark.parametrize("kind", ["floor", "table"])
+@pytest.mark.case("bodies", "Box that slides down a slope", source="g (sin 20 - 0.2 cos 20 degrees)")
+def test_a_box_slides_down_a_slope(kind: str) -> None:
+    """With the acceleration of Coulomb's law, and does not turn."""
+    scene = withe.Scene(gravity=on_slope(20.0))
+    ground(scene, kind, 0.2)
+    box = scene.add_body(withe.solids.Box((0.1, 0.08, 0.04)), density=1000, position=(0, 0, 0.02), friction=0.2)
+    simulation = scene.build(time_step=2e-3)
+    simulation.step(150)
+    way = 0.5 * 0.3**2 * G * (np.sin(np.radians(20.0)) - 0.2 * np.cos(np.radians(20.0)))
+    error = abs(simulation.position(box)[0] / way - 1.0)
+    measured(error)
+    assert error < 1e-6
+    np.testing.assert_allclose(simulation.rotation(box), np.eye(3), atol=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["floor", "table"])
+@pytest.mark.case("bodies", "Least friction that holds a box", source="tan 20 degrees", error="1e-3")
+def test_a_box_slides_below_the_angle_of_friction_only(kind: str) -> None:
+    """The threshold is within a thousandth."""
+    moved = []
+    for share in (0.999, 1.001):
+        mu = share * np.tan(np.radians(20.0))
+        scene = withe.Scene(gravity=on_slope(20.0))
+        ground(scene, kind, mu)
+        box = scene.add_body(withe.solids.Box((0.1, 0.08, 0.04)), density=1000, position=(0, 0, 0.02), friction=mu)
+        simulation = scene.build(time_step=2e-3)
+        simulation.step(500)
+        moved.append(simulation.position(box)[0])
+    assert moved[0] > 1e-3
+    assert moved[1] < 1e-6
+
+
+@pytest.mark.parametrize("kind", ["floor", "table"])
+@pytest.mark.case("bodies", "Slope on which a box tips", source="arctan(b / h)", error="0.02 degrees")
+def test_a_box_tips_from_its_edge(kind: str) -> None:
+    """The threshold is within 0.02 degrees, rounded edges included."""
+    leaning = []
+    for degrees in (21.78, 21.82):
+        scene = withe.Scene(gravity=on_slope(degrees))
+        ground(scene, kind, 1.0)
+        box = scene.add_body(withe.solids.Box(BLOCK), density=1000, position=(0, 0, 0.05), friction=1.0)
+        simulation = scene.build(time_step=2e-3)
+        most = 0.0
+        for _ in range(10):
+            simulation.step(100)
+            most = max(most, float(simulation.rotation(box)[0, 2]))
+        leaning.append(most)
+    assert leaning[0] < 1e-3
+    assert leaning[1] > 0.1
+
+
+@pytest.mark.case("bodies", "Rocking block, first quarter", source="Housner 1963, elliptic integral")
+def test_a_block_rocks() -> None:
+    """From half of the angle at which it would fall, until it strikes with its other edge."""
+    base, height = BLOCK[0], BLOCK[2]
+    half = np.arctan2(base, height)
+    angle = 0.5 * half
+    rate = np.sqrt(3.0 * G / (2.0 * np.hypot(base, height)))
+    u = np.sqrt(angle) * (0.5 - 0.5 * np.cos(np.pi * (np.arange(2000) + 0.5) / 2000))
+    weights = np.sqrt(angle) * 0.5 * np.sin(np.pi * (np.arange(2000) + 0.5) / 2000) * np.pi / 2000
+    fall = np.cos(half - angle) - np.cos(half - angle + u**2)
+    exact = float((2.0 * u / (rate * np.sqrt(2.0 * fall)) * weights).sum())
+    turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
+    scene = withe.Scene(gravity=(0, 0, -G))
+    table(scene, 2.0)
+    place = turn @ [-0.5 * base, 0, 0.5 * height] + np.array([0, 0, 1e-9])
+    box = scene.add_body(withe.solids.Box(BLOCK), density=1000, position=place, rotation=turn, restitution=0.0)
+    simulation = scene.build(time_step=2e-4)
+    times, leans = [], []
+    while simulation.time < 0.13:
+        simulation.step(1)
+        times.append(simulation.time)
+        leans.append(np.arcsin(simulation.rotation(box)[0, 2]))
+    upright = int(np.argmax(np.array(leans) < 0.0))
+    found = float(np.interp(0.0, leans[upright - 1 : upright + 1][::-1], times[upright - 1 : upright + 1][::-1]))
+    before, after = np.diff(leans)[[upright - 8, upright + 12]] / 2e-4
+    measured(abs(found / exact - 1.0))
+    assert found == pytest.approx(exact, rel=1e-3)
+    assert after / before == pytest.approx(1.0 - 1.5 * np.sin(half) ** 2, rel=0.04)
+
+
+@pytest.mark.case("bodies", "Block on a wedge that slides", source="m g sin a cos a / (M + m sin^2 a)")
+def test_a_block_pushes_a_wedge_aside() -> None:
+    """Hulls on a box and on a floor, without friction."""
+    angle = np.radians(30.0)
+    rise = 0.2 * np.tan(angle)
+    corners = [(x, y, z) for y in (-0.1, 0.1) for x, z in ((0, 0), (0.2, 0), (0.2, rise))]
+    turn = np.array([[np.cos(angle), 0, -np.sin(angle)], [0, 1, 0], [np.sin(angle), 0, np.cos(angle)]])
+    scene = withe.Scene(gravity=(0, 0, -G))
+    scene.add_floor()
+    scene.enable_contact()
+    wedge = scene.add_body(withe.solids.Hull(corners), mass=1.0)
+    place = np.array([0.15, 0, 0.15 * np.tan(angle)]) + turn @ [0, 0, 0.02]
+    scene.add_body(withe.solids.Box((0.04, 0.04, 0.04)), mass=1.0, position=place, rotation=turn)
+    simulation = scene.build(time_step=1e-3)
+    simulation.step(100)
+    exact = G * np.sin(angle) * np.cos(angle) / (1.0 + np.sin(angle) ** 2)
+    error = abs(simulation.velocity(wedge)[0] / (0.1 * exact) - 1.0)
+    measured(error)
+    assert error < 1e-4
+
+
+@pytest.mark.parametrize("ratio", [1.0, 100.0])
+def test_ten_boxes_stand(ratio: float) -> None:
+    """Equal boxes on each other, also with a heavy one on top."""
+    scene = withe.Scene()
+    scene.add_floor(friction=0.5)
+    scene.enable_contact(friction=0.5)
+    side = 0.05
+    boxes = [
+        scene.add_body(
+            withe.solids.Box((0.1, 0.1, side)),
+            density=1000 * (ratio if k == 9 else 1.0),
+            position=(0, 0, (k + 0.5) * side),
+        )
+        for k in range(10)
+    ]
+    simulation = scene.build(time_step=4e-3)
+    simulation.step(50)
+    before = np.array([simulation.position(box) for box in boxes])
+    simulation.step(200)
+    np.testing.assert_allclose([simulation.position(box) for box in boxes], before, atol=1e-7)
+    forces = simulation.contacts()["normal_force"].sum()
+    weights = np.array([1.0] * 9 + [ratio]) * 1000 * 0.1 * 0.1 * side * G
+    assert forces == pytest.approx(np.cumsum(weights[::-1]).sum(), rel=1e-3)
+
+
+def test_boxes_cross_without_corners_on_each_other() -> None:
+    """A long box across another one rests where their edges cross."""
+    scene = withe.Scene()
+    scene.add_floor(friction=0.5)
+    scene.enable_contact(friction=0.5)
+    long = withe.solids.Box((0.4, 0.04, 0.04))
+    scene.add_body(long, density=1000, position=(0, 0, 0.02))
+    upper = scene.add_body(long, density=1000, position=(0, 0, 0.06), rotation=(np.sqrt(0.5), 0, 0, np.sqrt(0.5)))
+    simulation = scene.build(time_step=2e-3)
+    simulation.step(500)
+    np.testing.assert_allclose(simulation.position(upper), (0, 0, 0.06), atol=1e-5)
+
+
+@pytest.mark.parametrize("triangles", [1, 20])
+def test_a_ball_does_not_notice_triangles(triangles: int) -> None:
+    """A plate of 12 and of 1,760 triangles, to rounding."""
+    scene = withe.Scene(gravity=(1.0, 0.3, -G))
+    plate = scene.add_body(divided_plate(triangles), density=1000)
+    scene.clamp(plate)
+    scene.enable_contact(friction=0.5)
+    ball = scene.add_body(withe.solids.Sphere(0.02), density=1000, position=(-0.3, -0.1, 0.02))
+    simulation = scene.build(time_step=2e-3)
+    simulation.step(200)
+    way = 0.5 * 0.4**2 * 5.0 / 7.0 * np.array([1.0, 0.3])
+    np.testing.assert_allclose(simulation.position(ball)[:2] - (-0.3, -0.1), way, rtol=1e-3)
+    assert len(simulation.contacts()) == 1
+
+
+def divided_plate(n: int) -> withe.solids.Mesh:
+    """Return a plate below z = 0, with n x n squares on both faces."""
+    grid = np.linspace(-0.5, 0.5, n + 1)
+    top = np.array([(x, y, 0.0) for x in grid for y in grid])
+    count = len(top)
+    triangles = []
+    for i in range(n):
+        for j in range(n):
+            a, b = i * (n + 1) + j, (i + 1) * (n + 1) + j
+            for triangle in ((a, b, b + 1), (a, b + 1, a + 1)):
+                triangles += [triangle, tuple(count + k for k in triangle[::-1])]
+    rim = [i * (n + 1) for i in range(n)] + [n * (n + 1) + j for j in range(n)]
+    rim += [i * (n + 1) + n for i in range(n, 0, -1)] + list(range(n, -1, -1))
+    for a, b in zip(rim, rim[1:], strict=False):
+        triangles += [(a, count + a, count + b), (a, count + b, b)]
+    return withe.solids.Mesh(np.concatenate([top, top - (0, 0, 0.05)]), np.array(triangles))
+
+
+def cloud(seed: int, friction: float) -> tuple[withe.Scene, list[tuple[withe.Rod | withe.Body, Array, Array | None]]]:
+    """Draw three rods and five bodies, most of them boxes, that fly at each other."""
+    draw = np.random.default_rng(seed)
+    scene = withe.Scene(gravity=(0, 0, 0))
+    scene.enable_contact(friction=friction)
+    rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+    axes = np.concatenate([np.eye(3), -np.eye(3), np.full((1, 3), 0.577), np.full((1, 3), -0.577)])
+    draw.shuffle(axes)
+    things: list[tuple[withe.Rod | withe.Body, Array, Array | None]] = []
+    for i, axis in enumerate(axes):
+        place = 0.13 * axis + draw.normal(size=3) * 0.005
+        turn = np.linalg.qr(draw.normal(size=(3, 3)))[0]
+        turn *= np.linalg.det(turn)
+        velocity = -0.5 * axis + draw.normal(size=3) * 0.05
+        if i < 3:
+            half = 0.05 * turn[:, 0]
+            rod = scene.add_rod(start=place - half, end=place + half, nodes=11, radius=0.004, material=rubber)
+            things.append((rod, velocity, None))
+            continue
+        sides = draw.uniform(0.015, 0.05, 3)
+        solids = [withe.solids.Box(tuple(sides)), withe.solids.Sphere(0.5 * sides[0])]
+        solid = solids[int(draw.random() < 0.25)]
+        body = scene.add_body(solid, density=10.0 ** draw.uniform(2.0, 4.0), position=place, rotation=turn)
+        things.append((body, velocity, draw.normal(size=3) * 15.0))
+    return scene, things
+
+
+@pytest.mark.filterwarnings("ignore::withe.CoarseStepWarning")
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+@pytest.mark.parametrize("seed", range(5))
+def test_boxes_and_rods_that_meet_keep_momenta_and_energy(seed: int, friction: float) -> None:
+    """Both momenta, and the balance of energy."""
+    scene, things = cloud(seed, friction)
+    simulation = scene.build(time_step=1e-3)
+    for thing, velocity, spin in things:
+        if isinstance(thing, withe.Body):
+            simulation.set_velocity(thing, velocity, angular=spin)
+        else:
+            simulation.set_velocities(thing, np.tile(velocity, (11, 1)))
+    before, energy = simulation.momentum(), simulation.energy().total
+    scale = 2.0 * energy / 0.5  # sum of the moduli of linear momenta; times the size of the scene of angular ones
+    met: set[tuple[str, ...]] = set()
+    for _ in range(30):
+        simulation.step(10)
+        met |= {tuple(pair) for pair in simulation.contacts()["pair"]}
+    after, now = simulation.momentum(), simulation.energy()
+    assert len(met) >= 3
+    np.testing.assert_allclose(after.linear, before.linear, atol=1e-9 * scale)
+    np.testing.assert_allclose(after.angular, before.angular, atol=1e-7 * 0.13 * scale)
+    assert now.total + now.dissipated == pytest.approx(energy, rel=1e-6)
+    if friction == 0.0:
+        assert now.total == pytest.approx(energy, rel=1e-3)
+    else:
+        assert now.dissipated > 0.01 * energy
+
+
+def test_what_lies_on_a_box_does_not_depend_on_the_axes_of_the_scene() -> None:
+    """A rod and a box slide on a held box, in two orientations of the whole scene."""
+    turn = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))[0]
+    turn *= np.linalg.det(turn)
+    found = []
+    for axes in (np.eye(3), turn):
+        scene = withe.Scene(gravity=axes @ on_slope(15.0))
+        below = scene.add_body(
+            withe.solids.Box((0.5, 0.5, 0.1)), density=1000, position=axes @ [0, 0, -0.05], rotation=axes
+        )
+        scene.clamp(below)
+        scene.enable_contact(friction=0.1)
+        rubber = withe.Material(youngs_modulus=1e7, density=1000.0)
+        ends = [axes @ [-0.05, y, 0.004] for y in (-0.05, 0.04)]
+        rod = scene.add_rod(start=ends[0], end=ends[1], nodes=9, radius=0.004, material=rubber)
+        place = axes @ [0.1, 0.02, 0.015]
+        box = scene.add_body(withe.solids.Box((0.05, 0.04, 0.03)), density=1000, position=place, rotation=axes)
+        simulation = scene.build(time_step=1e-3, planar=False)
+        simulation.step(100)
+        found.append(np.concatenate([simulation.positions(rod), simulation.position(box)[None]]) @ axes)
+    np.testing.assert_allclose(found[1], found[0], atol=1e-8)
+
+
+def test_balls_pass_on_their_speed() -> None:
+    """Newton's cradle without weight: only the last of six balls goes on."""
+    radius = 0.02
+    scene = withe.Scene(gravity=(0, 0, 0))
+    scene.enable_contact()
+    places = [-0.06, *(2.0 * radius * 1.01 * np.arange(5))]
+    balls = [scene.add_body(withe.solids.Sphere(radius), density=7800, position=(x, 0, 0)) for x in places]
+    simulation = scene.build(time_step=1e-3)
+    simulation.set_velocity(balls[0], (1, 0, 0))
+    simulation.step(150)
+    np.testing.assert_allclose([simulation.velocity(ball)[0] for ball in balls], [0, 0, 0, 0, 0, 1], atol=1e-4)
+
+
+def test_a_rope_slides_over_the_edge_of_a_table() -> None:
+    """It falls off as a whole, and no node enters the table."""
+    scene = withe.Scene(gravity=(0, 0, -G))
+    below = scene.add_body(withe.solids.Box((0.4, 0.4, 0.1)), density=1000, position=(-0.2, 0, -0.05))
+    scene.clamp(below)
+    scene.enable_contact(friction=0.2)
+    soft = withe.Material(youngs_modulus=1e6, density=1000.0)
+    rope = scene.add_rod(start=(-0.2, 0, 0.004), end=(0.2, 0, 0.004), nodes=41, radius=0.004, material=soft)
+    simulation = scene.build(time_step=2e-3)
+    for _ in range(20):
+        simulation.step(10)
+        x, z = simulation.positions(rope)[:, [0, 2]].T
+        assert not ((x < -1e-4) & (z < 0.0039) & (z > -0.1)).any()
+    assert z.max() < -0.05
