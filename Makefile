@@ -20,6 +20,8 @@ export PATH := $(VENV)/bin:$(PATH)
 export CMAKE_BUILD_PARALLEL_LEVEL ?= $(JOBS)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 unexport PYTHONPATH PYTHONHOME
+# Packages are installed without bytecode. Python must keep what it compiles, or each process compiles torch or VTK anew.
+unexport PYTHONDONTWRITEBYTECODE
 # One at a time, also with `make --jobs`. Python compiles modules when it first imports them; most never are.
 PIP_INSTALL := flock $(VENV) python -m pip install --quiet --no-compile --constraint constraints.txt
 requirements = $$(python tools/requirements.py $(1))

@@ -68,7 +68,7 @@ def _points(name: str) -> np.ndarray:
 
 def _friction(report: Report, quick: bool) -> None:
     """Needed coefficients of the seven patterns: on the floor, at lift-off, and there with a push along the cable."""
-    names = PATTERNS[:2] if quick else PATTERNS
+    names = PATTERNS[1:2] if quick else PATTERNS
     numbers = (2,) if quick else (1, 2, 3)
     rows, saved = [], []
     with bar(len(names) * len(numbers), "patterns") as shown:

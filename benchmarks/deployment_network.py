@@ -29,14 +29,15 @@ def compare(report: Report, quick: bool) -> None:
     """The small network, the dissertation's and exact grasps side by side, where all are new, and on the table."""
     if not networks.torch_is_there():
         return
-    new, table = _new(500 if quick else 10_000), _table()
+    asked = _new(200 if quick else 10_000), _table()
+    exact = [deployment.grasp(*each) for each in asked]
     pattern = _pattern()
     with networks.one_thread():
         rows = [("exact", *[""] * 5, *_times(deployment.grasp, pattern, 1 if quick else 5), "")]
         for name, network in networks.loaded(
             deployment.GraspNetwork, deployment.train, "deployment", quick, 500
         ).items():
-            here, there = (errors(network(*asked), deployment.grasp(*asked)) for asked in (new, table))
+            here, there = (errors(network(*each), known) for each, known in zip(asked, exact, strict=True))
             size, spent = networks.size_and_training(network, SHIPPED if name == "small" else None)
             cells = networks.cells(found[key] for found in (here, there) for key in GOALS)
             times = _times(network, pattern, 1 if quick else 20)

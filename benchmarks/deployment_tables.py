@@ -407,7 +407,8 @@ def main() -> None:
         Run(name, number, friction, way, seed, nodes)
         for number, way, name, friction, seed in product(cables, noisy_ways, names, frictions, range(trials))
     ]
-    runs = laid(wanted, patterns, Lines("deployment_tables", resume=options.resume or options.known), options.known)
+    known, workers = options.known, 1 if options.quick else os.cpu_count() or 1
+    runs = laid(wanted, patterns, Lines("deployment_tables", resume=options.resume or options.known), known, workers)
     if len(runs) < len(wanted):
         report.figures["interrupted"] = f"{len(runs)} of {len(wanted)} runs"
     cells = cells_of(runs, patterns, trials)
@@ -434,18 +435,18 @@ def carried_out_here(run: Run) -> Run:
     return carried_out(run, _here[0])
 
 
-def laid(wanted: list[Run], patterns: Patterns, lines: Lines, known: bool) -> list[Run]:
-    """Carry out the requested runs, and print and write each at its end. Return the completed ones."""
+def laid(wanted: list[Run], patterns: Patterns, lines: Lines, known: bool, workers: int) -> list[Run]:
+    """Carry out runs in `workers` processes, and print and write each at its end. Return the completed ones."""
     done = {(run.key, run.seed, run.nodes): run for run in (Run(**line) for line in lines.known)}
     left = [run for run in wanted if (run.key, run.seed, run.nodes) not in done]
     if not known and left:
         os.environ.setdefault("OMP_NUM_THREADS", "1")  # for workers, also for torch
-        workers = ProcessPoolExecutor(
-            min(os.cpu_count() or 1, len(left)), get_context("spawn"), initializer=begin, initargs=(patterns.nodes,)
+        pool = ProcessPoolExecutor(
+            min(workers, len(left)), get_context("spawn"), initializer=begin, initargs=(patterns.nodes,)
         )
         try:
             with bar(len(left), "laying", "runs") as shown:
-                for ended in as_completed([workers.submit(carried_out_here, run) for run in left]):
+                for ended in as_completed([pool.submit(carried_out_here, run) for run in left]):
                     found = ended.result()
                     done[found.key, found.seed, found.nodes] = found
                     lines.add(asdict(found))
@@ -454,7 +455,7 @@ def laid(wanted: list[Run], patterns: Patterns, lines: Lines, known: bool) -> li
         except KeyboardInterrupt:
             print("\ninterrupted: --resume goes on", flush=True)
         finally:
-            workers.shutdown(cancel_futures=True)
+            pool.shutdown(cancel_futures=True)
     return [done[name] for run in wanted if (name := (run.key, run.seed, run.nodes)) in done]
 
 

@@ -42,7 +42,7 @@ def loaded(kind: Any, train: Callable[..., Any], name: str, quick: bool, samples
     if file.exists() and not quick:
         source = kind.load(file)
     else:
-        limit = 1.0 if quick else SOURCE_SECONDS
+        limit = 0.1 if quick else SOURCE_SECONDS
         source = train("source", samples=samples if quick else None, time_limit=limit)
     return {"small": kind.load(), "source": source}
 

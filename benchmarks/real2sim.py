@@ -25,12 +25,12 @@ TRUTH = np.array([1e6, 3000.0])  # of the vibrating rod: Young's modulus [Pa], v
 SCALE, NOISE = 3600.0, 0.5  # scale of the camera [px/m], noise of its tags [px]
 
 
-def _curvatures(report: Report) -> None:
+def _curvatures(report: Report, quick: bool) -> None:
     """The published targets, and tips for the curvatures that reach them, with a level camera and a fitted one."""
     simulation, places = robot()
     targets = seen_curvatures(places)
     found = fit(simulation, targets, CONSTANT, progress=False)
-    seconds = [once(lambda: fit(simulation, targets, CONSTANT, progress=False)) for _ in range(5)]
+    seconds = [once(lambda: fit(simulation, targets, CONSTANT, progress=False)) for _ in range(1 if quick else 5)]
     by_descent = fit(simulation, targets, CONSTANT, method="source", progress=False)
     apart = np.degrees(np.abs(found.values * LIMB - published()[1]).max())
     report.goal("targets: largest sum of residuals", np.abs(found.residuals).sum(axis=1).max(), 1e-9, at_least=False)
@@ -71,10 +71,10 @@ def _tags(report: Report, step: int) -> None:
     report.table("Tags off in frames 85 to 168 [mm]", ("curvature", "tip, mean", "tip, most", "all, RMS"), rows)
 
 
-def _stiffness(report: Report, step: int) -> None:
+def _stiffness(report: Report, step: int, factors: tuple[float, ...]) -> None:
     """Stills of limbs whose curvatures are unknown do not determine their modulus, and the fit reports it."""
     pixels, limbs, rows = log().pixels, ("upper", "lower"), []
-    for factor in (0.25, 1.0, 100.0):
+    for factor in factors:
         simulation, places = robot()
         for limb in limbs:
             simulation.set(limb, youngs_modulus=factor * simulation.get(limb, "youngs_modulus"))
@@ -182,16 +182,16 @@ def _ringing(report: Report, seeds: int, end: float = 2.0) -> None:
         report.goal(f"made ringing: {name} off, RMS [%]", value, 1.0, at_least=False)
 
 
-def _cable(report: Report, seeds: int) -> None:
+def _cable(report: Report, seeds: int, unseen: int, nodes: int, time_step: float) -> None:
     """A cable that swings after one of two grippers let go, seen for 1.5 s; pose in these and in a second unseen."""
     names = ("pose [mm]", "EI [%]", "damping [%]")
-    later = cable.TIMES[-1] + np.arange(1, 31) / 30.0
+    later = cable.TIMES[-1] + np.arange(1, unseen + 1) / 30.0
     times = np.concatenate([cable.TIMES, later]) + cable.DELAY
     exact, rows, errors = cable.true_shapes(times), [], []
     count, true = len(cable.TIMES), np.array(list(cable.TRUTH.values()))
     with bar(seeds, "made cable", "fits") as shown:
         for seed in range(seeds):
-            start = cable.held(31, 2.5e-3, **cable.GUESS)
+            start = cable.held(nodes, time_step, **cable.GUESS)
             target = cable.lines_seen(exact[:count], cable.NOISE, seed)
             found = fit_motion(start, target, cable.UNKNOWNS, begin=cable.lift, progress=False)
             found.apply(start)
@@ -212,13 +212,13 @@ def main() -> None:
     """Measure all, report."""
     quick = arguments(__doc__).quick
     report = Report("real2sim", quick=quick)
-    _curvatures(report)
+    _curvatures(report, quick)
     _tags(report, 20 if quick else 4)
-    _stiffness(report, 20 if quick else 4)
+    _stiffness(report, *(20, (1.0,)) if quick else (4, (0.25, 1.0, 100.0)))
     _errors(report, 2 if quick else 100)
     _photograph(report, 2 if quick else 300)
     _ringing(report, 1 if quick else 4, 0.5 if quick else 2.0)
-    _cable(report, 1 if quick else 8)
+    _cable(report, *(1, 3, 11, 1e-2) if quick else (8, 30, 31, 2.5e-3))
     report.write()
 
 

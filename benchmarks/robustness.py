@@ -245,7 +245,7 @@ def main() -> None:
     options = case_options(__doc__, 500)
     if options.case is not None:
         judge_one(judge, draw_case, options.case)
-    count = 5 if options.quick else options.cases
+    count = 2 if options.quick else options.cases
     verdicts = judge_all(judge, Verdict, list(range(options.first, options.first + count)), "stress test")
     report = Report("robustness", quick=options.quick)
     cases = [draw_case(verdict.number) for verdict in verdicts]

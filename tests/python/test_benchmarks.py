@@ -2,13 +2,13 @@
 
 import importlib.util
 import json
-import os
-import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+
+from scripts import run_script
 
 FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 sys.path.insert(0, str(FOLDER))
@@ -25,11 +25,8 @@ def interpreted(monkeypatch):
 
 
 def run(name, folder, *arguments):
-    environment = os.environ | {"WITHE_BENCHMARK_OUT": str(folder), "NUMBA_DISABLE_JIT": "1"}  # as `interpreted` says
-    command = [sys.executable, str(FOLDER / f"{name}.py"), *arguments]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=300)
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
+    environment = {"WITHE_BENCHMARK_OUT": str(folder), "NUMBA_DISABLE_JIT": "1"}  # as `interpreted` says
+    return run_script(FOLDER / f"{name}.py", list(arguments), folder, environment)
 
 
 def check_short_form(name, folder):

@@ -1,12 +1,11 @@
 """Examples run as a user runs them, in an empty folder."""
 
-import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+
+from scripts import run_script
 
 pytestmark = pytest.mark.slow
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -71,12 +70,9 @@ def test_an_example_finds_what_it_claims_and_writes_its_pictures(name, tmp_path,
     if name == "domain_randomisation.py":
         pytest.importorskip("gymnasium")
     options, pattern, low, high = EXAMPLES[name]
-    command = [sys.executable, ROOT / "examples" / name, *options, "--out", tmp_path]
-    environment = {**os.environ, "MPLBACKEND": "Agg"}
-    result = subprocess.run(
-        command, cwd=tmp_path, env=environment, check=True, timeout=300, stdout=subprocess.PIPE, text=True
-    )
-    match = re.search(pattern, result.stdout)
-    assert match, result.stdout
+    arguments = [*options, "--out", str(tmp_path)]
+    printed = run_script(ROOT / "examples" / name, arguments, tmp_path, {"MPLBACKEND": "Agg"})
+    match = re.search(pattern, printed)
+    assert match, printed
     assert low <= float(match[1]) <= high
     assert list(tmp_path.glob("*.png"))
