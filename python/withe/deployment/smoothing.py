@@ -50,9 +50,13 @@ def _blocks(plain: FloatArray, along: FloatArray, direction: FloatArray) -> Any:
     """Matrix of 2 x 2 blocks plain I + along dd, one a point, over all first and then all second components."""
     from scipy import sparse
 
+    count = direction.shape[1]
     mixed = along * direction[0] * direction[1]
-    rows = [[plain + along * direction[0] ** 2, mixed], [mixed, plain + along * direction[1] ** 2]]
-    return sparse.bmat([[sparse.diags(block) for block in row] for row in rows])
+    blocks = [[plain + along * direction[0] ** 2, mixed], [mixed, plain + along * direction[1] ** 2]]
+    # The two entries of a row follow each other. `bmat` of four diagonal matrices takes twenty times as long.
+    columns = np.tile(np.arange(2 * count).reshape(2, count).T.ravel(), 2)
+    starts = np.arange(0, 4 * count + 1, 2)
+    return sparse.csr_matrix((np.moveaxis(np.array(blocks), 1, 2).ravel(), columns, starts), (2 * count, 2 * count))
 
 
 def _solved(root: Any, rest: Any, right: FloatArray) -> FloatArray:

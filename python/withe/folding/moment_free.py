@@ -149,7 +149,8 @@ def _spread(
     search continues from the nodes with the least need, like Prim's algorithm, with all equally good nodes at once.
     """
     first, neighbours = network.graph.indptr, network.graph.indices
-    seen, reached = np.zeros((2, len(network.allowed)), dtype=bool)
+    seen, reached, is_end = np.zeros((3, len(network.allowed)), dtype=bool)
+    is_end[ends] = True
     waiting: list[tuple[float, int]] = []
     bound, room = bounds
     found, next_nodes = False, begin
@@ -166,9 +167,11 @@ def _spread(
         while waiting and waiting[0][0] <= bound:
             wave.append(heappop(waiting)[1])
         reached[wave] = True
-        if not found and np.isin(wave, ends).any():
+        if not found and is_end[wave].any():
             found, bound = True, bound + room
-        next_nodes = np.unique(np.concatenate([neighbours[first[node] : first[node + 1]] for node in wave]))
+        next_nodes = np.concatenate([neighbours[first[node] : first[node + 1]] for node in wave])
+        if len(wave) > 1:  # the neighbours of one node differ
+            next_nodes = np.unique(next_nodes)
 
 
 class _NeededSlides:
