@@ -81,8 +81,8 @@ def main() -> None:
     rows.append(("continuum", f"{1e3 * plan.slide[-1]:.2f}", ""))
     report.goal("slide, off from the continuum [m]", abs(plan.slide[-1] - folded.slide), 1e-4, at_least=False)
     if HAVE_ELASTICA:
-        for elements in (40,) if options.quick else (40, 60):
-            duration = 0.002 if options.quick else np.inf
+        for elements in (20,) if options.quick else (40, 60):
+            duration = 0.01 if options.quick else np.inf
             found, seconds = in_elastica(plan, motion, elements, duration)
             curves[f"PyElastica, {elements} elements"] = found
             rows.append((f"PyElastica, {elements} elements", f"{1e3 * found[-1, 1]:.2f}", f"{seconds:.0f}"))

@@ -262,7 +262,7 @@ def coil(nodes, turns):
         (straight(2), 4000.0, {"weight": 1.8}, {"time_step": 0.2, "tolerance": 1e-3, "duration": 4.0}),
         # Steps that are too inaccurate are taken back, with what they gained.
         pytest.param(
-            *(straight(12), 400.0, {"curvature": 12.0}, {"time_step": 0.5, "tolerance": 1e-3, "duration": 2.0}),
+            *(straight(8), 400.0, {"curvature": 12.0}, {"time_step": 0.5, "tolerance": 1e-3, "duration": 2.0}),
             marks=pytest.mark.slow,
         ),
     ],

@@ -12,7 +12,7 @@ def dropped(friction=0.4, model="imcv2", friction_model="anchored", restitution=
     yaw, middle = np.radians(10.0), np.array([0.0, 0.0, 0.05])
     half = 0.25 * np.array([np.cos(yaw), np.sin(yaw), 0.0])
     scene = withe.Scene()
-    scene.add_rod(start=middle - half, end=middle + half, nodes=51, radius=5e-3, material=rubber)
+    scene.add_rod(start=middle - half, end=middle + half, nodes=31, radius=5e-3, material=rubber)
     scene.add_floor(friction=friction, restitution=restitution)
     scene.enable_contact(friction=friction, model=model, friction_model=friction_model, restitution=restitution)
     simulation = scene.build(time_step=5e-3, **build)

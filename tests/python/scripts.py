@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import runpy
 import sys
 import tempfile
+import types
 from pathlib import Path
 
 # Neither torch nor numba: they start threads, or read the environment of a script when they are imported.
@@ -50,6 +50,10 @@ def _execute(path: str, arguments: list[str], folder: str, environment: dict[str
         import matplotlib
 
         matplotlib.use(backend)
+    multiprocessing.set_start_method(None, force=True)  # the default of scripts, not that of this server
     sys.argv = [path, *arguments]
     sys.path[:] = [str(Path(path).parent), *(place for place in sys.path if place not in OF_TESTS)]
-    runpy.run_path(path, run_name="__main__")
+    script = types.ModuleType("__main__")
+    script.__file__ = path
+    sys.modules["__main__"] = sys.modules["__mp_main__"] = script  # its classes come back from its own processes
+    exec(compile(Path(path).read_bytes(), path, "exec"), script.__dict__)
