@@ -26,6 +26,19 @@ def pytest_configure(config):
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+def pytest_collection_modifyitems(config, items):
+    """Give each worker a share of the files with slow tests first, so that all workers end with quick tests, together.
+
+    A worker begins with a run of successive tests, and takes tests from the end of another run when its own is over.
+    """
+    workers = getattr(config, "workerinput", {}).get("workercount", 1)
+    if workers > 1:
+        slow = {item.path for item in items if item.get_closest_marker("slow")}
+        files = sorted(dict.fromkeys(item.path for item in items), key=lambda path: path not in slow)
+        place = {path: (number % workers, number) for number, path in enumerate(files)}
+        items.sort(key=lambda item: place[item.path])
+
+
 # --- names of parameters ----------------------------------------------------------------------------------------------
 
 
