@@ -8,6 +8,7 @@ __all__ = [
     "CoarseStepWarning",
     "ConvergenceError",
     "EnergyDriftWarning",
+    "LostCableWarning",
     "OutOfPlaneWarning",
     "PlausibilityWarning",
     "PoorMaskWarning",
@@ -56,6 +57,14 @@ class EnergyDriftWarning(UserWarning):
     The midpoint rule conserves energy to second order in the time step, while edges turn by less than about 0.1 rad in
     a step. The engine compares ``energy().total - energy().work + energy().dissipated`` with its first value
     every 16 steps, and warns once per simulation. `integrator="energy_momentum"` conserves energy at any time step.
+    """
+
+
+class LostCableWarning(UserWarning):
+    """Warn that a frame of a film shows no cable, so a tracker keeps its last state.
+
+    `withe.perception.Tracker.seen` is False for each such frame. The warning is given once per tracker. Check the mask:
+    the argument `mask` of `Tracker` takes a filter, and `update(mask=...)` an array.
     """
 
 

@@ -10,8 +10,10 @@ from withe.perception.drawing import draw
 from withe.perception.mask_quality import MaskQuality
 from withe.perception.masks import border_filter, color_filter, ground_filter, network_mask
 from withe.perception.results import Ambiguity, Crossing, Joint, Tracing
+from withe.perception.rod_prior import RodPrior
 from withe.perception.tags import TagDetection, detect_tags
 from withe.perception.tracing import trace, trace_mask
+from withe.perception.tracker import TrackedCable, Tracker
 
 __all__ = [
     "Ambiguity",
@@ -19,7 +21,10 @@ __all__ = [
     "Crossing",
     "Joint",
     "MaskQuality",
+    "RodPrior",
     "TagDetection",
+    "TrackedCable",
+    "Tracker",
     "Tracing",
     "border_filter",
     "color_filter",

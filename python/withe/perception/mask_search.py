@@ -1,0 +1,108 @@
+"""Search of a mask along the normals of a centreline, and beyond its ends."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Sightings", "end_of_mask", "search_normals"]
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.uint8]
+
+_SAME = 2.0  # greatest difference of a cross-section from the width of a cable of which it is the whole [px]
+_WIDEST = 2.6  # greatest width of a cross-section that determines a centre, relative to the width of the cable
+_NARROWEST = 0.35
+_ONE_BORDER = 0.3  # weight of a centre that follows from one border only
+
+
+@dataclass
+class Sightings:
+    """Centres of a cable on normals of its predicted centreline.
+
+    Attributes
+    ----------
+    offset : ndarray of shape (samples,) [px]
+        Offset of the centre along the normal; NaN where the mask does not show one.
+    weight : ndarray of shape (samples,)
+        1 where both borders are seen, less where one is seen, 0 where none is.
+    """
+
+    offset: Array
+    weight: Array
+
+
+def _values(mask: Mask, points: Array) -> NDArray[np.bool_]:
+    """Values of a mask at points, shape (..., 2); False outside."""
+    height, width = mask.shape
+    x, y = np.rint(points[..., 0]).astype(np.intp), np.rint(points[..., 1]).astype(np.intp)
+    inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)
+    x[~inside] = 0
+    y[~inside] = 0
+    return (mask[y, x] != 0) & inside
+
+
+def search_normals(mask: Mask, points: Array, normals: Array, expected: Array, reach: int, width: float) -> Sightings:
+    """Find the centre of a cable on each normal.
+
+    A run of the mask along a normal that is as wide as the cable has its centre in the middle. Another run has two
+    possible centres, half a width from either border: a wider run shows a second cable beside this cable, and a
+    narrower run is covered in part. Of all possible centres, the nearest to the expected offset counts.
+
+    Parameters
+    ----------
+    mask : ndarray of uint8, shape (height, width)
+    points, normals : ndarray of shape (samples, 2) [px]
+    expected : ndarray of shape (samples,) [px]
+        Expected offsets.
+    reach : int [px]
+        Greatest offset.
+    width : float [px]
+        Width of the cable.
+    """
+    count = len(points)
+    steps = np.arange(-reach, reach + 1)
+    seen = _values(mask, points[:, None] + steps[None, :, None] * normals[:, None])
+    padded = np.zeros((count, len(steps) + 2), np.int8)
+    padded[:, 1:-1] = seen
+    change = np.diff(padded, axis=1)
+    rows, first = np.nonzero(change == 1)
+    last = np.nonzero(change == -1)[1] - 1
+    left, right = steps[first] - 0.5, steps[last] + 0.5
+    across = right - left
+    has_left, has_right = first > 0, last < len(steps) - 1
+    whole = has_left & has_right & (np.abs(across - width) <= max(_SAME, 0.25 * width))
+    usable = (across <= _WIDEST * width) & (across >= _NARROWEST * width)
+    result = Sightings(np.full(count, np.nan), np.zeros(count))
+    middle, by_left, by_right = 0.5 * (left + right), left + 0.5 * width, right - 0.5 * width
+    row = np.concatenate([rows, rows, rows])
+    offset = np.concatenate([middle, by_left, by_right])
+    good = np.concatenate([whole, usable & has_left & ~whole, usable & has_right & ~whole])
+    weight = np.repeat([1.0, _ONE_BORDER, _ONE_BORDER], len(rows))
+    row, offset, weight = row[good], offset[good], weight[good]
+    order = np.lexsort((np.abs(offset - expected[row]), row))
+    row, offset, weight = row[order], offset[order], weight[order]
+    if len(row):
+        best = np.flatnonzero(np.diff(row, prepend=-1))
+        result.offset[row[best]] = offset[best]
+        result.weight[row[best]] = weight[best]
+    return result
+
+
+def end_of_mask(mask: Mask, end: Array, direction: Array, reach: int) -> float:
+    """Return how far the mask continues beyond the end of a centreline [px].
+
+    The value is negative if the mask ends before the end. NaN if the mask does not show the centreline before its end,
+    or continues beyond the reach.
+    """
+    steps = np.arange(-reach, reach + 1)
+    seen = _values(mask, end + steps[:, None] * direction)
+    padded = np.concatenate([[False], seen, [False]]).astype(np.int8)
+    change = np.diff(padded)
+    first, last = np.flatnonzero(change == 1), np.flatnonzero(change == -1) - 1
+    before = np.flatnonzero(first <= reach)  # runs that begin before the end
+    if not len(before) or last[before[-1]] == len(steps) - 1:
+        return np.nan
+    return float(steps[last[before[-1]]]) + 0.5

@@ -1,0 +1,254 @@
+"""State of one tracked cable: prediction, search of the mask, and fit of the chain."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from withe.perception.chain import Chain, Pulls
+from withe.perception.mask_search import end_of_mask, search_normals
+from withe.perception.plane import Plane
+from withe.perception.rod_prior import RodPrior
+
+__all__ = ["Tracked", "sample_points"]
+
+Array = NDArray[np.float64]
+
+_SAMPLES = 3  # normals per edge
+_ROUNDS = 4  # greatest number of searches a frame
+_NEWTON = 3  # iterations of Newton's method after a search
+_SETTLED = 0.02  # step of a node at which a frame is done [px]
+_HUBER = 4.0  # distance beyond which data pull with constant force [px]
+_MATCHED = 3.0  # greatest distance from the mask of a visible node after the fit [px]
+_END = 1.0  # weight of an end that the mask exceeds, relative to the data of a node
+_END_INWARDS = 0.1  # weight of an end that exceeds the mask: the end may also be hidden
+_END_SCALE = 3.0  # distance at which this weight has fallen to a half [px]
+_SAG = 0.02  # displacement of a visible node by its weight [px]
+_MEMORY = 0.3  # share of the curvature that is renewed in a frame, without a rod
+_CALM = 0.7  # factor of the velocity of hidden nodes in a frame, without a rod
+_LAST_SEEN_INERTIA = 0.05  # stiffness of inertia over that of bending, without a rod
+
+
+def sample_points(nodes: Array) -> Array:
+    """Return points along a chain, `_SAMPLES` an edge and the last node, shape (n, 2)."""
+    edge, share = _places(len(nodes))
+    return (1.0 - share[:, None]) * nodes[edge] + share[:, None] * nodes[edge + 1]
+
+
+def _places(nodes: int) -> tuple[NDArray[np.intp], Array]:
+    """Edges and shares of the samples."""
+    place = np.arange(_SAMPLES * (nodes - 1) + 1)
+    edge = np.minimum(place // _SAMPLES, nodes - 2)
+    return edge, place / _SAMPLES - edge
+
+
+class Tracked:
+    """A cable that is tracked.
+
+    Parameters
+    ----------
+    name : str
+    x : ndarray of shape (nodes, 2)
+        Nodes, in coordinates of the plane.
+    length : float
+        Length in these coordinates.
+    width : float [px]
+    rod : RodPrior or None
+    plane : Plane
+    step : float [s]
+        Typical time between frames.
+    """
+
+    def __init__(
+        self, name: str, x: Array, length: float, width: float, rod: RodPrior | None, plane: Plane, step: float
+    ) -> None:
+        self.name, self.x, self.length, self.width, self.rod, self.plane = name, x, length, width, rod, plane
+        self.velocity = np.zeros_like(x)
+        self.visible = np.ones(len(x), np.bool_)
+        self.residual = 0.0
+        spacing = length / (len(x) - 1)
+        self.chain = _chain(rod, spacing, len(x), plane.scale, step)
+        if rod is None:
+            self.chain.set_curvature(_curvature(x, spacing))
+        self.ahead = x
+        self.predicted_pixels = plane.pixels(x)
+
+    def restart(self, x: Array) -> None:
+        """Set the nodes to a trace, in the direction that is nearer to the last nodes."""
+        if np.square(x[::-1] - self.x).sum() < np.square(x - self.x).sum():
+            x = x[::-1].copy()
+        self.x, self.velocity = x, np.zeros_like(x)
+        if self.rod is None:
+            self.chain.set_curvature(_curvature(x, self.chain.spacing))
+
+    def hold(self, x: Array) -> None:
+        """Stay at positions, at rest."""
+        self.x, self.velocity = x, np.zeros_like(x)
+        self.visible[:] = False
+        self.residual = float("nan")
+
+    def predict(self, step: float) -> None:
+        """Predict the nodes after a step [s]."""
+        self.ahead = self.x + step * self.velocity
+        self.predicted_pixels = self.plane.pixels(self.ahead)
+
+    def match(
+        self, mask: NDArray[np.uint8], covered: NDArray[np.uint8] | None, others: list[Array], reach: int, step: float
+    ) -> None:
+        """Fit the chain to the mask."""
+        x, last = self.ahead, self.x
+        expected = sample_points(self.predicted_pixels)
+        inertia = self._inertia(step)
+        edge, share = _places(len(x))
+        offset = np.full(len(edge), np.nan)
+        for search in range(_ROUNDS):
+            pulls, offset = self._pulls(mask, covered, x, expected, others, edge, share, reach)
+            before = x
+            x = self.chain.settle(x, self.ahead, inertia, pulls, _NEWTON, _SETTLED)
+            if search and np.abs(x - before).max() < 5.0 * _SETTLED:
+                break
+        pulls, offset = self._pulls(mask, covered, x, expected, others, edge, share, reach)
+        matched = np.abs(offset) < _MATCHED
+        self.residual = float(np.sqrt(np.mean(offset[matched] ** 2))) if matched.any() else float("nan")
+        near = np.concatenate([[False], matched, [False]])
+        by_sample = near[:-2] | near[1:-1] | near[2:]
+        self.visible = by_sample[::_SAMPLES].copy()
+        if self.visible.sum() < 3:
+            self.visible[:] = False
+        self.velocity = (x - last) / step
+        self.x = x
+        if self.rod is None:
+            self.velocity[~self.visible] *= _CALM
+            self._remember()
+
+    def _inertia(self, step: float) -> Array:
+        """Stiffness of inertia of each node."""
+        if self.rod is None:
+            return np.full(len(self.x), _LAST_SEEN_INERTIA * self.chain.bend)
+        return np.asarray(self.chain.masses * (1.0 / step**2 + self.chain.damping / step))
+
+    def _remember(self) -> None:
+        """Renew the natural curvature of parts that are seen."""
+        seen = self.visible.copy()
+        seen[1:] &= self.visible[:-1]
+        seen[:-1] &= self.visible[1:]
+        change = _MEMORY * (_curvature(self.x, self.chain.spacing) - self.chain.curvature)
+        self.chain.set_curvature(self.chain.curvature + np.where(seen, change, 0.0))
+
+    def _pulls(
+        self,
+        mask: NDArray[np.uint8],
+        covered: NDArray[np.uint8] | None,
+        x: Array,
+        expected: Array,
+        others: list[Array],
+        edge: NDArray[np.intp],
+        share: Array,
+        reach: int,
+    ) -> tuple[Pulls, Array]:
+        """Search the mask about a shape; also return the offsets of the centres that count [px]."""
+        points, slopes = self.plane.pixels_and_slopes(x)
+        samples = (1.0 - share[:, None]) * points[edge] + share[:, None] * points[edge + 1]
+        tangents = np.gradient(samples, axis=0)
+        tangents /= np.maximum(np.linalg.norm(tangents, axis=1), 1e-9)[:, None]
+        normals = np.column_stack([-tangents[:, 1], tangents[:, 0]])
+        prior = ((expected - samples) * normals).sum(axis=1)
+        seen = search_normals(mask, samples, normals, prior, reach, self.width)
+        offset = seen.offset.copy()
+        found = samples + np.nan_to_num(offset)[:, None] * normals
+        offset[self._belongs_elsewhere(found, np.abs(offset - prior), others)] = np.nan
+        good = np.isfinite(offset)
+        weight = seen.weight[good] * self.chain.data / _SAMPLES
+        weight *= np.minimum(1.0, _HUBER / np.maximum(np.abs(offset[good]), 1e-9))
+        on = (1.0 - share[:, None]) * x[edge] + share[:, None] * x[edge + 1]
+        slope = slopes[edge[good] + np.rint(share[good]).astype(np.intp)]
+        axis = np.einsum("nij,ni->nj", slope, normals[good])
+        size = np.maximum(np.linalg.norm(axis, axis=1), 1e-9)
+        axis /= size[:, None]
+        target = on[good] + (offset[good] / size)[:, None] * axis
+        pulls = Pulls(edge[good], share[good], axis, target, weight)
+        return self._with_ends(pulls, mask, covered, x, samples, slopes, reach), offset
+
+    def _belongs_elsewhere(self, found: Array, off: Array, others: list[Array]) -> NDArray[np.bool_]:
+        """Return True for centres that are much nearer to the prediction of another cable."""
+        result = np.zeros(len(found), np.bool_)
+        far = off > 0.5 * self.width
+        if not far.any():
+            return result
+        for points in others:
+            apart = found[far][:, None] - points[None]
+            nearest = np.sqrt((apart**2).sum(axis=2).min(axis=1))
+            result[far] |= nearest < 0.5 * off[far]
+        return result
+
+    def _with_ends(
+        self,
+        pulls: Pulls,
+        mask: NDArray[np.uint8],
+        covered: NDArray[np.uint8] | None,
+        x: Array,
+        samples: Array,
+        slopes: Array,
+        reach: int,
+    ) -> Pulls:
+        """Add the pulls on both ends along the cable."""
+        count = len(x)
+        edges, shares, axes, targets, weights = [], [], [], [], []
+        for node, inner, edge, share in ((0, _SAMPLES, 0, 0.0), (count - 1, -1 - _SAMPLES, count - 2, 1.0)):
+            tip = samples[0] if node == 0 else samples[-1]
+            direction = tip - samples[inner]
+            direction /= max(float(np.hypot(*direction)), 1e-9)
+            off = end_of_mask(mask, tip, direction, reach)
+            if not np.isfinite(off):
+                continue
+            if covered is not None and _is_covered(covered, tip + (off + 2.0) * direction):
+                continue
+            axis = slopes[node].T @ direction
+            size = max(float(np.hypot(*axis)), 1e-9)
+            axis /= size
+            if off >= 0.0:
+                weight = _END * min(1.0, _HUBER / max(off, 1e-9))
+            else:
+                weight = _END_INWARDS / (1.0 + (off / _END_SCALE) ** 2) ** 2
+            edges.append(edge)
+            shares.append(share)
+            axes.append(axis)
+            targets.append(x[node] + off / size * axis)
+            weights.append(weight * self.chain.data)
+        if not edges:
+            return pulls
+        return Pulls(
+            np.append(pulls.edge, edges).astype(np.intp),
+            np.append(pulls.share, shares),
+            np.vstack([pulls.axis, axes]),
+            np.vstack([pulls.target, targets]),
+            np.append(pulls.weight, weights),
+        )
+
+
+def _is_covered(covered: NDArray[np.uint8], point: Array) -> bool:
+    x, y = (int(v) for v in np.rint(point))
+    return 0 <= y < covered.shape[0] and 0 <= x < covered.shape[1] and bool(covered[y, x])
+
+
+def _chain(rod: RodPrior | None, spacing: float, count: int, scale: float, step: float) -> Chain:
+    """Return the chain of a rod, with stiffnesses in N/m, or one with the stiffness 1 of data."""
+    if rod is None:
+        return Chain(spacing, 0.3, 0.0, np.zeros(2), 0.0, np.zeros(count), 1.0)
+    metric = spacing / scale
+    bend = rod.bend_stiffness / metric**3
+    mass = rod.line_density * metric
+    load = mass * scale * np.array(rod.gravity)
+    data = 4.0 * bend + float(np.hypot(*load)) / _SAG + 10.0 * mass / step**2
+    curvature = np.full(count, rod.natural_curvature / scale)
+    return Chain(spacing, bend, mass, load, rod.damping, curvature, data)
+
+
+def _curvature(x: Array, spacing: float) -> Array:
+    """Curvature at the nodes of a chain, 0 at both ends, shape (nodes,)."""
+    bend = x[:-2] - 2.0 * x[1:-1] + x[2:]
+    way = x[2:] - x[:-2]
+    turned = np.column_stack([-way[:, 1], way[:, 0]])
+    result = np.zeros(len(x))
+    result[1:-1] = 2.0 / spacing * (bend * turned).sum(axis=1) / np.maximum((way**2).sum(axis=1), 1e-12)
+    return result
