@@ -20,16 +20,19 @@ _ONE_BORDER = 0.3  # weight of a centre that follows from one border only
 
 @dataclass
 class Sightings:
-    """Centres of a cable on normals of its predicted centreline.
+    """Possible centres of a cable on normals of its predicted centreline.
 
     Attributes
     ----------
-    offset : ndarray of shape (samples,) [px]
-        Offset of the centre along the normal; NaN where the mask does not show one.
-    weight : ndarray of shape (samples,)
-        1 where both borders are seen, less where one is seen, 0 where none is.
+    row : ndarray of int, shape (centres,)
+        Number of the normal.
+    offset : ndarray of shape (centres,) [px]
+        Offset of the centre along the normal.
+    weight : ndarray of shape (centres,)
+        1 where both borders are seen, less where one is seen.
     """
 
+    row: NDArray[np.intp]
     offset: Array
     weight: Array
 
@@ -44,28 +47,25 @@ def _values(mask: Mask, points: Array) -> NDArray[np.bool_]:
     return (mask[y, x] != 0) & inside
 
 
-def search_normals(mask: Mask, points: Array, normals: Array, expected: Array, reach: int, width: float) -> Sightings:
-    """Find the centre of a cable on each normal.
+def search_normals(mask: Mask, points: Array, normals: Array, reach: int, width: float) -> Sightings:
+    """Find possible centres of a cable on each normal.
 
     A run of the mask along a normal that is as wide as the cable has its centre in the middle. Another run has two
     possible centres, half a width from either border: a wider run shows a second cable beside this cable, and a
-    narrower run is covered in part. Of all possible centres, the nearest to the expected offset counts.
+    narrower run is covered in part.
 
     Parameters
     ----------
     mask : ndarray of uint8, shape (height, width)
     points, normals : ndarray of shape (samples, 2) [px]
-    expected : ndarray of shape (samples,) [px]
-        Expected offsets.
     reach : int [px]
         Greatest offset.
     width : float [px]
         Width of the cable.
     """
-    count = len(points)
     steps = np.arange(-reach, reach + 1)
     seen = _values(mask, points[:, None] + steps[None, :, None] * normals[:, None])
-    padded = np.zeros((count, len(steps) + 2), np.int8)
+    padded = np.zeros((len(points), len(steps) + 2), np.int8)
     padded[:, 1:-1] = seen
     change = np.diff(padded, axis=1)
     rows, first = np.nonzero(change == 1)
@@ -74,21 +74,13 @@ def search_normals(mask: Mask, points: Array, normals: Array, expected: Array, r
     across = right - left
     has_left, has_right = first > 0, last < len(steps) - 1
     whole = has_left & has_right & (np.abs(across - width) <= max(_SAME, 0.25 * width))
-    usable = (across <= _WIDEST * width) & (across >= _NARROWEST * width)
-    result = Sightings(np.full(count, np.nan), np.zeros(count))
-    middle, by_left, by_right = 0.5 * (left + right), left + 0.5 * width, right - 0.5 * width
-    row = np.concatenate([rows, rows, rows])
-    offset = np.concatenate([middle, by_left, by_right])
-    good = np.concatenate([whole, usable & has_left & ~whole, usable & has_right & ~whole])
-    weight = np.repeat([1.0, _ONE_BORDER, _ONE_BORDER], len(rows))
-    row, offset, weight = row[good], offset[good], weight[good]
-    order = np.lexsort((np.abs(offset - expected[row]), row))
-    row, offset, weight = row[order], offset[order], weight[order]
-    if len(row):
-        best = np.flatnonzero(np.diff(row, prepend=-1))
-        result.offset[row[best]] = offset[best]
-        result.weight[row[best]] = weight[best]
-    return result
+    usable = (across <= _WIDEST * width) & (across >= _NARROWEST * width) & ~whole
+    good = np.concatenate([whole, usable & has_left, usable & has_right])
+    return Sightings(
+        np.concatenate([rows, rows, rows])[good],
+        np.concatenate([0.5 * (left + right), left + 0.5 * width, right - 0.5 * width])[good],
+        np.repeat([1.0, _ONE_BORDER, _ONE_BORDER], len(rows))[good],
+    )
 
 
 def end_of_mask(mask: Mask, end: Array, direction: Array, reach: int) -> float:

@@ -24,9 +24,13 @@ _END = 1.0  # weight of an end that the mask exceeds, relative to the data of a 
 _END_INWARDS = 0.1  # weight of an end that exceeds the mask: the end may also be hidden
 _END_SCALE = 3.0  # distance at which this weight has fallen to a half [px]
 _SAG = 0.02  # displacement of a visible node by its weight [px]
-_MEMORY = 0.3  # share of the curvature that is renewed in a frame, without a rod
-_CALM = 0.7  # factor of the velocity of hidden nodes in a frame, without a rod
-_LAST_SEEN_INERTIA = 0.05  # stiffness of inertia over that of bending, without a rod
+_CERTAIN = 0.25  # least certainty of a sample that makes a node visible
+_RIVAL = 0.5  # lead over a rival prediction at which a centre is certain, relative to the width
+_SELF = 4.0  # least distance along a cable of parts that may cross, relative to the width
+_MEMORY = 0.5  # share of the curvature that is renewed in a frame, without a rod
+_CALM = 0.9  # factor of the velocity of hidden nodes in a frame, without a rod
+_INERTIA = 0.05  # stiffness of inertia over that of data at a node, without a rod
+_BEND = 20.0  # the same for bending
 
 
 def sample_points(nodes: Array) -> Array:
@@ -105,7 +109,7 @@ class Tracked:
             pulls, offset = self._pulls(mask, covered, x, expected, others, edge, share, reach)
             before = x
             x = self.chain.settle(x, self.ahead, inertia, pulls, _NEWTON, _SETTLED)
-            if search and np.abs(x - before).max() < 5.0 * _SETTLED:
+            if search > 0 and np.abs(x - before).max() < 5.0 * _SETTLED:
                 break
         pulls, offset = self._pulls(mask, covered, x, expected, others, edge, share, reach)
         matched = np.abs(offset) < _MATCHED
@@ -124,7 +128,7 @@ class Tracked:
     def _inertia(self, step: float) -> Array:
         """Stiffness of inertia of each node."""
         if self.rod is None:
-            return np.full(len(self.x), _LAST_SEEN_INERTIA * self.chain.bend)
+            return np.full(len(self.x), _INERTIA)
         return np.asarray(self.chain.masses * (1.0 / step**2 + self.chain.damping / step))
 
     def _remember(self) -> None:
@@ -152,13 +156,9 @@ class Tracked:
         tangents = np.gradient(samples, axis=0)
         tangents /= np.maximum(np.linalg.norm(tangents, axis=1), 1e-9)[:, None]
         normals = np.column_stack([-tangents[:, 1], tangents[:, 0]])
-        prior = ((expected - samples) * normals).sum(axis=1)
-        seen = search_normals(mask, samples, normals, prior, reach, self.width)
-        offset = seen.offset.copy()
-        found = samples + np.nan_to_num(offset)[:, None] * normals
-        offset[self._belongs_elsewhere(found, np.abs(offset - prior), others)] = np.nan
-        good = np.isfinite(offset)
-        weight = seen.weight[good] * self.chain.data / _SAMPLES
+        offset, certainty = self._centres(mask, samples, normals, expected, others, reach)
+        good = certainty > 0.0
+        weight = certainty[good] * self.chain.data / _SAMPLES
         weight *= np.minimum(1.0, _HUBER / np.maximum(np.abs(offset[good]), 1e-9))
         on = (1.0 - share[:, None]) * x[edge] + share[:, None] * x[edge + 1]
         slope = slopes[edge[good] + np.rint(share[good]).astype(np.intp)]
@@ -167,19 +167,37 @@ class Tracked:
         axis /= size[:, None]
         target = on[good] + (offset[good] / size)[:, None] * axis
         pulls = Pulls(edge[good], share[good], axis, target, weight)
+        offset[certainty < _CERTAIN] = np.nan
         return self._with_ends(pulls, mask, covered, x, samples, slopes, reach), offset
 
-    def _belongs_elsewhere(self, found: Array, off: Array, others: list[Array]) -> NDArray[np.bool_]:
-        """Return True for centres that are much nearer to the prediction of another cable."""
-        result = np.zeros(len(found), np.bool_)
-        far = off > 0.5 * self.width
-        if not far.any():
-            return result
+    def _centres(
+        self, mask: NDArray[np.uint8], samples: Array, normals: Array, expected: Array, others: list[Array], reach: int
+    ) -> tuple[Array, Array]:
+        """Return the offset of the cable at each sample and its certainty, 0 to 1.
+
+        Another cable, or another part of this cable, explains a centre of the mask if its prediction is nearer. Of the
+        remaining centres, the one nearest to the prediction counts.
+        """
+        seen = search_normals(mask, samples, normals, reach, self.width)
+        found = samples[seen.row] + seen.offset[:, None] * normals[seen.row]
+        off = np.abs(seen.offset - ((expected - samples) * normals).sum(axis=1)[seen.row])
+        rival = np.full(len(off), np.inf)
         for points in others:
-            apart = found[far][:, None] - points[None]
-            nearest = np.sqrt((apart**2).sum(axis=2).min(axis=1))
-            result[far] |= nearest < 0.5 * off[far]
-        return result
+            rival = np.minimum(rival, _nearest(found, points))
+        places = np.arange(len(samples))
+        apart = np.abs(seen.row[:, None] - places[None]) * self.length / len(samples)
+        own = np.hypot(*(found[:, None] - expected[None]).transpose(2, 0, 1))
+        own[apart < _SELF * self.width] = np.inf
+        rival = np.minimum(rival, own.min(axis=1, initial=np.inf))
+        certainty = seen.weight * np.clip((rival - off) / (_RIVAL * self.width), 0.0, 1.0)
+        kept = np.flatnonzero(certainty > 0.0)
+        row = seen.row[kept]
+        order = np.lexsort((off[kept], row))
+        best = kept[order][np.flatnonzero(np.diff(row[order], prepend=-1))]
+        offsets, certainties = np.zeros(len(samples)), np.zeros(len(samples))
+        offsets[seen.row[best]] = seen.offset[best]
+        certainties[seen.row[best]] = certainty[best]
+        return offsets, certainties
 
     def _with_ends(
         self,
@@ -226,6 +244,11 @@ class Tracked:
         )
 
 
+def _nearest(points: Array, line: Array) -> Array:
+    """Distance of each point from the nearest sample of a line."""
+    return np.asarray(np.sqrt(((points[:, None] - line[None]) ** 2).sum(axis=2).min(axis=1, initial=np.inf)))
+
+
 def _is_covered(covered: NDArray[np.uint8], point: Array) -> bool:
     x, y = (int(v) for v in np.rint(point))
     return 0 <= y < covered.shape[0] and 0 <= x < covered.shape[1] and bool(covered[y, x])
@@ -234,7 +257,7 @@ def _is_covered(covered: NDArray[np.uint8], point: Array) -> bool:
 def _chain(rod: RodPrior | None, spacing: float, count: int, scale: float, step: float) -> Chain:
     """Return the chain of a rod, with stiffnesses in N/m, or one with the stiffness 1 of data."""
     if rod is None:
-        return Chain(spacing, 0.3, 0.0, np.zeros(2), 0.0, np.zeros(count), 1.0)
+        return Chain(spacing, _BEND, 0.0, np.zeros(2), 0.0, np.zeros(count), 1.0)
     metric = spacing / scale
     bend = rod.bend_stiffness / metric**3
     mass = rod.line_density * metric
