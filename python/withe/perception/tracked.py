@@ -23,6 +23,7 @@ _MATCHED = 3.0  # greatest distance from the mask of a visible node after the fi
 _END = 1.0  # weight of an end that the mask exceeds, relative to the data of a node
 _END_INWARDS = 0.1  # weight of an end that exceeds the mask: the end may also be hidden
 _END_SCALE = 3.0  # distance at which this weight has fallen to a half [px]
+_END_CLEAR = 1.2  # least distance of an end from other cables at which the mask shows it, relative to the width
 _SAG = 0.02  # displacement of a visible node by its weight [px]
 _CERTAIN = 0.25  # least certainty of a sample that makes a node visible
 _RIVAL = 0.5  # lead over a rival prediction at which a centre is certain, relative to the width
@@ -168,7 +169,7 @@ class Tracked:
         target = on[good] + (offset[good] / size)[:, None] * axis
         pulls = Pulls(edge[good], share[good], axis, target, weight)
         offset[certainty < _CERTAIN] = np.nan
-        return self._with_ends(pulls, mask, covered, x, samples, slopes, reach), offset
+        return self._with_ends(pulls, mask, covered, x, samples, slopes, others, reach), offset
 
     def _centres(
         self, mask: NDArray[np.uint8], samples: Array, normals: Array, expected: Array, others: list[Array], reach: int
@@ -199,6 +200,12 @@ class Tracked:
         certainties[seen.row[best]] = certainty[best]
         return offsets, certainties
 
+    def _is_crossed(self, ends: Array, node: int, samples: Array, others: list[Array]) -> bool:
+        """Return True if another cable, or another part of this one, passes an end: its mask hides the end."""
+        far = max(_SAMPLES, round(_SELF * self.width / self.length * len(samples)))
+        own = samples[far:] if node == 0 else samples[:-far]
+        return any(bool((_nearest(ends, points) < _END_CLEAR * self.width).any()) for points in (*others, own))
+
     def _with_ends(
         self,
         pulls: Pulls,
@@ -207,6 +214,7 @@ class Tracked:
         x: Array,
         samples: Array,
         slopes: Array,
+        others: list[Array],
         reach: int,
     ) -> Pulls:
         """Add the pulls on both ends along the cable."""
@@ -217,7 +225,7 @@ class Tracked:
             direction = tip - samples[inner]
             direction /= max(float(np.hypot(*direction)), 1e-9)
             off = end_of_mask(mask, tip, direction, reach)
-            if not np.isfinite(off):
+            if not np.isfinite(off) or self._is_crossed(np.stack([tip, tip + off * direction]), node, samples, others):
                 continue
             if covered is not None and _is_covered(covered, tip + (off + 2.0) * direction):
                 continue
