@@ -1,4 +1,4 @@
-"""The command line: ``withe run SCENE``, ``withe perceive IMAGE``, ``withe deploy PATTERN``, ``withe fold``."""
+"""The command line: ``withe run SCENE``, ``withe perceive IMAGE``, ``withe track FILM``, ``withe deploy``, ``withe fold``."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import Any
 from withe.deployment import command as deploy
 from withe.folding import command as fold
 from withe.perception import command as perceive
+from withe.perception import track_command as track
 from withe.scene import command as scene
 
 __all__ = ["main"]
@@ -22,6 +23,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     commands = parser.add_subparsers(required=True, metavar="command")
     scene.add_parser(commands)
     perceive.add_parser(commands)
+    track.add_parser(commands)
     deploy.add_parser(commands)
     fold.add_parser(commands)
     parsed = parser.parse_args(arguments)

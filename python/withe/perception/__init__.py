@@ -1,4 +1,4 @@
-"""Find every rope or cable in an image, in order, and which one lies on top.
+"""Find every rope or cable in an image, in order, and which one lies on top. Follow them through films.
 
 >>> import withe
 >>> tracing = withe.perception.trace("cables.jpg")  # doctest: +SKIP
@@ -6,7 +6,8 @@
 """
 
 from withe.perception.camera import Camera
-from withe.perception.drawing import draw
+from withe.perception.drawing import draw, draw_tracked
+from withe.perception.film import FilmFrame, read_film
 from withe.perception.mask_quality import MaskQuality
 from withe.perception.masks import border_filter, color_filter, ground_filter, network_mask
 from withe.perception.results import Ambiguity, Crossing, Joint, Tracing
@@ -20,6 +21,7 @@ __all__ = [
     "Camera",
     "Crossing",
     "Joint",
+    "FilmFrame",
     "MaskQuality",
     "RodPrior",
     "TagDetection",
@@ -30,8 +32,10 @@ __all__ = [
     "color_filter",
     "detect_tags",
     "draw",
+    "draw_tracked",
     "ground_filter",
     "network_mask",
+    "read_film",
     "trace",
     "trace_mask",
 ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import colorsys
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,8 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from withe.common.extras import require
 from withe.perception.results import Tracing
 from withe.perception.tracing import check_image
+from withe.perception.tracker import TrackedCable
 
-__all__ = ["draw"]
+__all__ = ["draw", "draw_tracked"]
 
 _FRACTION_BITS = 4  # OpenCV draws between pixels when coordinates are scaled by a power of two
 
@@ -78,4 +80,49 @@ def draw(image: ArrayLike, tracing: Tracing) -> NDArray[np.uint8]:
     for doubt in tracing.ambiguous:
         corners = doubt.point + 10 * np.array([[0.0, -1.0], [0.87, 0.5], [-0.87, 0.5]])
         line(corners, True, (255, 255, 0), 1)
+    return picture
+
+
+def draw_tracked(image: ArrayLike, cables: Sequence[TrackedCable]) -> NDArray[np.uint8]:
+    """Draw tracked cables over a frame of a film.
+
+    Parameters
+    ----------
+    image : array_like of shape (height, width, 3)
+        Red, green, blue as uint8; grey and alpha are accepted.
+    cables : sequence of TrackedCable
+
+    Returns
+    -------
+    ndarray of uint8, shape (height, width, 3)
+        Lines where cables are visible, rings at nodes that only the prior determines. A dot marks the first node, and
+        the name stands beside it.
+
+    Raises
+    ------
+    ValueError
+        The argument is not an image.
+    ImportError
+        OpenCV is not installed.
+    """
+    cv2 = require("cv2", "vision")
+    picture = np.ascontiguousarray(check_image(image) // 2 + 20)
+    bits = _FRACTION_BITS
+
+    def fixed(points: NDArray[np.float64]) -> NDArray[np.int32]:
+        return np.round(np.atleast_2d(points) * (1 << bits)).astype(np.int32)
+
+    for index, cable in enumerate(cables):
+        colour = cable_colour(index)
+        both = cable.visible[:-1] & cable.visible[1:]
+        for i in np.flatnonzero(both):
+            cv2.polylines(picture, [fixed(cable.nodes[i : i + 2])[:, None]], False, colour, 2, cv2.LINE_AA, bits)
+        for node, visible in zip(fixed(cable.nodes), cable.visible, strict=True):
+            if not visible:
+                cv2.circle(picture, (int(node[0]), int(node[1])), 3 << bits, colour, 1, cv2.LINE_AA, bits)
+        x, y = (int(v) for v in fixed(cable.nodes[0])[0])
+        cv2.circle(picture, (x, y), 5 << bits, colour, -1, cv2.LINE_AA, bits)
+        column, row = (int(v) for v in np.round(cable.nodes[0]))
+        place = min(max(column + 8, 2), picture.shape[1] - 90), min(max(row - 8, 14), picture.shape[0] - 4)
+        cv2.putText(picture, cable.name, place, cv2.FONT_HERSHEY_SIMPLEX, 0.5, colour, 1, cv2.LINE_AA)
     return picture

@@ -187,9 +187,9 @@ class Tracked:
             rival = np.minimum(rival, _nearest(found, points))
         places = np.arange(len(samples))
         apart = np.abs(seen.row[:, None] - places[None]) * self.length / len(samples)
-        own = np.hypot(*(found[:, None] - expected[None]).transpose(2, 0, 1))
+        own = _squares(found, expected)
         own[apart < _SELF * self.width] = np.inf
-        rival = np.minimum(rival, own.min(axis=1, initial=np.inf))
+        rival = np.minimum(rival, np.sqrt(np.maximum(own.min(axis=1, initial=np.inf), 0.0)))
         certainty = seen.weight * np.clip((rival - off) / (_RIVAL * self.width), 0.0, 1.0)
         kept = np.flatnonzero(certainty > 0.0)
         row = seen.row[kept]
@@ -252,9 +252,14 @@ class Tracked:
         )
 
 
+def _squares(points: Array, line: Array) -> Array:
+    """Squares of distances between points and samples of a line, shape (points, samples)."""
+    return np.asarray((points**2).sum(axis=1)[:, None] + (line**2).sum(axis=1) - 2.0 * points @ line.T)
+
+
 def _nearest(points: Array, line: Array) -> Array:
     """Distance of each point from the nearest sample of a line."""
-    return np.asarray(np.sqrt(((points[:, None] - line[None]) ** 2).sum(axis=2).min(axis=1, initial=np.inf)))
+    return np.asarray(np.sqrt(np.maximum(_squares(points, line).min(axis=1, initial=np.inf), 0.0)))
 
 
 def _is_covered(covered: NDArray[np.uint8], point: Array) -> bool:
