@@ -11,7 +11,7 @@ import numpy.typing as npt
 from withe.common import validation
 from withe.common.keywords import keyword_hints
 from withe.perception.masks import border_filter
-from withe.perception.tracing import check_image, read_image
+from withe.perception.images import check_image, read_image
 
 __all__ = ["JAW", "Cable", "MeasuredCable", "measure"]
 

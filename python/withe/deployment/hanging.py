@@ -14,7 +14,7 @@ from withe.common import validation
 from withe.common.keywords import keyword_hints
 from withe.deployment.cable import pixel_size
 from withe.perception.masks import border_filter
-from withe.perception.tracing import check_image, read_image
+from withe.perception.images import check_image, read_image
 
 __all__ = ["MeasuredCurvature", "measure_curvature"]
 

@@ -16,7 +16,7 @@ from withe.common.keywords import keyword_hints
 from withe.folding.paper import Paper
 from withe.perception.camera import Camera
 from withe.perception.masks import MaskFunction, border_filter
-from withe.perception.tracing import check_image, read_image
+from withe.perception.images import check_image, read_image
 
 __all__ = ["SeenEdge", "camera_over", "find_edge", "overhead_camera"]
 

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.perception.masks import border_filter
-from withe.perception.tracing import check_image, read_image
+from withe.perception.images import check_image, read_image
 
 __all__ = ["strip_ends"]
 

@@ -5,6 +5,7 @@
 >>> tracing.centrelines[0]                          # (n, 2) pixels, end to end # doctest: +SKIP
 """
 
+from withe.perception.boards import CharucoBoard, Chessboard
 from withe.perception.camera import Camera
 from withe.perception.drawing import draw, draw_tracked
 from withe.perception.film import FilmFrame, read_film
@@ -19,6 +20,8 @@ from withe.perception.tracker import TrackedCable, Tracker
 __all__ = [
     "Ambiguity",
     "Camera",
+    "CharucoBoard",
+    "Chessboard",
     "Crossing",
     "Joint",
     "FilmFrame",

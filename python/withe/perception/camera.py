@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from withe.perception.boards import CharucoBoard, Chessboard
+from withe.perception.calibrating import calibrate_lens
 
 __all__ = ["Camera"]
 
@@ -42,6 +48,11 @@ class Camera:
     translation : array_like of shape (3,), optional [m]
         Translation t: the position of the world's origin in the camera.
 
+    Attributes
+    ----------
+    reprojection_error : float or None [px]
+        Root mean square distance of the corners of a board from their projections, for a camera by `calibrate`.
+
     Raises
     ------
     ValueError
@@ -74,6 +85,48 @@ class Camera:
         self.translation = np.zeros(3) if translation is None else _checked(translation, (3,), "translation")
         self._pose = np.column_stack([self.rotation, self.translation])
         self._flat = False
+        self.reprojection_error: float | None = None
+
+    @classmethod
+    def calibrate(
+        cls, images: Iterable[ArrayLike | str | os.PathLike[str]], board: Chessboard | CharucoBoard
+    ) -> Camera:
+        """Calibrate the lens of a camera from pictures of a board [1]_, by OpenCV.
+
+        Take about ten sharp pictures with one focus and zoom. Tilt the board by 20 to 40 degrees in different directions,
+        and show it in all corners of the picture.
+
+        Parameters
+        ----------
+        images : iterable of path, or of array_like of shape (height, width, 3) of uint8
+            At least three pictures of one size that show the board: red, green and blue, or grey. Pictures without the
+            board are not used.
+        board : Chessboard or CharucoBoard
+
+        Returns
+        -------
+        Camera
+            Camera with the found `matrix` and `distortion`, at the origin of the world, and with `reprojection_error`.
+            The coefficient k3 of the distortion is 0.
+            `Camera.from_points` with this matrix and distortion finds its place in the world.
+
+        Raises
+        ------
+        ValueError
+            No pictures, or pictures of different sizes. Fewer than three pictures that show the board, boards that are
+            all parallel, or a reprojection error of 2 px or more.
+        ImportError
+            OpenCV is not installed: ``pip install ".[vision]"`` in a clone of withe.
+
+        References
+        ----------
+        .. [1] Zhang, Z. (2000). A flexible new technique for camera calibration. IEEE Transactions on Pattern Analysis
+           and Machine Intelligence 22(11).
+        """
+        lens = calibrate_lens(images, board)
+        camera = cls(lens.matrix, lens.distortion)
+        camera.reprojection_error = lens.error
+        return camera
 
     @classmethod
     def from_points(

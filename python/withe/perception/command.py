@@ -11,7 +11,8 @@ import numpy as np
 
 from withe.common.extras import require
 from withe.perception.drawing import draw
-from withe.perception.tracing import read_image, trace
+from withe.perception.images import read_image
+from withe.perception.tracing import trace
 
 __all__ = ["add_parser", "run"]
 

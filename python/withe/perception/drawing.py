@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from withe.common.extras import require
 from withe.perception.results import Tracing
-from withe.perception.tracing import check_image
+from withe.perception.images import check_image
 from withe.perception.tracker import TrackedCable
 
 __all__ = ["draw", "draw_tracked"]

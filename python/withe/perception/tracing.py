@@ -10,28 +10,21 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from withe import _core
-from withe.common.extras import require
 from withe.common.user_warnings import warn
 from withe.errors import PoorMaskWarning
+from withe.perception.images import as_array, check_image, read_image
 from withe.perception.mask_quality import compare_with_picture, measure_quality
 from withe.perception.masks import MaskFunction, ground_filter
 from withe.perception.results import Ambiguity, Crossing, Joint, Tracing
 
-__all__ = ["check_image", "check_mask", "read_image", "trace", "trace_mask"]
+__all__ = ["check_mask", "trace", "trace_mask"]
 
 Method = Literal["withe", "mbest"]
 
 
-def _as_array(values: ArrayLike, name: str) -> NDArray[Any]:
-    try:
-        return np.asarray(values)
-    except (ValueError, TypeError) as error:
-        raise ValueError(f"{name} must be an array, got rows of different lengths or no numbers: {error}") from None
-
-
 def check_mask(mask: ArrayLike, name: str = "mask") -> NDArray[np.uint8]:
     """Return a mask as bytes, row by row, or raise ValueError with the reason."""
-    array = _as_array(mask, name)
+    array = as_array(mask, name)
     if array.ndim != 2:
         raise ValueError(f"{name} must have shape (height, width), got {array.shape}")
     if array.dtype == np.bool_:
@@ -72,45 +65,6 @@ def _tracing(
         ambiguous=[Ambiguity(np.array([x, y]), reason) for x, y, reason in found["ambiguous"]],
         timings=found["timings"],
     )
-
-
-def check_image(image: ArrayLike, name: str = "image") -> NDArray[np.uint8]:
-    """Return a picture as RGB bytes, row by row, or raise ValueError with the reason."""
-    array = _as_array(image, name)
-    shape = array.shape
-    if array.ndim == 2:
-        array = array[..., None]
-    if array.ndim != 3 or array.shape[2] not in (1, 3, 4) or 0 in array.shape:
-        raise ValueError(f"{name} must have shape (height, width, 3) and hold a pixel, got {shape}")
-    if array.dtype.kind == "f" and not np.isfinite(array).all():
-        raise ValueError(f"{name} must be finite, got NaN or infinity")
-    if array.dtype == np.bool_:
-        array = array.astype(np.uint8) * 255
-    if array.dtype != np.uint8:
-        raise ValueError(f"{name} must be of type uint8, got {array.dtype}")
-    if array.shape[2] == 1:
-        array = np.repeat(array, 3, axis=2)
-    return np.ascontiguousarray(array[..., :3])
-
-
-def read_image(path: str | os.PathLike[str], name: str = "image") -> NDArray[np.uint8]:
-    """Read a picture from a file as RGB bytes.
-
-    Raises
-    ------
-    ValueError
-        The file does not exist, or OpenCV cannot read it.
-    """
-    cv2 = require("cv2", "vision")
-    try:
-        content = np.fromfile(path, np.uint8)
-    except (OSError, ValueError) as error:  # ValueError: a path with a zero byte in it
-        reason = error.strerror if isinstance(error, OSError) else error
-        raise ValueError(f"{name} must be a file that can be read, got {os.fspath(path)!r}: {reason}") from None
-    picture = cv2.imdecode(content, cv2.IMREAD_COLOR) if len(content) else None
-    if picture is None:
-        raise ValueError(f"{name} must be a picture that can be read, got {os.fspath(path)!r}, which is not a picture")
-    return np.ascontiguousarray(picture[..., ::-1])
 
 
 def _check_method(method: str) -> None:

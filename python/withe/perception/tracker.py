@@ -18,7 +18,8 @@ from withe.perception.chain import resample
 from withe.perception.masks import MaskFunction, ground_filter
 from withe.perception.plane import Plane
 from withe.perception.rod_prior import RodPrior
-from withe.perception.tracing import check_image, check_mask, trace_mask
+from withe.perception.images import check_image
+from withe.perception.tracing import check_mask, trace_mask
 from withe.perception.tracked import Tracked, sample_points
 
 __all__ = ["TrackedCable", "Tracker"]
