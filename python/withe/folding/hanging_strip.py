@@ -13,6 +13,7 @@ from withe.common import validation
 from withe.common.keywords import keyword_hints
 from withe.common.user_warnings import warn
 from withe.folding.strip_pictures import strip_ends
+from withe.perception.camera import Camera
 
 __all__ = ["Measured", "droop", "measure"]
 
@@ -108,6 +109,7 @@ def measure(
     image: npt.ArrayLike | str | os.PathLike[str] | None = None,
     turned: float | npt.ArrayLike | str | os.PathLike[str] | None = None,
     scale: float | None = None,
+    camera: Camera | None = None,
     error: float | None = None,
 ) -> Measured:
     """Find a sheet's gravito-bending length Lgb = (EI / 2w)^(1/3) with a ruler, or from a picture.
@@ -131,6 +133,9 @@ def measure(
         Reading of the same strip turned over: its drop if the first reading is by ruler, else its picture.
     scale : float [px/m]
         Pixels per metre of the pictures, at the strip.
+    camera : withe.perception.Camera
+        Camera whose plane z = 0 is the plane of the strip, with y vertical, instead of `scale`. Its lens distortion is
+        removed.
     error : float [m]
         Standard deviation of either length. By default 0.5 mm, or 0.3 pixels of a picture.
 
@@ -142,8 +147,8 @@ def measure(
     Raises
     ------
     ValueError
-        Missing input: pass length and drop, or an image and its scale. Lengths that are not positive or above 10 m, or
-        a drop that no strip of this length can have. A picture without a sheet, or readings of two different strips.
+        Missing input: pass length and drop, or an image and its scale or camera. Lengths that are not positive or above
+        10 m, or a drop that no strip of this length can have. A picture without a sheet, or readings of two different strips.
     ImportError
         An image file is given, and OpenCV is not installed.
 
@@ -159,10 +164,10 @@ def measure(
     >>> print(f"{1e3 * found.gravito_bending_length:.1f} mm, give or take {1e3 * found.error:.1f}")
     49.7 mm, give or take 0.4
     """
-    by_ruler = length is not None and drop is not None and image is None and scale is None
-    by_picture = image is not None and scale is not None and length is None and drop is None
+    by_ruler = length is not None and drop is not None and image is None and scale is None and camera is None
+    by_picture = image is not None and (scale is None) != (camera is None) and length is None and drop is None
     if not by_ruler and not by_picture:
-        raise ValueError("measure needs length and drop, or image and scale")
+        raise ValueError("measure needs length and drop, or image and either scale or camera")
     if by_ruler:
         along = validation.positive(length, "length")
         if not along < _LONGEST_REACH:
@@ -175,12 +180,16 @@ def measure(
         down = float(np.mean(drops))
         flat = _measured(_angle_where(1, down / along), along, down, error, by_reach=False)
         return flat if turned is None else _uncurled(flat, np.array([along, *drops]), error)
-    per_metre = validation.positive(scale, "scale")
+    scale = None if scale is None else validation.positive(scale, "scale")
+    pixels = [strip_ends(x) for x in (image, turned) if x is not None]
+    metric = [ends / scale if camera is None else camera.to_plane(ends)[:, :2] for ends in pixels]
+    per_metre = float(np.linalg.norm(np.diff(pixels[0], axis=0)) / np.linalg.norm(np.diff(metric[0], axis=0)))
     error = validation.non_negative(_READ / per_metre if error is None else error, "error")
-    ends = np.array([strip_ends(x) for x in (image, turned) if x is not None]) / per_metre
+    ends = np.abs([each[1] - each[0] for each in metric])
     across, down = (float(x) for x in ends.mean(axis=0))
     if not across < _LONGEST_REACH:
-        raise ValueError(f"scale must be in pixels per metre, got {per_metre:g}: the strip would reach {across:.3g} m")
+        wrong = "camera must be in metres" if scale is None else f"scale must be in pixels per metre, got {scale:g}"
+        raise ValueError(f"{wrong}: the strip would reach {across:.3g} m")
     flat = _measured(_angle_where_tip_is(across, down), across, down, error, by_reach=True)
     return flat if turned is None else _uncurled(flat, ends.ravel(), error)
 

@@ -16,8 +16,10 @@ FloatArray = npt.NDArray[np.float64]
 _TIP = 10.0  # length at the end that determines the tip [px], at least four times the thickness
 
 
-def strip_ends(image: npt.ArrayLike | str | os.PathLike[str]) -> tuple[float, float]:
-    """Horizontal and vertical distance from the clamp, where the strip enters the picture, to its tip [px].
+def strip_ends(image: npt.ArrayLike | str | os.PathLike[str]) -> FloatArray:
+    """Pixels of the clamp, where the strip enters the picture at its border, and of the tip, shape (2, 2).
+
+    The centre of the first pixel is (0, 0), so that the left border is at x = -0.5.
 
     Raises
     ------
@@ -40,7 +42,10 @@ def strip_ends(image: npt.ArrayLike | str | os.PathLike[str]) -> tuple[float, fl
     x, y = _tip(ink)
     if y <= clamp or mask[-1].any() or mask[0].any():
         raise ValueError("image must show a strip that hangs down and ends inside, got one that does not")
-    return x, y - clamp
+    ends = np.array([(0.0, clamp), (x, y)]) - 0.5
+    if right:
+        ends[:, 0] = picture.shape[1] - 1.0 - ends[:, 0]
+    return ends
 
 
 def _strip(mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:

@@ -16,9 +16,11 @@ from withe.perception.rod_prior import RodPrior
 from withe.perception.tags import TagDetection, detect_tags
 from withe.perception.tracing import trace, trace_mask
 from withe.perception.tracker import TrackedCable, Tracker
+from withe.perception.triangulation import CableInSpace, triangulate
 
 __all__ = [
     "Ambiguity",
+    "CableInSpace",
     "Camera",
     "CharucoBoard",
     "Chessboard",
@@ -41,4 +43,5 @@ __all__ = [
     "read_film",
     "trace",
     "trace_mask",
+    "triangulate",
 ]

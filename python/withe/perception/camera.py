@@ -283,6 +283,24 @@ class Camera:
             raise ValueError("pixels must see the plane in front of the camera, but some look above the plane")
         return np.column_stack([solution[:, :2], z])
 
+    def directions(self, pixels: ArrayLike) -> Array:
+        """Return the ratios x/z and y/z of lines of sight in the axes of the camera, without lens distortion.
+
+        Parameters
+        ----------
+        pixels : array_like of shape (n, 2) [px]
+
+        Returns
+        -------
+        ndarray of shape (n, 2)
+
+        Raises
+        ------
+        ValueError
+            A wrong shape, or pixels outside of the range of the lens distortion.
+        """
+        return self._normalised(_checked(pixels, (None, 2), "pixels"))
+
     def _normalised(self, pixels: Array) -> Array:
         """Directions (x/z, y/z) of pixels, distortion removed."""
         distorted = (pixels - self.matrix[:2, 2]) @ np.linalg.inv(self.matrix[:2, :2]).T

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from withe.perception.camera import Camera
 from withe.perception.mask_quality import MaskQuality
+from withe.perception.triangulation import CableInSpace, triangulate
 
 __all__ = ["Ambiguity", "Crossing", "Joint", "Tracing"]
 
@@ -143,6 +144,48 @@ class Tracing:
         points = camera.to_plane(line, height)
         points[:, 2] += lift
         return points
+
+    def triangulate(
+        self,
+        camera: Camera,
+        other: Tracing,
+        other_camera: Camera,
+        cable: int = 0,
+        other_cable: int = 0,
+        nodes: int = 101,
+    ) -> CableInSpace:
+        """Return the centreline of a cable in space, from this tracing and the tracing of a second view.
+
+        Parameters
+        ----------
+        camera, other_camera : Camera
+            Cameras of this tracing and of the other one, with matrices and poses in one world.
+        other : Tracing
+            Tracing of the second view.
+        cable, other_cable : int
+            Index of the cable in this tracing, and of the same cable in the other one.
+        nodes : int
+            Number of points.
+
+        Returns
+        -------
+        CableInSpace
+
+        Raises
+        ------
+        ValueError
+            A missing cable, a ring, or bad input as in `withe.perception.triangulate`.
+        """
+        lines = []
+        for tracing, index, name in ((self, cable, "cable"), (other, other_cable, "other_cable")):
+            if not isinstance(tracing, Tracing):
+                raise ValueError(f"other must be a Tracing, got {type(tracing).__name__}")
+            if not -len(tracing) <= index < len(tracing):
+                raise ValueError(f"{name} must be from 0 to {len(tracing) - 1}, got {index}")
+            if tracing.closed[index]:
+                raise ValueError(f"{name} must be a cable with two ends, got a ring: cut the ring in the masks")
+            lines.append(tracing.centrelines[index])
+        return triangulate(lines, (camera, other_camera), nodes=nodes)
 
     def to_dict(self) -> dict[str, Any]:
         """Return all fields as plain Python objects for JSON; labels as runs (label, length) row by row.
