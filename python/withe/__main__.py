@@ -1,4 +1,4 @@
-"""The command line: ``withe run SCENE``, ``withe perceive IMAGE``, ``withe track FILM``, ``withe deploy``, ``withe fold``."""
+"""The command line: ``withe run``, ``withe perceive``, ``withe track``, ``withe deploy``, ``withe fold``."""
 
 from __future__ import annotations
 

@@ -114,8 +114,17 @@ def hanging_film(seed: int) -> Film:
 
 
 def crossing_film(seed: int, frames: int = 90) -> Film:
-    """Two cables of one width, one of which moves over the other and beyond; both bend on their way."""
-    random = np.random.default_rng([seed, 2])
+    """Two cables of one width that are apart at first; then they cross, bend, and turn."""
+    for attempt in range(100):
+        film = _crossing(np.random.default_rng([seed, 2, attempt]), frames)
+        first, last = film.lines[0][:, ::4]
+        if np.sqrt(((first[:, None] - last[None]) ** 2).sum(axis=2)).min() > 3.0 * WIDTH:
+            return film
+    raise RuntimeError("no film in which the cables are apart at first")
+
+
+def _crossing(random: np.random.Generator, frames: int) -> Film:
+    """A film in which the cables may touch at first."""
     share = np.linspace(-0.5, 0.5, TRUE_NODES)
     angle = random.uniform(0.0, 2.0 * np.pi)
     between = np.radians(random.uniform(15.0, 165.0))

@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from withe.common import validation
 from withe.common.keywords import keyword_hints
-from withe.perception.masks import border_filter
 from withe.perception.images import check_image, read_image
+from withe.perception.masks import border_filter
 
 __all__ = ["JAW", "Cable", "MeasuredCable", "measure"]
 

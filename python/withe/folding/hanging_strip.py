@@ -148,7 +148,8 @@ def measure(
     ------
     ValueError
         Missing input: pass length and drop, or an image and its scale or camera. Lengths that are not positive or above
-        10 m, or a drop that no strip of this length can have. A picture without a sheet, or readings of two different strips.
+        10 m, or a drop that no strip of this length can have. A picture without a sheet, or readings of two different
+        strips.
     ImportError
         An image file is given, and OpenCV is not installed.
 
@@ -180,9 +181,9 @@ def measure(
         down = float(np.mean(drops))
         flat = _measured(_angle_where(1, down / along), along, down, error, by_reach=False)
         return flat if turned is None else _uncurled(flat, np.array([along, *drops]), error)
-    scale = None if scale is None else validation.positive(scale, "scale")
+    factor = 1.0 if scale is None else validation.positive(scale, "scale")
     pixels = [strip_ends(x) for x in (image, turned) if x is not None]
-    metric = [ends / scale if camera is None else camera.to_plane(ends)[:, :2] for ends in pixels]
+    metric = [ends / factor if camera is None else camera.to_plane(ends)[:, :2] for ends in pixels]
     per_metre = float(np.linalg.norm(np.diff(pixels[0], axis=0)) / np.linalg.norm(np.diff(metric[0], axis=0)))
     error = validation.non_negative(_READ / per_metre if error is None else error, "error")
     ends = np.abs([each[1] - each[0] for each in metric])

@@ -15,8 +15,8 @@ from withe.common.extras import require
 from withe.common.keywords import keyword_hints
 from withe.folding.paper import Paper
 from withe.perception.camera import Camera
-from withe.perception.masks import MaskFunction, border_filter
 from withe.perception.images import check_image, read_image
+from withe.perception.masks import MaskFunction, border_filter
 
 __all__ = ["SeenEdge", "camera_over", "find_edge", "overhead_camera"]
 

@@ -7,8 +7,8 @@ import os
 import numpy as np
 import numpy.typing as npt
 
-from withe.perception.masks import border_filter
 from withe.perception.images import check_image, read_image
+from withe.perception.masks import border_filter
 
 __all__ = ["strip_ends"]
 

@@ -77,7 +77,7 @@ class Chessboard:
         if not found:
             return None
         column, row = np.meshgrid(np.arange(1, self.columns), np.arange(1, self.rows))
-        places = self.square * np.column_stack([column.ravel(), row.ravel()])
+        places = np.column_stack([column.ravel(), row.ravel()]).astype(np.float64) * self.square
         return _refined(picture, np.asarray(corners, np.float64).reshape(-1, 2), _CLEAR), places
 
 

@@ -58,11 +58,13 @@ def calibrate_lens(images: Iterable[ArrayLike | str | os.PathLike[str]], board: 
             places.append(np.column_stack([found[1], np.zeros(len(found[1]))]).astype(np.float32))
     if len(seen) < FEWEST or shape is None:
         raise ValueError(
-            f"images must show the board in at least {FEWEST} pictures, got {len(seen)} of {given}: check the numbers of "
-            "squares of the board, and take sharp pictures in which it is tilted and fills much of the picture"
+            f"images must show the board in at least {FEWEST} pictures, got {len(seen)} of {given}: check the "
+            "numbers of squares of the board, and take sharp pictures in which the tilted board fills much of the frame"
         )
     # Boards that do not fill the corners of the picture hardly determine k3, the coefficient of r^6.
-    error, matrix, distortion, turns, _ = cv2.calibrateCamera(places, seen, shape[::-1], None, None, flags=cv2.CALIB_FIX_K3)
+    error, matrix, distortion, turns, _ = cv2.calibrateCamera(
+        places, seen, shape[::-1], None, None, flags=cv2.CALIB_FIX_K3
+    )
     normals = np.array([cv2.Rodrigues(turn)[0][:, 2] for turn in turns])
     cosines = np.clip(normals @ normals.T, -1.0, 1.0)
     if np.arccos(cosines.min()) < _LEAST_TILT:
@@ -72,7 +74,7 @@ def calibrate_lens(images: Iterable[ArrayLike | str | os.PathLike[str]], board: 
         )
     if not error < _OFF:
         raise ValueError(
-            f"images must agree with one camera, got a reprojection error of {error:.2g} px: check the numbers of squares "
-            "of the board, keep it flat, and use one focus and zoom"
+            f"images must agree with one camera, got a reprojection error of {error:.2g} px: check the numbers of "
+            "squares of the board, keep it flat, and use one focus and zoom"
         )
     return Lens(np.asarray(matrix, np.float64), np.asarray(distortion, np.float64).ravel()[:5], float(error))

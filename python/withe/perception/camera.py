@@ -93,8 +93,8 @@ class Camera:
     ) -> Camera:
         """Calibrate the lens of a camera from pictures of a board [1]_, by OpenCV.
 
-        Take about ten sharp pictures with one focus and zoom. Tilt the board by 20 to 40 degrees in different directions,
-        and show it in all corners of the picture.
+        Take about ten sharp pictures with one focus and zoom. Tilt the board by 20 to 40 degrees in different
+        directions, and show it in all corners of the picture.
 
         Parameters
         ----------

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from withe.common.extras import require
-from withe.perception.results import Tracing
 from withe.perception.images import check_image
+from withe.perception.results import Tracing
 from withe.perception.tracker import TrackedCable
 
 __all__ = ["draw", "draw_tracked"]

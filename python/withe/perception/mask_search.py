@@ -44,7 +44,7 @@ def _values(mask: Mask, points: Array) -> NDArray[np.bool_]:
     inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)
     x[~inside] = 0
     y[~inside] = 0
-    return (mask[y, x] != 0) & inside
+    return np.asarray((mask[y, x] != 0) & inside)
 
 
 def search_normals(mask: Mask, points: Array, normals: Array, reach: int, width: float) -> Sightings:

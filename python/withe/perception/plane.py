@@ -50,6 +50,6 @@ class Plane:
         if self.camera is None:
             return x.copy(), np.broadcast_to(np.eye(2), (len(x), 2, 2))
         count, step = len(x), 0.5
-        moved = np.concatenate([x, x + [step, 0.0], x + [0.0, step]])
+        moved = np.concatenate([x, x + np.array([step, 0.0]), x + np.array([0.0, step])])
         here, first, second = self.pixels(moved).reshape(3, count, 2)
         return here, np.stack([first - here, second - here], axis=2) / step

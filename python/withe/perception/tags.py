@@ -15,8 +15,8 @@ from withe.common.extras import require
 from withe.common.keywords import keyword_hints
 from withe.common.short_repr import ShortRepr
 from withe.perception.camera import Camera
-from withe.perception.tag_edges import refine_square
 from withe.perception.images import check_image, read_image
+from withe.perception.tag_edges import refine_square
 
 __all__ = ["TagDetection", "detect_tags"]
 

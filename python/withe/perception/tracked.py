@@ -83,6 +83,8 @@ class Tracked:
         if np.square(x[::-1] - self.x).sum() < np.square(x - self.x).sum():
             x = x[::-1].copy()
         self.x, self.velocity = x, np.zeros_like(x)
+        self.visible[:] = True
+        self.residual = 0.0
         if self.rod is None:
             self.chain.set_curvature(_curvature(x, self.chain.spacing))
 

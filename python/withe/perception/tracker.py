@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from withe import _core
 from withe.common import validation
 from withe.common.keywords import keyword_hints
 from withe.common.short_repr import ShortRepr
@@ -15,10 +16,10 @@ from withe.common.user_warnings import warn
 from withe.errors import LostCableWarning
 from withe.perception.camera import Camera
 from withe.perception.chain import resample
+from withe.perception.images import check_image
 from withe.perception.masks import MaskFunction, ground_filter
 from withe.perception.plane import Plane
 from withe.perception.rod_prior import RodPrior
-from withe.perception.images import check_image
 from withe.perception.tracing import check_mask, trace_mask
 from withe.perception.tracked import Tracked, sample_points
 
@@ -45,8 +46,8 @@ class TrackedCable(ShortRepr):
     points : ndarray of shape (nodes, 3) [m], or None
         Positions in the world, on the plane z = 0. None without a camera.
     residual : float [px]
-        Root mean square distance of the cable from the middle of the mask, where the cable is visible. NaN if no node is
-        visible.
+        Root mean square distance of the cable from the middle of the mask, where the cable is visible. NaN if no node
+        is visible.
     """
 
     name: str
@@ -90,13 +91,16 @@ class Tracker:
 
     Notes
     -----
-    The prior is two-dimensional: it neglects motion out of the plane, twist, and friction on the table. For a cable that
-    friction holds in its shape, leave out `rod`.
+    The prior is two-dimensional: it neglects motion out of the plane, twist, and friction on the table. For a cable
+    that friction holds in its shape, leave out `rod`.
 
-    Each frame minimises the incremental potential of the implicit Euler method [1]_: elastic energy, weight, and inertia
-    about the predicted positions, together with springs from the chain to the middles of the cross-sections of the mask.
-    Cross-sections are searched along normals of the chain [2]_. A cross-section wider than the cable has a second cable
-    beside it, and counts with the border that agrees with the prediction.
+    The tracker minimises the incremental potential of the implicit Euler method [1]_ in each frame: elastic energy,
+    weight, and inertia about the predicted positions. Springs pull the chain to the middles of cross-sections of the
+    mask, which are searched along normals of the chain [2]_. A cross-section wider than the cable has a second cable
+    beside it. It counts with the border that agrees with the prediction.
+
+    Two cables that lie on each other along their whole length cannot be told apart. An end that something covers
+    slowly looks like a cable that slides; `hidden` of `update` prevents that.
 
     References
     ----------
@@ -129,9 +133,9 @@ class Tracker:
     ) -> None:
         if camera is not None and not isinstance(camera, Camera):
             raise ValueError(f"camera must be a withe.perception.Camera, got {type(camera).__name__}")
-        rods = [rod] if isinstance(rod, RodPrior) else [] if rod is None else list(rod)
+        rods = [] if rod is None else list(rod) if isinstance(rod, Sequence) else [rod]
         if not all(isinstance(each, RodPrior) for each in rods):
-            raise ValueError("rod must be a RodPrior or a sequence of RodPrior")
+            raise ValueError(f"rod must be a RodPrior or a sequence of RodPrior, got {rod!r}")
         if rods and camera is None:
             raise ValueError("rod needs a camera, because its lengths are in metres: pass camera= as well")
         self._rods = rods
@@ -207,8 +211,8 @@ class Tracker:
         Warns
         -----
         LostCableWarning
-            A frame shows no cable. The tracker then keeps its last state, and `seen` is False. The warning is given once
-            per tracker.
+            A frame shows no cable. The tracker then keeps its last state, and `seen` is False. The warning is given
+            once per tracker.
         """
         pixels = self._checked_mask(image, mask)
         covered = None if hidden is None else self._checked_size(check_mask(hidden, "hidden"), "hidden")
@@ -225,7 +229,7 @@ class Tracker:
         if not self._seen and not self._warned:
             self._warned = True
             warn(
-                "the frame shows no cable, so the tracker keeps its last state: check the mask; "
+                "the frame shows no cable, so the tracker keeps its last state: check the mask. "
                 "Tracker.seen is False for each such frame",
                 LostCableWarning,
             )
@@ -314,30 +318,33 @@ class Tracker:
         for i, cable in enumerate(self._cables):
             others = [points for j, points in enumerate(expected) if j != i]
             cable.match(pixels, covered, others, self._reach, step)
-        self._seen = any(cable.visible.any() for cable in self._cables)
-        if not self._seen:
+        if not any(cable.visible.any() for cable in self._cables):
             for cable, (x, _) in zip(self._cables, before, strict=True):
                 cable.hold(x)
-            return
         lost = [cable for cable in self._cables if not cable.visible.any()]
-        if lost:
+        if lost and pixels.any():
             self._find_again(pixels, lost)
+        self._seen = any(cable.visible.any() for cable in self._cables)
 
     def _find_again(self, pixels: NDArray[np.uint8], lost: list[Tracked]) -> None:
         """Trace the frame, and set cables that no node is seen of to traces of their length."""
         taken = [self._plane.pixels(cable.x) for cable in self._cables if cable not in lost]
-        tracing = trace_mask(pixels)
-        for line, closed in zip(tracing.centrelines, tracing.closed, strict=True):
+        found = _core.trace_lines(pixels, None, "withe")  # without the warnings of trace_mask, frame by frame
+        for line, closed in zip(found["centrelines"], found["closed"], strict=True):
             middle = line[len(line) // 2]
-            near = any(np.hypot(*(points - middle).T).min() < 2.0 * lost[0].width for points in taken)
-            if closed or near or len(line) < 3:
+            if not lost or closed or any(_passes(points, middle, lost[0].width) for points in taken):
                 continue
             traced = self._plane.coordinates(line)
             fitting = [c for c in lost if abs(_length(traced) / c.length - 1.0) < _FOUND_AGAIN]
             if fitting:
-                nearest = min(fitting, key=lambda c: np.hypot(*(c.x.mean(axis=0) - traced.mean(axis=0))))
+                nearest = min(fitting, key=lambda c: float(np.hypot(*(c.x.mean(axis=0) - traced.mean(axis=0)))))
                 nearest.restart(resample(traced, self._count))
                 lost.remove(nearest)
+
+
+def _passes(nodes: Array, point: Array, width: float) -> bool:
+    """Return True if a cable passes a point within two widths."""
+    return bool(np.hypot(*(nodes - point).T).min() < 2.0 * width)
 
 
 def _length(line: Array) -> float:

@@ -22,7 +22,7 @@ _MATCHED = 241  # points of each line that are matched
 _SIDEWAYS = 0.5  # cost of a step along one line only [px^2]
 _WINDOW = 0.06  # greatest change of a node's place on a line in an iteration, relative to the length
 _ITERATIONS = 12
-_SMOOTH = 0.3  # weight of third differences of nodes, and of differences of edges, over that of distances in pixels
+_SMOOTH = 1.0  # weight of third differences of nodes, and of differences of edges, over that of distances in pixels
 _DAMPING = 1e-6
 _FAR_OFF = 5.0  # greatest root mean square distance of two views of one cable [px]
 _LEAST_BASELINE = 1e-3  # least distance of the cameras, relative to the distance of the cable
@@ -84,10 +84,10 @@ def triangulate(lines: Sequence[ArrayLike], cameras: Sequence[Camera], *, nodes:
     Notes
     -----
     A point of one line lies on the epipolar line of its partner in the other picture. The partners advance along both
-    lines from end to end, and the pairs with the least epipolar distances are found by dynamic programming. Afterwards,
-    the points in space are fitted to both lines by the Gauss-Newton method, with small weights of third differences and
-    of different distances between points. These weights decide where a line is parallel to its epipolar lines, since the
-    pictures do not determine the depth there.
+    lines from end to end. Dynamic programming finds the pairs with the least epipolar distances. The Gauss-Newton
+    method then fits points in space to both lines, with small weights of third differences and of different distances
+    between points. These weights decide where a line is parallel to its epipolar lines, since the pictures do not
+    determine the depth there.
     """
     if len(lines) != 2 or len(cameras) != 2:
         raise ValueError(f"lines and cameras must be pairs, got {len(lines)} lines and {len(cameras)} cameras")
@@ -109,8 +109,8 @@ def triangulate(lines: Sequence[ArrayLike], cameras: Sequence[Camera], *, nodes:
     found = CableInSpace(points, residuals, turned)
     if not found.rms < _FAR_OFF:
         raise ValueError(
-            f"lines must be views of one cable, but their residuals are {found.rms:.3g} px: check that both show the same "
-            "whole cable, and the poses of the cameras"
+            f"lines must be views of one cable, but their residuals are {found.rms:.3g} px: check that both show the "
+            "same whole cable, and the poses of the cameras"
         )
     return found
 
@@ -151,13 +151,13 @@ def _cheapest_path(costs: Array) -> tuple[float, NDArray[np.intp]]:
         j = diagonal - i
         before = np.minimum(total[i, j], np.minimum(total[i, j + 1], total[i + 1, j]) + _SIDEWAYS)
         total[i + 1, j + 1] = before + costs[i, j]
-    i = j = count - 1
-    path = [(i, j)]
-    while i > 0 or j > 0:
-        options = (total[i, j], total[i, j + 1] + _SIDEWAYS, total[i + 1, j] + _SIDEWAYS)
-        best = int(np.argmin(options))
-        i, j = i - (best != 2), j - (best != 1)
-        path.append((i, j))
+    row = column = count - 1
+    path = [(row, column)]
+    while row > 0 or column > 0:
+        beside = total[row, column + 1] + _SIDEWAYS, total[row + 1, column] + _SIDEWAYS
+        best = int(np.argmin((total[row, column], *beside)))
+        row, column = row - (best != 2), column - (best != 1)
+        path.append((row, column))
     return float(total[-1, -1] / count), np.array(path[::-1], np.intp)
 
 
@@ -249,4 +249,4 @@ def _regular(x: Array, weight: float) -> list[tuple[Array, Array]]:
     slope[index, index + 1] = edges / lengths[:, None]
     slope[index, index] = -edges / lengths[:, None]
     even = weight * np.diff(slope, axis=0).reshape(count - 2, -1)
-    return [(matrix, matrix @ x.ravel()), (even, weight * np.diff(lengths))]
+    return [(matrix, np.asarray(matrix @ x.ravel())), (even, np.asarray(weight * np.diff(lengths), np.float64))]
