@@ -249,4 +249,7 @@ def _regular(x: Array, weight: float) -> list[tuple[Array, Array]]:
     slope[index, index + 1] = edges / lengths[:, None]
     slope[index, index] = -edges / lengths[:, None]
     even = weight * np.diff(slope, axis=0).reshape(count - 2, -1)
-    return [(matrix, np.asarray(matrix @ x.ravel())), (even, np.asarray(weight * np.diff(lengths), np.float64))]
+    return [
+        (matrix, np.asarray(matrix @ x.ravel(), np.float64)),
+        (even, np.asarray(weight * np.diff(lengths), np.float64)),
+    ]
