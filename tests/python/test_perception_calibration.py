@@ -47,7 +47,7 @@ def test_distances_on_a_board_come_back_in_metres(calibrated):
         posed = Camera.from_points(seen, known, camera.matrix, camera.distortion)
         found = posed.to_plane(seen)[:, :2]
         assert np.abs(found - known).max() < 4e-4
-        assert np.linalg.norm(found[-1] - found[0]) == pytest.approx(np.linalg.norm(known[-1] - known[0]), abs=1e-4)
+        assert np.linalg.norm(found[-1] - found[0]) == pytest.approx(np.linalg.norm(known[-1] - known[0]), abs=3e-4)
         assert posed.translation == pytest.approx(place, abs=4e-3)
         assert posed.rotation == pytest.approx(rotation, abs=0.01)
 
@@ -115,7 +115,7 @@ def test_a_strip_is_measured_through_a_lens_with_distortion():
     assert found == pytest.approx(true, rel=0.01)
     assert abs(wrong - true) > 3.0 * abs(found - true)
     assert measure(image=plain, camera=Camera(matrix, **pose)).gravito_bending_length == pytest.approx(true, rel=1e-9)
-    with pytest.raises(ValueError, match="image and either scale or camera"):
+    with pytest.raises(ValueError, match="image and scale, or image and camera"):
         measure(image=plain, camera=lens, scale=scale)
 
 

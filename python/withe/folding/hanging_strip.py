@@ -168,7 +168,7 @@ def measure(
     by_ruler = length is not None and drop is not None and image is None and scale is None and camera is None
     by_picture = image is not None and (scale is None) != (camera is None) and length is None and drop is None
     if not by_ruler and not by_picture:
-        raise ValueError("measure needs length and drop, or image and either scale or camera")
+        raise ValueError("measure needs length and drop, or image and scale, or image and camera")
     if by_ruler:
         along = validation.positive(length, "length")
         if not along < _LONGEST_REACH:
