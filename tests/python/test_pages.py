@@ -9,7 +9,11 @@ import numpy as np
 import pytest
 
 import withe
+from cable_films import crossing_film, mask_of
+from rendered_boards import pictures
 from soft_limb import LOG
+from two_views import VIEWS, curve
+from withe.perception import Chessboard
 from withe.perception.synthetic import make_case, render
 from withe.view.graphics import probe_rendering
 
@@ -120,12 +124,25 @@ def a_picture_of_two_cables():
     cv2 = pytest.importorskip("cv2")
     case = make_case("crossing 60", 1)
     cv2.imwrite("cables.jpg", render(case, np.random.default_rng(0))[..., ::-1])
-    return {}
+    Path("boards").mkdir()
+    for number, board in enumerate(pictures(Chessboard(9, 6, 0.03), 4)):
+        cv2.imwrite(f"boards/{number}.png", board)
+    for number, camera in enumerate(VIEWS):
+        cv2.imwrite(f"view_{number}.png", np.uint8(200) * mask_of([camera.project(curve(5))]))
+    writer = cv2.VideoWriter("cables.avi", cv2.VideoWriter_fourcc(*"MJPG"), 30.0, (896, 672))
+    for mask in crossing_film(201, frames=60).masks():
+        writer.write(np.repeat(np.uint8(200) * mask[..., None], 3, axis=2))
+    writer.release()
+    return {"cameras": VIEWS}
 
 
 @after("docs/how_to/trace.md")
 def cables_become_rods(names):
     assert len(names["tracing"]) == 2
+    assert names["lens"].reprojection_error < 0.2
+    assert names["found"].length == pytest.approx(0.65, abs=0.01)
+    assert [cable.name for cable in names["cables"]] == ["red", "blue"]
+    assert names["tracker"].time is None
     (rod,) = names["scene"].build().rods
     assert rod.nodes == 101
 
