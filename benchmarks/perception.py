@@ -13,16 +13,19 @@ import os
 import statistics
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from reporting import Report
+from tracking_peers import CoherentPointDrift, TracedAnew
 
 from withe import _core
-from withe.perception import Camera, color_filter, trace, trace_mask
+from withe.perception import Camera, Tracker, color_filter, trace, trace_mask
 from withe.perception.synthetic import CASES, SyntheticScene, make_case, render, render_mask
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests" / "python"))
+from cable_films import NODES, RATE, SHAPE, TRUE_NODES, camera, crossing_film, hanging_film
 from labelled import RANGES, dice, orders, pictures
 from scoring import score
 
@@ -212,6 +215,89 @@ def speed(folder, rounds):
     line("frames a second", f"{1 / whole:.0f}", 1 / whole, 145 * 0.98e-3 / statistics.median(unit))
 
 
+def nodes_in_order(nodes, first, truth):
+    """Return nodes in the direction in which the first frame, `first`, agrees with the truth."""
+    turned = np.hypot(*(first - truth).T).mean() > np.hypot(*(first[::-1] - truth).T).mean()
+    return nodes[:, ::-1] if turned else nodes
+
+
+def hidden_cables(count, first_seed):
+    """Errors of the hidden 40 % of hanging cables during 2 s, and the speed of the tracker."""
+    factors = {"right": 1.0, "bending stiffness 30 % lower": 0.7, "bending stiffness 30 % higher": 1.3, "none": None}
+    errors, worst, seconds = {}, {}, []
+    for seed in range(first_seed, first_seed + count):
+        film = hanging_film(seed)
+        frames = slice(*film.hidden_frames)
+        masks = list(film.masks())[: frames.stop]
+        truth = film.lines[: frames.stop, 0, :: (TRUE_NODES - 1) // (NODES - 1)]
+        hidden = np.zeros(NODES, bool)
+        hidden[(film.hidden[0] + 3) // 4 : film.hidden[1] // 4 + 1] = True
+        trackers = {}
+        for name, factor in factors.items():
+            (rod,) = film.rods
+            rod = rod if factor is None else replace(rod, bend_stiffness=factor * rod.bend_stiffness)
+            tracker = Tracker(camera(), None if factor is None else rod, frame_rate=RATE)
+            trackers[f"rod {name}"] = lambda mask, tracker=tracker: tracker.update(mask=mask)[0].nodes
+        anew, drift = TracedAnew(), CoherentPointDrift()
+        trackers["trace of each frame"] = lambda mask, anew=anew: anew.update(mask)[0]
+        trackers["coherent point drift"] = drift.update
+        for name, update in trackers.items():
+            started = time.process_time()
+            nodes = np.array([update(mask) for mask in masks])
+            if name == "rod right":
+                seconds.append((time.process_time() - started) / len(masks))
+            error = np.linalg.norm(nodes_in_order(nodes, nodes[0], truth[0]) - truth, axis=2)[frames][:, hidden]
+            errors.setdefault(name, []).append(error.mean())
+            worst.setdefault(name, []).append(error.max())
+    print(f"Tracking, {count} hanging cables, 40 % hidden for 2 s, {SHAPE[1]} x {SHAPE[0]}, {NODES} nodes")
+    goals = {"rod right": 2, "rod bending stiffness 30 % lower": 8, "rod bending stiffness 30 % higher": 8}
+    for name, values in errors.items():
+        shown = f"{np.mean(values):.2f} (film {max(values):.2f}, node {max(worst[name]):.1f})"
+        if name in goals:
+            line(f"{name}: hidden [px]", shown, np.mean(values), goals[name], at_least=False)
+        else:
+            beside(f"{name}: hidden [px]", shown)
+    rate = 1.0 / statistics.median(seconds)
+    line("tracking, mask given [frames/s]", f"{rate:.0f}", rate, 60)
+
+
+def crossing_cables(count, first_seed):
+    """Count exchanges of two cables that cross, and lost cables."""
+    found = {"Tracker": [0, 0], "trace of each frame": [0, 0]}
+    for seed in range(first_seed, first_seed + count):
+        film = crossing_film(seed)
+        truth = film.lines[:, :, :: (TRUE_NODES - 1) // (NODES - 1)]
+        tracker, anew = Tracker(), TracedAnew()
+        updates = {
+            "Tracker": lambda mask, tracker=tracker: [cable.nodes for cable in tracker.update(mask=mask)],
+            "trace of each frame": lambda mask, anew=anew: list(anew.update(mask)),
+        }
+        nodes = {name: [] for name in updates}
+        for mask in film.masks():
+            for name, update in updates.items():
+                nodes[name].append(update(mask))
+        for name, frames in nodes.items():
+            begin, end = np.array(frames[0]), np.array(frames[-1])
+            swapped = lost = False
+            for first, last in zip(begin, end, strict=True):
+                options = [(c, w) for c in (0, 1) for w in (1, -1)]
+                c, w = min(options, key=lambda o: np.hypot(*(first - truth[0, o[0], :: o[1]]).T).mean())
+                right = np.hypot(*(last - truth[-1, c, ::w]).T).mean()
+                other = min(np.hypot(*(last - truth[-1, 1 - c, ::v]).T).mean() for v in (1, -1))
+                swapped |= bool(other < right)
+                lost |= bool(right > 10.0)
+            found[name][0] += swapped
+            found[name][1] += lost
+    print(f"Tracking, {count} films of two cables that cross")
+    for name, (swapped, lost) in found.items():
+        shown = f"{swapped} of {count} ({lost} more than 10 px off)"
+        if name == "Tracker":
+            line("exchanged names", shown, swapped, 0, at_least=False)
+            line("more than 10 px off at the end", f"{lost} of {count}", lost, 0, at_least=False)
+        else:
+            beside(f"exchanged names, {name}", shown)
+
+
 def thinning_is_exact(folder):
     """Compare thinning pixel by pixel."""
     try:
@@ -242,6 +328,8 @@ def main():
     else:
         print("No labelled images: WITHE_DATA does not name a folder with mbest in it")
     metres()
+    hidden_cables(2 if quick else 10, first_seed)
+    crossing_cables(3 if quick else 100, first_seed)
     order_of_self_crossings(20 if quick else 100, first_seed)
     synthetic(10 if quick else 40, 1.0, first_seed)
     if not quick:
