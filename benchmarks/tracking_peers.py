@@ -41,8 +41,8 @@ class TracedAnew:
 class CoherentPointDrift:
     """Non-rigid registration of nodes to pixels of the mask [Myronenko and Song 2010], for one cable.
 
-    As in TrackDLO [Xiang et al. 2023], the kernel of motion depends on distances along the cable. Nodes that no pixel is
-    near have a small membership, so that visible nodes carry hidden nodes. This is a version of our own, without the
+    As in TrackDLO [Xiang et al. 2023], the kernel of motion depends on distances along the cable. Nodes far from all
+    pixels have a small membership, so that visible nodes carry hidden nodes. This is a version of our own, without the
     published step that restores distances between nodes.
     """
 

@@ -15,6 +15,9 @@ Mask = NDArray[np.uint8]
 _SAME = 2.0  # greatest difference of a cross-section from the width of a cable of which it is the whole [px]
 _WIDEST = 2.6  # greatest width of a cross-section that determines a centre, relative to the width of the cable
 _NARROWEST = 0.35
+_FINE = 2  # samples per pixel beyond an end
+_ACROSS = np.array([-0.3, -0.15, 0.0, 0.15, 0.3])  # places across the end of a cable, relative to the width
+_RAGGED = 3.0  # greatest distance of the borders of an end from their median [px]
 _ONE_BORDER = 0.3  # weight of a centre that follows from one border only
 
 
@@ -83,18 +86,27 @@ def search_normals(mask: Mask, points: Array, normals: Array, reach: int, width:
     )
 
 
-def end_of_mask(mask: Mask, end: Array, direction: Array, reach: int) -> float:
+def end_of_mask(mask: Mask, end: Array, direction: Array, reach: int, width: float) -> float:
     """Return how far the mask continues beyond the end of a centreline [px].
 
-    The value is negative if the mask ends before the end. NaN if the mask does not show the centreline before its end,
-    or continues beyond the reach.
+    The value is a mean over parallel lines within the cable, so that it is finer than a pixel. It is negative if the
+    mask ends before the end. NaN if the mask does not show the centreline before its end, or continues beyond the reach.
     """
-    steps = np.arange(-reach, reach + 1)
-    seen = _values(mask, end + steps[:, None] * direction)
-    padded = np.concatenate([[False], seen, [False]]).astype(np.int8)
-    change = np.diff(padded)
-    first, last = np.flatnonzero(change == 1), np.flatnonzero(change == -1) - 1
-    before = np.flatnonzero(first <= reach)  # runs that begin before the end
-    if not len(before) or last[before[-1]] == len(steps) - 1:
+    steps = np.arange(-reach * _FINE, reach * _FINE + 1) / _FINE
+    middle = reach * _FINE
+    across = width * _ACROSS[:, None] * np.array([-direction[1], direction[0]])
+    seen = _values(mask, end + across[:, None] + steps[None, :, None] * direction)
+    padded = np.zeros((len(across), len(steps) + 2), np.int8)
+    padded[:, 1:-1] = seen
+    change = np.diff(padded, axis=1)
+    begins, ends = change[:, : middle + 1] == 1, change == -1
+    begun = begins.any(axis=1)
+    begin = middle - np.argmax(begins[:, ::-1], axis=1)  # of the last run that begins before the end
+    ends &= np.arange(ends.shape[1]) > begin[:, None]
+    last = np.argmax(ends, axis=1) - 1
+    good = begun & (last < len(steps) - 1)
+    if not good[len(_ACROSS) // 2]:
         return np.nan
-    return float(steps[last[before[-1]]]) + 0.5
+    found = steps[last[good]] + 0.5 / _FINE
+    near = np.abs(found - np.median(found)) < _RAGGED
+    return float(found[near].mean())

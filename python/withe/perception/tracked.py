@@ -17,11 +17,13 @@ Array = NDArray[np.float64]
 _SAMPLES = 3  # normals per edge
 _ROUNDS = 4  # greatest number of searches a frame
 _NEWTON = 3  # iterations of Newton's method after a search
+_FIRST_FITS = 5  # fits to the first frame, which start at rest
 _SETTLED = 0.02  # step of a node at which a frame is done [px]
 _HUBER = 4.0  # distance beyond which data pull with constant force [px]
 _MATCHED = 3.0  # greatest distance from the mask of a visible node after the fit [px]
-_END = 1.0  # weight of an end that the mask exceeds, relative to the data of a node
+_END = 5.0  # weight of an end that the mask exceeds, relative to the data of a node
 _END_INWARDS = 0.1  # weight of an end that exceeds the mask: the end may also be hidden
+_MARGIN = 3.0  # greatest margin of a mask beyond the ends of a cable [px]
 _END_SCALE = 3.0  # distance at which this weight has fallen to a half [px]
 _END_CLEAR = 1.2  # least distance of an end from other cables at which the mask shows it, relative to the width
 _SAG = 0.02  # displacement of a visible node by its weight [px]
@@ -77,6 +79,19 @@ class Tracked:
             self.chain.set_curvature(_curvature(x, spacing))
         self.ahead = x
         self.predicted_pixels = plane.pixels(x)
+        self.margins = [0.0, 0.0]  # length by which the mask exceeds either end in the first frame [px]
+
+    def settle(self, mask: NDArray[np.uint8], others: list[Array], reach: int, step: float) -> None:
+        """Fit the nodes to the first frame, and measure the margins of the mask."""
+        for _ in range(_FIRST_FITS):
+            self.predict(step)
+            self.match(mask, None, others, reach, step)
+            self.velocity[:] = 0.0
+        samples = sample_points(self.plane.pixels(self.x))
+        for end, (tip, direction) in enumerate(_tips(samples)):
+            off = end_of_mask(mask, tip, direction, reach, self.width)
+            if np.isfinite(off) and not self._is_crossed(np.stack([tip, tip + off * direction]), end, samples, others):
+                self.margins[end] = float(np.clip(off, -_MARGIN, _MARGIN))
 
     def restart(self, x: Array) -> None:
         """Set the nodes to a trace, in the direction that is nearer to the last nodes."""
@@ -202,10 +217,13 @@ class Tracked:
         certainties[seen.row[best]] = certainty[best]
         return offsets, certainties
 
-    def _is_crossed(self, ends: Array, node: int, samples: Array, others: list[Array]) -> bool:
-        """Return True if another cable, or another part of this one, passes an end: its mask hides the end."""
+    def _is_crossed(self, ends: Array, end: int, samples: Array, others: list[Array]) -> bool:
+        """Return True if another cable, or another part of this one, passes an end: its mask hides the end.
+
+        `end`: 0 for the first end, 1 for the last.
+        """
         far = max(_SAMPLES, round(_SELF * self.width / self.length * len(samples)))
-        own = samples[far:] if node == 0 else samples[:-far]
+        own = samples[far:] if end == 0 else samples[:-far]
         return any(bool((_nearest(ends, points) < _END_CLEAR * self.width).any()) for points in (*others, own))
 
     def _with_ends(
@@ -222,15 +240,14 @@ class Tracked:
         """Add the pulls on both ends along the cable."""
         count = len(x)
         edges, shares, axes, targets, weights = [], [], [], [], []
-        for node, inner, edge, share in ((0, _SAMPLES, 0, 0.0), (count - 1, -1 - _SAMPLES, count - 2, 1.0)):
-            tip = samples[0] if node == 0 else samples[-1]
-            direction = tip - samples[inner]
-            direction /= max(float(np.hypot(*direction)), 1e-9)
-            off = end_of_mask(mask, tip, direction, reach)
-            if not np.isfinite(off) or self._is_crossed(np.stack([tip, tip + off * direction]), node, samples, others):
+        for end, (tip, direction) in enumerate(_tips(samples)):
+            node, edge, share = (0, 0, 0.0) if end == 0 else (count - 1, count - 2, 1.0)
+            off = end_of_mask(mask, tip, direction, reach, self.width)
+            if not np.isfinite(off) or self._is_crossed(np.stack([tip, tip + off * direction]), end, samples, others):
                 continue
             if covered is not None and _is_covered(covered, tip + (off + 2.0) * direction):
                 continue
+            off -= self.margins[end]
             axis = slopes[node].T @ direction
             size = max(float(np.hypot(*axis)), 1e-9)
             axis /= size
@@ -262,6 +279,15 @@ def _squares(points: Array, line: Array) -> Array:
 def _nearest(points: Array, line: Array) -> Array:
     """Distance of each point from the nearest sample of a line."""
     return np.asarray(np.sqrt(np.maximum(_squares(points, line).min(axis=1, initial=np.inf), 0.0)))
+
+
+def _tips(samples: Array) -> list[tuple[Array, Array]]:
+    """Points and outward directions of both ends."""
+    tips = []
+    for tip, inner in ((samples[0], samples[_SAMPLES]), (samples[-1], samples[-1 - _SAMPLES])):
+        way = tip - inner
+        tips.append((tip, way / max(float(np.hypot(*way)), 1e-9)))
+    return tips
 
 
 def _is_covered(covered: NDArray[np.uint8], point: Array) -> bool:

@@ -308,6 +308,9 @@ class Tracker:
             self._cables.append(
                 Tracked(names[k], resample(lines[i], self._count), length, width, rod, self._plane, self._step)
             )
+        shown = [sample_points(cable.predicted_pixels) for cable in self._cables]
+        for k, cable in enumerate(self._cables):
+            cable.settle(pixels, shown[:k] + shown[k + 1 :], self._reach, self._step)
 
     def _follow(self, pixels: NDArray[np.uint8], covered: NDArray[np.uint8] | None, step: float) -> None:
         """Move every cable by one step; if none is seen, keep them."""
