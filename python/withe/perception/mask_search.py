@@ -17,7 +17,7 @@ _WIDEST = 2.6  # greatest width of a cross-section that determines a centre, rel
 _NARROWEST = 0.35
 _FINE = 2  # samples per pixel beyond an end
 _ACROSS = np.array([-0.3, -0.15, 0.0, 0.15, 0.3])  # places across the end of a cable, relative to the width
-_RAGGED = 3.0  # greatest distance of the borders of an end from their median [px]
+_RAGGED = 3.0  # greatest distance of a border of an end from that on the middle line [px]
 _ONE_BORDER = 0.3  # weight of a centre that follows from one border only
 
 
@@ -50,16 +50,20 @@ def _values(mask: Mask, points: Array) -> NDArray[np.bool_]:
     return np.asarray((mask[y, x] != 0) & inside)
 
 
-def search_normals(mask: Mask, points: Array, normals: Array, reach: int, width: float) -> Sightings:
+def search_normals(
+    mask: Mask, covered: Mask | None, points: Array, normals: Array, reach: int, width: float
+) -> Sightings:
     """Find possible centres of a cable on each normal.
 
     A run of the mask along a normal that is as wide as the cable has its centre in the middle. Another run has two
     possible centres, half a width from either border: a wider run shows a second cable beside this cable, and a
-    narrower run is covered in part.
+    narrower run is covered in part. A border of a run beside a covered pixel is not a border of the cable.
 
     Parameters
     ----------
     mask : ndarray of uint8, shape (height, width)
+    covered : ndarray of uint8, shape (height, width), or None
+        Pixels where something may cover the cable.
     points, normals : ndarray of shape (samples, 2) [px]
     reach : int [px]
         Greatest offset.
@@ -67,7 +71,8 @@ def search_normals(mask: Mask, points: Array, normals: Array, reach: int, width:
         Width of the cable.
     """
     steps = np.arange(-reach, reach + 1)
-    seen = _values(mask, points[:, None] + steps[None, :, None] * normals[:, None])
+    places = points[:, None] + steps[None, :, None] * normals[:, None]
+    seen = _values(mask, places)
     padded = np.zeros((len(points), len(steps) + 2), np.int8)
     padded[:, 1:-1] = seen
     change = np.diff(padded, axis=1)
@@ -76,6 +81,10 @@ def search_normals(mask: Mask, points: Array, normals: Array, reach: int, width:
     left, right = steps[first] - 0.5, steps[last] + 0.5
     across = right - left
     has_left, has_right = first > 0, last < len(steps) - 1
+    if covered is not None:
+        behind = _values(covered, places)
+        has_left &= ~behind[rows, np.maximum(first - 1, 0)]
+        has_right &= ~behind[rows, np.minimum(last + 1, len(steps) - 1)]
     whole = has_left & has_right & (np.abs(across - width) <= max(_SAME, 0.25 * width))
     usable = (across <= _WIDEST * width) & (across >= _NARROWEST * width) & ~whole
     good = np.concatenate([whole, usable & has_left, usable & has_right])
@@ -90,7 +99,8 @@ def end_of_mask(mask: Mask, end: Array, direction: Array, reach: int, width: flo
     """Return how far the mask continues beyond the end of a centreline [px].
 
     The value is a mean over parallel lines within the cable, so that it is finer than a pixel. It is negative if the
-    mask ends before the end. NaN if the mask does not show the centreline before its end, or continues beyond the reach.
+    mask ends before the end. It is NaN if the mask does not show the centreline before its end, or continues beyond the
+    reach.
     """
     steps = np.arange(-reach * _FINE, reach * _FINE + 1) / _FINE
     middle = reach * _FINE
@@ -107,6 +117,6 @@ def end_of_mask(mask: Mask, end: Array, direction: Array, reach: int, width: flo
     good = begun & (last < len(steps) - 1)
     if not good[len(_ACROSS) // 2]:
         return np.nan
-    found = steps[last[good]] + 0.5 / _FINE
-    near = np.abs(found - np.median(found)) < _RAGGED
-    return float(found[near].mean())
+    middle_line = steps[last[len(_ACROSS) // 2]]
+    found = steps[last[good]]
+    return float(found[np.abs(found - middle_line) < _RAGGED].mean()) + 0.5 / _FINE

@@ -21,9 +21,9 @@ _FIRST_FITS = 5  # fits to the first frame, which start at rest
 _SETTLED = 0.02  # step of a node at which a frame is done [px]
 _HUBER = 4.0  # distance beyond which data pull with constant force [px]
 _MATCHED = 3.0  # greatest distance from the mask of a visible node after the fit [px]
-_END = 5.0  # weight of an end that the mask exceeds, relative to the data of a node
-_END_INWARDS = 0.1  # weight of an end that exceeds the mask: the end may also be hidden
-_MARGIN = 3.0  # greatest margin of a mask beyond the ends of a cable [px]
+_END = 20.0  # weight of an end that the mask exceeds, relative to the data of a node
+_END_INWARDS = 0.3  # weight of an end that exceeds the mask: the end may also be hidden
+_MARGIN = 0.8  # greatest margin of a mask beyond the ends of a cable, relative to the width: ends may be round
 _END_SCALE = 3.0  # distance at which this weight has fallen to a half [px]
 _END_CLEAR = 1.2  # least distance of an end from other cables at which the mask shows it, relative to the width
 _SAG = 0.02  # displacement of a visible node by its weight [px]
@@ -82,16 +82,22 @@ class Tracked:
         self.margins = [0.0, 0.0]  # length by which the mask exceeds either end in the first frame [px]
 
     def settle(self, mask: NDArray[np.uint8], others: list[Array], reach: int, step: float) -> None:
-        """Fit the nodes to the first frame, and measure the margins of the mask."""
+        """Fit the nodes to the first frame, and measure the margins of the mask, equal at both ends."""
+        limit = _MARGIN * self.width
+        excess = 0.5 * (float(np.linalg.norm(np.diff(self.x, axis=0), axis=1).sum()) - self.length)
+        self.margins = [float(np.clip(excess, -limit, limit))] * 2
         for _ in range(_FIRST_FITS):
             self.predict(step)
             self.match(mask, None, others, reach, step)
             self.velocity[:] = 0.0
-        samples = sample_points(self.plane.pixels(self.x))
-        for end, (tip, direction) in enumerate(_tips(samples)):
-            off = end_of_mask(mask, tip, direction, reach, self.width)
-            if np.isfinite(off) and not self._is_crossed(np.stack([tip, tip + off * direction]), end, samples, others):
-                self.margins[end] = float(np.clip(off, -_MARGIN, _MARGIN))
+            samples = sample_points(self.plane.pixels(self.x))
+            found = [end_of_mask(mask, tip, way, reach, self.width) for tip, way in _tips(samples)]
+            crossed = any(
+                self._is_crossed(np.stack([tip, tip + off * way]), end, samples, others)
+                for end, ((tip, way), off) in enumerate(zip(_tips(samples), found, strict=True))
+            )
+            if np.isfinite(found).all() and not crossed:
+                self.margins = [float(np.clip(np.mean(found), -limit, limit))] * 2
 
     def restart(self, x: Array) -> None:
         """Set the nodes to a trace, in the direction that is nearer to the last nodes."""
@@ -174,7 +180,7 @@ class Tracked:
         tangents = np.gradient(samples, axis=0)
         tangents /= np.maximum(np.linalg.norm(tangents, axis=1), 1e-9)[:, None]
         normals = np.column_stack([-tangents[:, 1], tangents[:, 0]])
-        offset, certainty = self._centres(mask, samples, normals, expected, others, reach)
+        offset, certainty = self._centres(mask, covered, samples, normals, expected, others, reach)
         good = certainty > 0.0
         weight = certainty[good] * self.chain.data / _SAMPLES
         weight *= np.minimum(1.0, _HUBER / np.maximum(np.abs(offset[good]), 1e-9))
@@ -189,14 +195,21 @@ class Tracked:
         return self._with_ends(pulls, mask, covered, x, samples, slopes, others, reach), offset
 
     def _centres(
-        self, mask: NDArray[np.uint8], samples: Array, normals: Array, expected: Array, others: list[Array], reach: int
+        self,
+        mask: NDArray[np.uint8],
+        covered: NDArray[np.uint8] | None,
+        samples: Array,
+        normals: Array,
+        expected: Array,
+        others: list[Array],
+        reach: int,
     ) -> tuple[Array, Array]:
         """Return the offset of the cable at each sample and its certainty, 0 to 1.
 
         Another cable, or another part of this cable, explains a centre of the mask if its prediction is nearer. Of the
         remaining centres, the one nearest to the prediction counts.
         """
-        seen = search_normals(mask, samples, normals, reach, self.width)
+        seen = search_normals(mask, covered, samples, normals, reach, self.width)
         found = samples[seen.row] + seen.offset[:, None] * normals[seen.row]
         off = np.abs(seen.offset - ((expected - samples) * normals).sum(axis=1)[seen.row])
         rival = np.full(len(off), np.inf)
