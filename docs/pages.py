@@ -117,6 +117,7 @@ EXAMPLES = {
     "Hands, cables and sheets": (
         "carry_rope",
         "pull_rope",
+        "track_cables",
         "place_cable",
         "write_word",
         "tie_knot",

@@ -26,7 +26,7 @@ LENGTH, RADIUS, DENSITY, STIFFNESS = 0.6, 4e-3, 0.02, 1.2e-4  # of the cable [m]
 SCALE, WIDTH, HEIGHT = 1000.0, 896, 560  # of the pictures [px/m], [px], [px]
 RATE, DURATION = 60.0, 3.0  # of the film [1/s], [s]
 HIDDEN = (0.5, 2.5)  # times between which the board is there [s]
-BOARD = (330, 40, 560, 540)  # left, top, right and bottom [px]
+BOARD = (316, 40, 572, 540)  # left, top, right and bottom [px]
 NODES, FINE = 41, 4  # nodes of the trackers; edges of the cable per edge of a tracker
 
 
@@ -52,7 +52,7 @@ def motion(duration: float) -> np.ndarray:
     begin = simulation.positions(cable)[-1]
 
     def path(time: float) -> np.ndarray:
-        return begin + [0.05 * np.sin(4.5 * time), 0.0, 0.06 * np.sin(3.0 * time) ** 2]
+        return begin + np.array([0.05 * np.sin(4.5 * time), 0.0, 0.06 * np.sin(3.0 * time) ** 2])
 
     simulation.move(hand, path=path)
     record = simulation.run(duration, record_every=1.0 / RATE, progress=False)
@@ -94,15 +94,14 @@ def main() -> None:
     board = np.zeros((HEIGHT, WIDTH), bool)
     board[BOARD[1] : BOARD[3], BOARD[0] : BOARD[2]] = True
     nodes: dict[str, list[np.ndarray]] = {name: [] for name in trackers}
-    covered, shares = [], []
+    covered = []
     for time, line in zip(times, truth, strict=True):
         there = HIDDEN[0] <= time < HIDDEN[1]
         image = picture(line, there)
         column, row = np.round(line[::FINE]).astype(int).T
         covered.append(there & board[row, column])
-        shares.append(covered[-1].mean())
         for name, tracker in trackers.items():
-            (cable,) = tracker.update(image, hidden=board if there else None, time=time)
+            (cable,) = tracker.update(image, hidden=board & there, time=time)
             nodes[name].append(cable.nodes)
     hidden = np.array(covered)
     errors = {}
@@ -110,15 +109,15 @@ def main() -> None:
         turned = np.hypot(*(found[0][0] - truth[0, 0])) > np.hypot(*(found[0][-1] - truth[0, 0]))
         nodes[name] = [each[::-1] if turned else each for each in found]
         errors[name] = np.linalg.norm(np.array(nodes[name]) - truth[:, ::FINE], axis=2)
-        print(
-            f"{name}: hidden nodes are {errors[name][hidden].mean():.2f} px off on the mean, {hidden.mean():.0%} hidden"
-        )
+        print(f"{name}: hidden nodes are {errors[name][hidden].mean():.2f} px off on the mean")
+    means = {}
+    for name, error in errors.items():
+        parts = [part if part.any() else np.ones_like(part) for part in hidden]
+        means[name] = [each[part].mean() for each, part in zip(error, parts, strict=True)]
 
     colors = style.use()
     figure, (left, right) = plt.subplots(1, 2, figsize=(11.0, 4.2), width_ratios=(1.6, 1.0))
-    frame = int(
-        np.argmax([errors["without"][i][hidden[i]].mean() if hidden[i].any() else 0.0 for i in range(len(times))])
-    )
+    frame = int(np.argmax(means["without"]))
     left.imshow(picture(truth[frame], True))
     left.plot(*truth[frame].T, color="white", lw=1.0, label="true centreline")
     for name, color, size in (("without", colors.sky, 5.0), ("with the rod", colors.yellow, 3.5)):
@@ -127,10 +126,7 @@ def main() -> None:
     left.legend(loc="lower left", labelcolor="white", facecolor="#26292f", framealpha=0.9, fontsize=8)
     left.spines[:].set_visible(False)
     for name, color in (("without", colors.blue), ("with the rod", colors.red)):
-        means = [
-            errors[name][i][hidden[i]].mean() if hidden[i].any() else errors[name][i].mean() for i in range(len(times))
-        ]
-        right.plot(times, means, color=color, label=name)
+        right.plot(times, means[name], color=color, label=name)
     right.axvspan(*HIDDEN, color=colors.pale, zorder=0)
     right.set(title="Error of the hidden nodes", ylim=(0.0, None), xlim=(0.0, times[-1]))
     style.label(right, x=("time", "s"), y=("mean error", "px"))

@@ -60,6 +60,7 @@ EXAMPLES = {
     "tendon_arm.py": (["--points", "4"], r"mm, ([.\d]+) mm off theory", 0.0, 0.05),
     "throwing_tip.py": (["--iterations", "120"], r"within ([.\d]+) mm of each point", 0.0, 1.0),
     "tie_knot.py": (["--knots", "trefoil", "--nodes", "60"], r"trefoil: tied (\d) of 1", 1, 1),
+    "track_cables.py": (["--duration", "1.5"], r"with the rod: hidden nodes are ([.\d]+) px off", 0.1, 3.0),
     "write_word.py": (["--nodes", "140", "--ways", "exact"], r"exact: ([.\d]+) mm off on the mean", 0.0, 2.5),
     "spider.py": (["--duration", "0.2"], r"half the step: no node moves by more than ([.\d]+)%", 0.0, 2.0),
 }

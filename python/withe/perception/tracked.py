@@ -264,8 +264,9 @@ class Tracked:
             axis = slopes[node].T @ direction
             size = max(float(np.hypot(*axis)), 1e-9)
             axis /= size
-            if off >= 0.0:
-                weight = _END * min(1.0, _HUBER / max(off, 1e-9))
+            # With known covers, an end inside the chain is an end; otherwise something may hide the rest.
+            if off >= 0.0 or covered is not None:
+                weight = _END * min(1.0, _HUBER / max(abs(off), 1e-9))
             else:
                 weight = _END_INWARDS / (1.0 + (off / _END_SCALE) ** 2) ** 2
             edges.append(edge)

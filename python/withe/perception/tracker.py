@@ -191,8 +191,9 @@ class Tracker:
         mask : array_like of shape (height, width), optional
             Pixels of cables: booleans or numbers.
         hidden : array_like of shape (height, width), optional
-            Pixels where something may cover a cable, such as a gripper. The mask is not used there, and ends at its
-            border are not taken for ends of a cable.
+            Pixels where something may cover a cable, such as a gripper; all False if nothing does. The mask is not used
+            there, and ends at its border are not taken for ends of a cable. All other ends are then ends of a cable.
+            Without `hidden`, each end of the mask may be the border of something that covers the cable.
         time : float, optional [s]
             Time of the frame, by default one frame period after the last frame.
 
