@@ -66,9 +66,23 @@ class Chessboard:
         return np.kron(cells, np.ones((pixels, pixels), np.uint8))
 
     def find(self, picture: NDArray[np.uint8]) -> tuple[Array, Array] | None:
-        """Return the inner corners in a grey picture, shape (n, 2) [px], and on the board, shape (n, 2) [m].
+        """Find the inner corners of the board in a picture.
 
-        None if the picture does not show the whole board.
+        Parameters
+        ----------
+        picture : ndarray of uint8, shape (height, width)
+            Grey picture.
+
+        Returns
+        -------
+        pair of ndarray of shape (n, 2), or None
+            Corners in the picture [px], and on the board [m], from the outer corner of the first square. None if the
+            picture does not show the whole board.
+
+        Raises
+        ------
+        ImportError
+            OpenCV is not installed.
         """
         cv2: Any = require("cv2", "vision")
         inner = self.columns - 1, self.rows - 1
@@ -150,9 +164,23 @@ class CharucoBoard:
         return np.asarray(self._made().generateImage(size, marginSize=pixels), np.uint8)
 
     def find(self, picture: NDArray[np.uint8]) -> tuple[Array, Array] | None:
-        """Return the inner corners in a grey picture, shape (n, 2) [px], and on the board, shape (n, 2) [m].
+        """Find the inner corners of the board in a picture.
 
-        None if the picture shows fewer than six corners.
+        Parameters
+        ----------
+        picture : ndarray of uint8, shape (height, width)
+            Grey picture.
+
+        Returns
+        -------
+        pair of ndarray of shape (n, 2), or None
+            Corners in the picture [px], and on the board [m], from the outer corner of the first square. None if the
+            picture shows fewer than six corners.
+
+        Raises
+        ------
+        ImportError
+            OpenCV is not installed.
         """
         cv2: Any = require("cv2", "vision")
         board = self._made()
