@@ -346,3 +346,17 @@ def test_files_that_are_no_films_are_refused(tmp_path, capsys, content):
         next(read_film(path))
     assert main(["track", str(path)]) == 2
     assert "path must be a film that can be read" in capsys.readouterr().err
+
+
+def test_ends_stay_in_place_while_a_known_board_hides_a_part_that_bends():
+    tracker = Tracker()
+    hidden = np.zeros(SHAPE, bool)
+    for frame in range(25):
+        truth = arc(bend=1.0 + 0.03 * frame)
+        if frame == 5:
+            hidden[:, 360:536] = True
+        (cable,) = tracker.update(mask=mask_of([truth]) & ~hidden, hidden=hidden)
+    error = apart(cable.nodes, truth[::4])
+    assert error[[0, -1]].max() < 1.5
+    assert error.mean() < 4.0
+    assert not cable.visible[18:23].any()
