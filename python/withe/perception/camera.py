@@ -91,7 +91,7 @@ class Camera:
     def calibrate(
         cls, images: Iterable[ArrayLike | str | os.PathLike[str]], board: Chessboard | CharucoBoard
     ) -> Camera:
-        """Calibrate the lens of a camera from pictures of a board [1]_, by OpenCV.
+        """Calibrate the lens of a camera from pictures of a board [Zhang 2000], by OpenCV.
 
         Take about ten sharp pictures with one focus and zoom. Tilt the board by 20 to 40 degrees in different
         directions, and show it in all corners of the picture.
@@ -117,11 +117,6 @@ class Camera:
             all parallel, or a reprojection error of 2 px or more.
         ImportError
             OpenCV is not installed: ``pip install ".[vision]"`` in a clone of withe.
-
-        References
-        ----------
-        .. [1] Zhang, Z. (2000). A flexible new technique for camera calibration. IEEE Transactions on Pattern Analysis
-           and Machine Intelligence 22(11).
         """
         lens = calibrate_lens(images, board)
         camera = cls(lens.matrix, lens.distortion)

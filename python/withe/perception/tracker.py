@@ -94,18 +94,13 @@ class Tracker:
     The prior is two-dimensional: it neglects motion out of the plane, twist, and friction on the table. For a cable
     that friction holds in its shape, leave out `rod`.
 
-    The tracker minimises the incremental potential of the implicit Euler method [1]_ in each frame: elastic energy,
+    The tracker minimises the incremental potential of the implicit Euler method [Martin et al. 2011] in each frame: elastic energy,
     weight, and inertia about the predicted positions. Springs pull the chain to the middles of cross-sections of the
-    mask, which are searched along normals of the chain [2]_. A cross-section wider than the cable has a second cable
+    mask, which are searched along normals of the chain [Harris and Stennett 1990]. A cross-section wider than the cable has a second cable
     beside it. It counts with the border that agrees with the prediction.
 
     Two cables that lie on each other along their whole length cannot be told apart. An end that something covers
     slowly looks like a cable that slides; `hidden` of `update` prevents that.
-
-    References
-    ----------
-    .. [1] Martin, S. et al. (2011). Example-based elastic materials. ACM Transactions on Graphics 30(4).
-    .. [2] Harris, C. and Stennett, C. (1990). RAPID, a video rate object tracker. British Machine Vision Conference.
 
     Examples
     --------
