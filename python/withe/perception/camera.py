@@ -91,7 +91,7 @@ class Camera:
     def calibrate(
         cls, images: Iterable[ArrayLike | str | os.PathLike[str]], board: Chessboard | CharucoBoard
     ) -> Camera:
-        """Calibrate the lens of a camera from pictures of a board [Zhang 2000], by OpenCV.
+        """Calibrate the lens of a camera from pictures of a board [Zhang 2000, PAMI 22], by OpenCV.
 
         Take about ten sharp pictures with one focus and zoom. Tilt the board by 20 to 40 degrees in different
         directions, and show it in all corners of the picture.

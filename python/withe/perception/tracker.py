@@ -94,10 +94,11 @@ class Tracker:
     The prior is two-dimensional: it neglects motion out of the plane, twist, and friction on the table. For a cable
     that friction holds in its shape, leave out `rod`.
 
-    The tracker minimises the incremental potential of the implicit Euler method [Martin et al. 2011] in each frame: elastic energy,
-    weight, and inertia about the predicted positions. Springs pull the chain to the middles of cross-sections of the
-    mask, which are searched along normals of the chain [Harris and Stennett 1990]. A cross-section wider than the cable has a second cable
-    beside it. It counts with the border that agrees with the prediction.
+    The tracker minimises the incremental potential of the implicit Euler method in each frame [Martin et al. 2011,
+    Example-based elastic materials]: elastic energy, weight, and inertia about the predicted positions. Springs pull
+    the chain to the middles of cross-sections of the mask. The tracker searches for cross-sections along normals of the
+    chain [Harris and Stennett 1990, RAPID]. A cross-section wider than the cable has a second cable beside it. It
+    counts with the border that agrees with the prediction.
 
     Two cables that lie on each other along their whole length cannot be told apart. An end that something covers
     slowly looks like a cable that slides; `hidden` of `update` prevents that.
