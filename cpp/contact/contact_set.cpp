@@ -16,8 +16,8 @@ namespace {
 // face.
 constexpr double kMaxEntryDepth = 0.5;
 
-/// Of a point that comes to a face from beside it: as deep as it is. It presses on an edge there, and does not begin to
-/// press on the face too [m].
+/// Depth at which surfaces begin that come to each other from beside: as deep as they are. An edge carries them there,
+/// and they do not press at once [m].
 double depth_of_entry(const ContactProblem& problem, const ContactRecord* record, const Touching& t) {
   if (!t.pair.may_be_beyond() || problem.starting || (record && record->approach > 0.0)) return 0.0;
   const bool beside = problem.bodies.proximity(t.pair, problem.start->q).beyond;

@@ -2,7 +2,8 @@
 /// Contact of points with the faces of rigid bodies.
 ///
 /// A face is a region of a plane, a little below the surface that touches. The body carries an edge along the normal of
-/// the face, from a point b0 of the plane to b1, of the length L. The distance of a point p from the plane is then bilinear in the points,
+/// the face. It goes from a point b0 of the plane to b1, and has the length L. The distance of a point p from the plane
+/// is then bilinear in the points,
 ///   D = |(p - b0) . (b1 - b0)| / L.
 /// Its change in a step is exactly G . (x1 - x0), where G has the means of both factors. With n = (b1 - b0) / L and
 /// y = p - b0 in the middle of the step, the forces along G are n on p, -n - y / L on b0 and y / L on b1. Their sum and
@@ -58,7 +59,8 @@ template <class Scalar>
 struct FaceVectors {
   Vec3<Scalar> point, edge;
 
-  FaceVectors(const Vec3<Scalar> (&x)[4], double share) : point(x[0] + share * (x[1] - x[0]) - x[2]), edge(x[3] - x[2]) {}
+  FaceVectors(const Vec3<Scalar> (&x)[4], double share)
+      : point(x[0] + share * (x[1] - x[0]) - x[2]), edge(x[3] - x[2]) {}
   /// The side on which the point is, over L.
   double over(const Face& face) const { return (value_of(dot(point, edge)) < 0.0 ? -1.0 : 1.0) / face.length; }
 };

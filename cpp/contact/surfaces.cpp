@@ -286,7 +286,9 @@ void Surfaces::find_neighbours() {
   }
   neighbours_.resize(at(model_.edge_count));
   std::vector<std::vector<SurfaceNode>> surfaces_at(at(model_.node_count)), nodes_of(at(model_.edge_count));
+  double inside = 0.0;  // how deep in their bodies nodes are
   for (const SurfaceNode& each : surface_nodes()) {
+    inside = std::max(inside, -each.distance);
     surfaces_at[at(each.node)].push_back(each);
     nodes_of[at(each.edge)].push_back(each);
   }
@@ -297,7 +299,7 @@ void Surfaces::find_neighbours() {
     std::priority_queue<Visit, std::vector<Visit>, std::greater<>> queue;
     std::vector<int> seen;
     const auto reach = [&](int node, double d) {
-      if (d >= limit || d >= distance[at(node)]) return;
+      if (d >= limit + inside || d >= distance[at(node)]) return;
       if (!std::isfinite(distance[at(node)])) seen.push_back(node);
       distance[at(node)] = d;
       queue.emplace(d, node);
@@ -313,7 +315,7 @@ void Surfaces::find_neighbours() {
       for (const SurfaceNode& surface : surfaces_at[at(node)])
         if (d + surface.distance < limit) found.push_back(surface.edge);
       for (int other : edges_at[at(node)]) {
-        found.push_back(other);
+        if (d < limit) found.push_back(other);
         reach(model_.edge_tail[at(other)], d + model_.edge_length(other));
         reach(model_.edge_head[at(other)], d + model_.edge_length(other));
       }

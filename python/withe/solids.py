@@ -17,18 +17,12 @@ from typing import Protocol, cast
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import ConvexHull
 
 from withe.common import extras, validation
-from withe.common.polyhedra import Core, polyhedron_core
 
 __all__ = ["Box", "Capsule", "Cylinder", "Hull", "Mesh", "Sphere"]
 
 FloatArray = npt.NDArray[np.float64]
-# Length of the core of a ball over its radius: the ball turns with it, and it must not show.
-_POINT = 1e-3
-# Default radius of rounded edges over the thinnest side.
-_SHARP = 2e-4
 
 
 class Solid(Protocol):
@@ -100,16 +94,6 @@ class Sphere:
         """Moment of inertia about the centre of mass over the mass, shape (3, 3) [m^2]."""
         return 0.4 * float(self.radius) ** 2 * np.eye(3)
 
-    @property
-    def core(self) -> Core:
-        """Segment by which it touches: the middle, too short to show.
-
-        Returns
-        -------
-        withe.common.polyhedra.Core
-        """
-        return _segment(_POINT * float(self.radius), float(self.radius))
-
     def surface(self) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         """Return the surface for pictures.
 
@@ -147,7 +131,7 @@ class Box:
         sides = validation.vector(self.size, "size of the box")
         if not (sides > 0.0).all():
             raise ValueError(f"size of the box must be positive, got {tuple(map(float, sides))}")
-        _rounding(self.rounding, float(sides.min()), "box")
+        _check_rounding(self.rounding, float(sides.min()), "box")
 
     @property
     def volume(self) -> float:
@@ -164,16 +148,6 @@ class Box:
         """Moment of inertia about the centre of mass over the mass, shape (3, 3) [m^2]."""
         squares = np.asarray(self.size, dtype=float) ** 2
         return np.diag(squares.sum() - squares) / 12.0
-
-    @property
-    def core(self) -> Core:
-        """Edges and faces by which it touches.
-
-        Returns
-        -------
-        withe.common.polyhedra.Core
-        """
-        return polyhedron_core(*self.surface(), _rounding(self.rounding, float(min(self.size)), "box"))
 
     def surface(self) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         """Return the surface for pictures.
@@ -282,16 +256,6 @@ class Capsule:
         across = barrel * (r**2 / 4.0 + h**2 / 12.0) + caps * (0.4 * r**2 + h**2 / 4.0 + 3.0 * h * r / 8.0)
         return np.diag([across, across, along]) / (barrel + caps)
 
-    @property
-    def core(self) -> Core:
-        """Segment by which it touches: the axis, at the distance of a radius from the surface.
-
-        Returns
-        -------
-        withe.common.polyhedra.Core
-        """
-        return _segment(float(self.length), float(self.radius))
-
     def surface(self) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         """Return the surface for pictures.
 
@@ -344,7 +308,7 @@ class Mesh:
                 f"triangles of the mesh must be counter-clockwise when seen from outside, and enclose a volume, got "
                 f"{self.volume:.3g} m^3: swap two columns of triangles if it is negative"
             )
-        _rounding(self.rounding, self._thinnest(), "mesh")
+        _check_rounding(self.rounding, float(np.ptp(vertices, axis=0).min()), "mesh")
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], *, scale: float = 1.0, rounding: float | None = None) -> Mesh:
@@ -354,7 +318,7 @@ class Mesh:
         ----------
         path : path-like
             STL, OBJ or PLY file, or another one that PyVista reads.
-        scale : float
+        scale : float [-]
             Metres per unit of the file, for example 1e-3 of a file in millimetres.
         rounding : float [m]
             Radius of the edges where the mesh touches.
@@ -407,20 +371,6 @@ class Mesh:
         second = second / 20.0 / volumes.sum() - np.outer(self.center, self.center)
         return np.asarray(np.trace(second) * np.eye(3) - second)
 
-    def _thinnest(self) -> float:
-        """Return the smallest extent along an axis [m]."""
-        return float(np.ptp(np.asarray(self.vertices), axis=0).min())
-
-    @property
-    def core(self) -> Core:
-        """Edges and faces by which it touches.
-
-        Returns
-        -------
-        withe.common.polyhedra.Core
-        """
-        return polyhedron_core(*self.surface(), _rounding(self.rounding, self._thinnest(), "mesh"))
-
     def surface(self) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         """Return the surface for pictures.
 
@@ -454,6 +404,8 @@ class Hull:
     rounding: float | None = None
 
     def __post_init__(self) -> None:
+        from scipy.spatial import ConvexHull
+
         points = validation.number_array(self.points, "points of the hull", ("n", 3))
         object.__setattr__(self, "points", points)
         spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
@@ -485,16 +437,6 @@ class Hull:
     def inertia_per_mass(self) -> FloatArray:
         """Moment of inertia about the centre of mass over the mass, shape (3, 3) [m^2]."""
         return self._shape.inertia_per_mass
-
-    @property
-    def core(self) -> Core:
-        """Edges and faces by which it touches.
-
-        Returns
-        -------
-        withe.common.polyhedra.Core
-        """
-        return self._shape.core
 
     def surface(self) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         """Return the surface for pictures.
@@ -532,21 +474,12 @@ def _check_closed(vertices: FloatArray, triangles: npt.NDArray[np.int64]) -> Non
         )
 
 
-def _segment(length: float, radius: float) -> Core:
-    """Return the core of a ball or capsule along z, about the origin."""
-    return Core(np.array([[0.0, 0.0, -0.5 * length], [0.0, 0.0, 0.5 * length]]), np.array([[0, 1]]), radius)
-
-
-def _rounding(given: float | None, size: float, owner: str) -> float:
-    """Return the radius of rounded edges, by default from the thinnest side."""
-    if given is None:
-        return _SHARP * size
-    radius = validation.positive(given, f"rounding of the {owner}")
-    if radius >= 0.5 * size:
+def _check_rounding(given: float | None, size: float, owner: str) -> None:
+    """Refuse a radius of edges that a solid is too thin for."""
+    if given is not None and validation.positive(given, f"rounding of the {owner}") >= 0.5 * size:
         raise ValueError(
-            f"rounding of the {owner} must be less than half of its thinnest side, {size:g} m, got {radius:g} m"
+            f"rounding of the {owner} must be less than half of its thinnest side, {size:g} m, got {given:g} m"
         )
-    return radius
 
 
 def _turned(radii: FloatArray, heights: FloatArray, sides: int = 48) -> tuple[FloatArray, npt.NDArray[np.int64]]:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import pickle
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import withe
+from withe.parts.body_surfaces import core_of
 
 BALL = withe.solids.Sphere(0.02)
 
@@ -154,7 +156,11 @@ def test_overlapping_bodies_are_named() -> None:
         (BALL, {"restitution": 1.5}, "restitution of body 'x' must"),
         (BALL, {"touches": "no"}, "touches of body 'x' must be True or False"),
         (BALL, {"touches": False, "friction": 0.3}, "friction of body 'x' has no effect"),
-        (withe.solids.Box((0.1, 0.1, 0.1)), {"friction": 0.3}, "touches nothing: use a sphere or a capsule"),
+        (
+            withe.solids.Cylinder(0.1, 0.1),
+            {"friction": 0.3},
+            "touches nothing: use a sphere, capsule, box, hull or mesh",
+        ),
     ],
 )
 def test_what_cannot_be_is_refused(solid: object, words: dict[str, object], message: str) -> None:
@@ -166,7 +172,7 @@ def test_what_cannot_be_is_refused(solid: object, words: dict[str, object], mess
 def test_a_solid_that_touches_nothing_has_no_pair() -> None:
     """In set_friction."""
     scene = withe.Scene()
-    floor, box = scene.add_floor(), scene.add_body(withe.solids.Box((0.1, 0.1, 0.1)), density=1000, name="box")
+    floor, box = scene.add_floor(), scene.add_body(withe.solids.Cylinder(0.1, 0.1), density=1000, name="box")
     with pytest.raises(ValueError, match="body 'box' touches nothing"):
         scene.set_friction(box, floor, 0.3)
 
@@ -198,3 +204,91 @@ def test_a_pendulum_that_touches_nothing_stays_planar() -> None:
     assert scene.build(time_step=1e-3).plan.planar
     scene.add_body(BALL, density=1000, position=(0.1, 0, -0.2))
     assert not scene.build(time_step=1e-3).plan.planar
+
+
+def test_a_mesh_file_touches_as_the_solid_that_it_shows(tmp_path: Path) -> None:
+    """A box in millimetres, with repeated vertices as in STL files."""
+    pyvista = pytest.importorskip("pyvista")
+    vertices, triangles = withe.solids.Box((0.1, 0.08, 0.04)).surface()
+    faces = np.column_stack([np.full(len(triangles), 3), triangles]).ravel()
+    pyvista.PolyData(1e3 * vertices, faces).save(str(tmp_path / "box.stl"))
+    mesh = withe.solids.Mesh.load(tmp_path / "box.stl", scale=1e-3)
+    assert mesh.volume == pytest.approx(0.1 * 0.08 * 0.04)
+    core = core_of(mesh)
+    assert core is not None
+    assert len(core.faces) == 6
+    assert len(core.segments) == 12
+    with pytest.raises(FileNotFoundError, match="no such file"):
+        withe.solids.Mesh.load(tmp_path / "none.stl")
+
+
+def test_concave_edges_touch_nothing() -> None:
+    """A channel has one face for each of its twelve sides, and no edge in its corners."""
+    outline = [(0, 0), (3, 0), (3, 2), (2, 2), (2, 1), (1, 1), (1, 2), (0, 2)]
+    n = len(outline)
+    vertices = np.array([(x, y, z) for z in (0.0, 4.0) for x, y in outline]) * 0.01
+    caps = [(0, 1, 4), (1, 2, 3), (1, 3, 4), (0, 4, 5), (0, 5, 7), (5, 6, 7)]
+    triangles = [caps_[::-1] for caps_ in caps] + [(a + n, b + n, c + n) for a, b, c in caps]
+    for i in range(n):
+        j = (i + 1) % n
+        triangles += [(i, j, j + n), (i, j + n, i + n)]
+    core = core_of(withe.solids.Mesh(vertices, np.array(triangles)))
+    assert core is not None
+    assert len(core.faces) == 10
+    assert len(core.segments) == 24 - 2
+
+
+@pytest.mark.parametrize(
+    ("solid", "message"),
+    [
+        (lambda: withe.solids.Box((0.1, 0.1, 0.02), rounding=0.01), "rounding of the box must be less than half"),
+        (lambda: withe.solids.Hull([(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0)]), "not in one plane"),
+        (lambda: withe.solids.Mesh(np.eye(3), [(0, 1, 2)]), r"must be closed.*Edges of triangles \[0\] do not"),
+        (
+            lambda: withe.solids.Mesh(np.diag([1.0, 1.0, 0.0]), [(0, 1, 1), (1, 1, 2)]),
+            r"triangles \[0, 1\] of the mesh have no area",
+        ),
+        (lambda: flipped(), "counter-clockwise when seen from outside"),
+    ],
+)
+def test_solids_that_cannot_touch_are_refused(solid: Callable[[], object], message: str) -> None:
+    """With what is wrong with them."""
+    with pytest.raises(ValueError, match=message):
+        solid()
+
+
+def flipped() -> withe.solids.Mesh:
+    """Return a box that is inside out."""
+    vertices, triangles = withe.solids.Box((0.1, 0.1, 0.1)).surface()
+    return withe.solids.Mesh(vertices, triangles[:, ::-1])
+
+
+def test_what_faces_cannot_touch_is_refused() -> None:
+    """A sphere as an obstacle, and a rod inside of a box, unless the pair is left out."""
+    rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+    scene = withe.Scene()
+    box = scene.add_body(withe.solids.Box((0.1, 0.1, 0.1)), density=1000, name="box")
+    ball = scene.add_sphere(center=(0.3, 0, 0), radius=0.05, name="ball")
+    with pytest.raises(ValueError, match=r"obstacle 'ball' does not touch the faces of body 'box'\. Add it"):
+        scene.build()
+    scene.ignore_contact(ball, box)
+    scene.build()
+    scene.enable_contact()
+    rod = scene.add_rod(start=(0, 0, 0), end=(0, 0, 0.2), nodes=9, radius=0.004, material=rubber, name="rod")
+    with pytest.raises(ValueError, match="node 0 of rod 'rod' is drawn inside of body 'box'"):
+        scene.build()
+    scene.join(rod.start, box)
+    assert len(scene.build(time_step=1e-3).contacts()) == 0
+
+
+@pytest.mark.parametrize("nodes", [9, 40])
+@pytest.mark.parametrize("start", [(0, 0, 0), (0, 0, 0.05), (0, 0, -0.02)])
+def test_a_rod_comes_out_of_the_box_that_it_is_joined_to(start: tuple[float, float, float], nodes: int) -> None:
+    """It does not touch the face that it passes, but others."""
+    rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+    scene = withe.Scene()
+    scene.enable_contact()
+    box = scene.add_body(withe.solids.Box((0.1, 0.1, 0.1)), density=1000)
+    rod = scene.add_rod(start=start, end=np.add(start, (0, 0, 0.2)), nodes=nodes, radius=0.004, material=rubber)
+    scene.join(rod.start, box)
+    assert len(scene.build(time_step=1e-3).contacts()) == 0

@@ -103,7 +103,8 @@ def test_the_order_of_calls_does_not_change_the_rows_of_bodies(tmp_path):
 
 SOLIDS = {
     "sphere": withe.solids.Sphere(0.02),
-    "box": withe.solids.Box((0.02, 0.03, 0.05)),
+    "box": withe.solids.Box((0.02, 0.03, 0.05), rounding=1e-4),
+    "hull": withe.solids.Hull([(0, 0, 0), (0.02, 0, 0), (0, 0.03, 0), (0, 0, 0.05), (0.02, 0.03, 0.05)]),
     "cylinder": withe.solids.Cylinder(0.01, 0.04),
     "capsule": withe.solids.Capsule(0.01, 0.03),
     "mesh": withe.solids.Mesh(
@@ -134,7 +135,7 @@ BODY = '[[bodies]]\nname = "plug"\nposition = [0.3, 0, 0]\ndensity = 900.0\n'
             "kind of solid is unknown, got 'bx'; did you mean 'box'",
         ),
         (BODY + 'solid = { kind = "box", sise = [1, 1, 1] }', 5, "solid has no key 'sise'; did you mean 'size'"),
-        (BODY + 'solid = { kind = "ball", radius = 1 }', 5, "it is one of box, capsule, cylinder, mesh, sphere"),
+        (BODY + 'solid = { kind = "ball", radius = 1 }', 5, "it is one of box, capsule, cylinder, hull, mesh, sphere"),
         (BODY + "solid = { radius = 0.1 }", 5, "solid must be a table with kind, one of box"),
         (BODY + 'solid = "box"', 5, "solid must be a table with kind"),
         (BODY + 'solid = { kind = "sphere" }', 5, "radius"),

@@ -19,7 +19,7 @@ _DEPTH = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Core:
-    """What a solid touches by: all points at a distance from segments, and flat faces.
+    """The part of a solid that touches: all points at a distance from segments, and flat faces.
 
     Parameters
     ----------

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from withe import _core
 from withe.common import validation
-from withe.parts.body_surfaces import make_surface
+from withe.parts.body_surfaces import core_of, make_surface
 from withe.parts.directory import Directory
 from withe.parts.handles import UnionFind
 from withe.parts.kinds import BodyPart, JoinPart, SupportPart
@@ -65,7 +65,7 @@ def make_body(
         moment = _inertia(inertia, owner)
         middle = np.zeros(3) if center is None else validation.vector(center, f"center of {owner}")
     surface = None
-    core = getattr(solid, "core", None)
+    core = core_of(solid)
     if validation.truth(touches, f"touches of {owner}") and core is not None:
         surface = make_surface(core, owner, origin, axes, friction, restitution)
     elif friction is not None or restitution is not None:

@@ -9,14 +9,32 @@ import numpy.typing as npt
 
 from withe import _core
 from withe.common import validation
-from withe.common.polyhedra import Core, inside, trails
+from withe.common.polyhedra import Core, inside, polyhedron_core, trails
 from withe.parts.directory import Directory
 from withe.parts.handles import UnionFind
 from withe.parts.kinds import BodyFace, BodyPart, BodySurface, JoinPart, ObstaclePart, RodPart
+from withe.solids import Box, Capsule, Hull, Mesh, Sphere
 
-__all__ = ["check_surfaces", "describe_surfaces", "make_surface", "surfaces_of"]
+__all__ = ["check_surfaces", "core_of", "describe_surfaces", "make_surface", "surfaces_of"]
 
 FloatArray = npt.NDArray[np.float64]
+# Length of the core of a ball over its radius: the ball turns with it, and it must not show.
+_POINT = 1e-3
+# Default radius of rounded edges over the thinnest extent.
+_SHARP = 2e-4
+
+
+def core_of(solid: object) -> Core | None:
+    """Return what a solid touches by; None: it is only drawn."""
+    if isinstance(solid, Sphere | Capsule):
+        radius = float(solid.radius)
+        half = 0.5 * (_POINT * radius if isinstance(solid, Sphere) else float(solid.length))
+        return Core(np.array([[0.0, 0.0, -half], [0.0, 0.0, half]]), np.array([[0, 1]]), radius)
+    if isinstance(solid, Box | Hull | Mesh):
+        vertices, triangles = solid.surface()
+        sharp = _SHARP * float(np.ptp(vertices, axis=0).min())
+        return polyhedron_core(vertices, triangles, sharp if solid.rounding is None else float(solid.rounding))
+    return None
 
 
 def make_surface(

@@ -270,7 +270,7 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
 
         Parameters
         ----------
-        solid : Sphere, Box, Cylinder, Capsule or Mesh of withe.solids
+        solid : Sphere, Box, Cylinder, Capsule, Hull or Mesh of withe.solids
             Shape of uniform density, from which centre and inertia follow. Give `density` or `mass` with it. With
             `mass` and `inertia` the solid is only drawn.
         density : float [kg/m^3]
@@ -294,8 +294,8 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
             Speed after an impact over the speed before, from 0 to 1, of which the smaller one of two bodies counts. By
             default that of rods.
         touches : bool
-            False if the solid is only drawn. Spheres and capsules touch obstacles, and after `enable_contact` rods and
-            other bodies; other solids are only drawn.
+            False if the solid is only drawn. Solids touch planes, and after `enable_contact` rods and other bodies.
+            Spheres and capsules touch other obstacles too. A cylinder is only drawn.
         name : str
             Name of the body.
 
