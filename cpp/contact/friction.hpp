@@ -132,11 +132,12 @@ Scalar slip_factor(const Scalar& square, double c) {
 /// too, and Newton's method would release one contact per iteration.
 inline bool holds(double square, double most) { return square <= (1.0 - 1e-12) * most * most; }
 
-/// limit * factor * S. The derivative is that of `ForceLaw::dual_slip`: where the factor changes with S, it multiplies
-/// the friction that is predicted.
+/// gain * S, gain = limit * factor. The derivative is that of `ForceLaw::dual_slip`: where the factor changes with S,
+/// it multiplies the friction that is predicted.
 template <class Scalar>
-Vec3<Scalar> along_slip(const FrictionSetting& f, const Vec3<Scalar>& slip, const Scalar& limit, const Scalar& factor) {
-  const Vec3<Scalar> force = (limit * factor) * slip;
+Vec3<Scalar> along_slip(const FrictionSetting& f, const Vec3<Scalar>& slip, const Scalar& gain, const Scalar& limit,
+                        const Scalar& factor) {
+  const Vec3<Scalar> force = gain * slip;
   if constexpr (!std::is_same_v<Scalar, double>) {
     const double share = value_of(factor);
     if (f.predicted != nullptr && share > 0.0) {
@@ -157,7 +158,8 @@ FrictionForce<Scalar> friction_force(const FrictionSetting& f, const Vec3<Scalar
   const double mu = f.friction;
   if (f.law != FrictionLaw::anchored) {
     const Scalar square = dot(slip, slip);
-    out.force = along_slip(f, slip, mu * pressing, slip_factor(square, f.rate));
+    const Scalar factor = slip_factor(square, f.rate);
+    out.force = along_slip(f, slip, mu * pressing * factor, mu * pressing, factor);
     out.sticking = f.rate * std::sqrt(value_of(square)) < 7.5;  // slower than the slip tolerance
     return out;
   }
@@ -167,7 +169,7 @@ FrictionForce<Scalar> friction_force(const FrictionSetting& f, const Vec3<Scalar
   const Scalar limit = (mu / f.tangential_stiffness) * pressing;
   const double most = std::max(value_of(limit), 0.0);
   out.sticking = holds(value_of(square), most);
-  if (!out.sticking) stick = along_slip(f, stick, limit, 1.0 / sqrt(square));
+  if (!out.sticking) stick = along_slip(f, stick, limit / sqrt(square), limit, 1.0 / sqrt(square));
   out.stick = stick;
   out.force = Scalar(f.tangential_stiffness) * stick;
   return out;
