@@ -118,7 +118,7 @@ Proximity Bodies::proximity(const ContactPair& pair, const VectorX& q, bool whol
     const FaceDistance d = distance_from(*pair.face, axes_of(*model, q, *pair.face), x[0] + pair.point * (x[1] - x[0]));
     p.distance = std::sqrt(p.points.square);
     p.outside = d.outside;
-    p.beyond = d.outside > 0.0;
+    p.beyond = d.outside > 0.0 || d.height < 0.0;
     p.normal = (1.0 / std::max(std::sqrt(p.points.square), 1e-300)) * p.points.between;
     return p;
   }

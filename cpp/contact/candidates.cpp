@@ -84,10 +84,12 @@ double allowed_beside(const Bodies& bodies, const ContactPair& pair, const Vecto
   const double turned = 2.0 * size(d[3] - d[2]) / face.length + size(way - d[2]) / size(aside - x[2]),
                speed = size(moved) + 2.0 * turned * face.size;
   if (speed == 0.0) return 1.0;
-  return advance(limit, speed, [&](double tau) {
+  const auto place = [&](double tau) {
     const FaceAxes axes(x[2] + tau * d[2], x[3] + tau * d[3], aside + tau * way);
-    return distance_from(face, axes, point + tau * (d[0] + pair.point * (d[1] - d[0]))).distance;
-  });
+    return distance_from(face, axes, point + tau * (d[0] + pair.point * (d[1] - d[0])));
+  };
+  if (place(0.0).height < 0.0 && place(1.0).height < 0.0) return 1.0;  // behind the face, beside another one
+  return advance(limit, speed, [&](double tau) { return place(tau).distance; });
 }
 
 /// Allowed share for straight lines, whose distance falls no faster than their ends approach each other. `change` is

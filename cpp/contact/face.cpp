@@ -6,7 +6,11 @@
 namespace withe {
 
 Face::Face(const FaceDescription& description, int normal_edge, int aside_node, double edge_length)
-    : edge(normal_edge), aside(aside_node), length(edge_length), depth(description.depth), outline(description.outline) {
+    : edge(normal_edge),
+      aside(aside_node),
+      length(edge_length),
+      depth(description.depth),
+      outline(description.outline) {
   for (int k = 0; k < 2; ++k) {
     low[k] = std::min(outline.col(k).minCoeff(), outline.col(k + 2).minCoeff());
     high[k] = std::max(outline.col(k).maxCoeff(), outline.col(k + 2).maxCoeff());

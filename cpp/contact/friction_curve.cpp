@@ -6,34 +6,34 @@ namespace withe {
 namespace {
 
 // Unknowns that move a contact: three nodes, and both angles.
-constexpr int kAngle = 9, kWays = 11;
+constexpr int kCurveAngle = 9, kCurveWays = 11;
 
-int unknown_of(int way) { return way < kAngle ? way : way + 3; }
+int unknown_of(int way) { return way < kCurveAngle ? way : way + 3; }
 
 /// Derivatives by them.
 struct CurvedSlopes {
-  double s[kWays] = {}, pressing[kWays] = {};
-  Vec3d normal[kWays] = {}, turn[kWays] = {};  ///< n, omega
-  Vec3d force[kWays], moment[kWays];           ///< F, F x n
+  double s[kCurveWays] = {}, pressing[kCurveWays] = {};
+  Vec3d normal[kCurveWays] = {}, turn[kCurveWays] = {};  ///< n, omega
+  Vec3d force[kCurveWays], moment[kCurveWays];           ///< F, F x n
 };
 
 struct Curve {
   const CurveWeights& w;
   double s, weight[3], weight_slope[3];  ///< w_i, w_i'
   double lever[2] = {};                  ///< r m_b
-  int ways[kWays], count = 0;            ///< indices of existing unknowns: in a plane two per node
+  int ways[kCurveWays], count = 0;       ///< indices of existing unknowns: in a plane two per node
 
   /// Calls see(j) for each unknown, without `angles` for those of nodes only.
   template <class See>
   void each_way(bool angles, const See& see) const {
     for (int i = 0; i < count; ++i)
-      if (angles || ways[i] < kAngle) see(ways[i]);
+      if (angles || ways[i] < kCurveAngle) see(ways[i]);
   }
 };
 
 Curve curve_of(const FrictionSetting& f, const SlippingSurfaces<double>& c) {
   Curve out{.w = *f.pair->piece.weights, .s = c.s, .weight = {}, .weight_slope = {}, .ways = {}};
-  for (int j = 0; j < kWays; ++j)
+  for (int j = 0; j < kCurveWays; ++j)
     if (f.spatial || (j < 3 * out.w.nodes && j % 3 < 2)) out.ways[out.count++] = j;
   for (int i = 0; i < 3; ++i) {
     out.weight[i] = out.w.at(i, c.s);
@@ -72,7 +72,7 @@ void add_turn_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c
     }
     if (f.spatial) {
       const WorkingTurnSlopes spun = f.finite_turns ? working_turn_slopes(side) : WorkingTurnSlopes{};
-      d.turn[kAngle + b] = (rho * spun.angle) * side.tangent;
+      d.turn[kCurveAngle + b] = (rho * spun.angle) * side.tangent;
       for (int k = 0; k < 3; ++k) {
         const Vec3d turned = (rho * spun.edge[k]) * side.tangent;
         d.turn[3 * side.tail + 3 + k] += turned;
@@ -90,7 +90,7 @@ Vec3d obstacle_arm_slope(const FrictionSetting& f, const Curve& curve, const Vec
   if (f.rolling) return -f.pair->radius_a * d.normal[j];
   const PointDistance<double> point = distance_to(*f.obstacle, curve_point(curve.w, x, curve.s));
   Vec3d moved = d.s[j] * curve_direction(curve.w, x, curve.s);
-  if (j < kAngle) moved += curve.weight[j / 3] * kUnitVectors[j % 3];
+  if (j < kCurveAngle) moved += curve.weight[j / 3] * kUnitVectors[j % 3];
   return moved - dot(point.normal, moved) * point.normal - (point.distance - f.pair->radius_b) * d.normal[j];
 }
 
@@ -110,7 +110,7 @@ void add_force_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& 
     const Vec3d& across = d.normal[j];
     Vec3d moved = cross(n, d.turn[j]) - cross(turn, across);
     if (!f.rolling) moved += d.s[j] * moved_on;
-    if (!f.rolling && j < kAngle) moved += curve.weight[j / 3] * kUnitVectors[j % 3];
+    if (!f.rolling && j < kCurveAngle) moved += curve.weight[j / 3] * kUnitVectors[j % 3];
     if (turns) moved -= cross(f.turn, obstacle_arm_slope(f, curve, x, d, j));
     d.force[j] = g.factor * (moved - off * across) - (g.factor * (dot(n, moved) + dot(slip, across))) * n +
                  (2.0 * g.by_square * dot(slip, moved - off * across)) * dual + (g.by_pressing * d.pressing[j]) * slip;
@@ -130,7 +130,7 @@ void direct_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, 
   for (int i = 0; i < curve.w.nodes; ++i) bend += curve.w.bend[i] * x[i];
   curve.each_way(true, [&](int j) {
     Vec3d change = d.s[j] * bend;
-    if (j < kAngle) change += (edge ? of_edge : curve.weight_slope)[j / 3] * kUnitVectors[j % 3];
+    if (j < kCurveAngle) change += (edge ? of_edge : curve.weight_slope)[j / 3] * kUnitVectors[j % 3];
     const Vec3d turned = inverse * (change - dot(t, change) * t), &leant = d.normal[j];
     const Vec3d along = turned - (dot(turned, n) + dot(t, leant)) * n - dot(t, n) * leant;
     d.force[j] = across * d.force[j] + (more * (dot(along, c.plain) + dot(c.along, d.force[j]))) * c.along +
@@ -145,8 +145,8 @@ void add_couples(const FrictionSetting& f, const SlippingSurfaces<double>& c, co
   const Vec3d &t = side.tangent, m = cross(c.friction.force, c.normal);
   const double rho = curve.lever[b], inverse = side.inverse, along = dot(t, m);
   const double grown = f.pair->radius_a * curve.w.share_slope[b];
-  Vec3d couple[kWays] = {};
-  double axial[kWays] = {};
+  Vec3d couple[kCurveWays] = {};
+  double axial[kCurveWays] = {};
   curve.each_way(true, [&](int j) {
     const Vec3d moment = rho * d.moment[j] + (grown * d.s[j]) * m;
     axial[j] = f.spatial ? dot(t, moment) : 0.0;

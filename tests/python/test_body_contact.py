@@ -275,7 +275,7 @@ def test_what_faces_cannot_touch_is_refused() -> None:
     scene.build()
     scene.enable_contact()
     rod = scene.add_rod(start=(0, 0, 0), end=(0, 0, 0.2), nodes=9, radius=0.004, material=rubber, name="rod")
-    with pytest.raises(ValueError, match="node 0 of rod 'rod' is drawn inside of body 'box'"):
+    with pytest.raises(ValueError, match="rod 'rod' is drawn inside of body 'box'"):
         scene.build()
     scene.join(rod.start, box)
     assert len(scene.build(time_step=1e-3).contacts()) == 0
@@ -292,3 +292,69 @@ def test_a_rod_comes_out_of_the_box_that_it_is_joined_to(start: tuple[float, flo
     rod = scene.add_rod(start=start, end=np.add(start, (0, 0, 0.2)), nodes=nodes, radius=0.004, material=rubber)
     scene.join(rod.start, box)
     assert len(scene.build(time_step=1e-3).contacts()) == 0
+
+
+def test_bodies_inside_of_each_other_are_refused() -> None:
+    """A box in a box, a bar through a plate, a ball in a box, and a rod that crosses a box within an edge."""
+    rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
+    for inner in (
+        lambda scene: scene.add_body(withe.solids.Box((0.02, 0.02, 0.02)), density=1000, name="inner"),
+        lambda scene: scene.add_body(withe.solids.Box((0.02, 0.02, 0.3)), density=1000, name="inner"),
+        lambda scene: scene.add_body(withe.solids.Sphere(0.01), density=1000, name="inner"),
+        lambda scene: scene.add_rod(
+            start=(-0.3, 0.003, 0), end=(0.3, 0.003, 0), nodes=4, radius=0.004, material=rubber, name="inner"
+        ),
+    ):
+        scene = withe.Scene()
+        scene.enable_contact()
+        scene.add_body(withe.solids.Box((0.1, 0.1, 0.04)), density=1000, name="outer")
+        inner(scene)
+        with pytest.raises(ValueError, match="'inner' is drawn inside of body 'outer'"):
+            scene.build(time_step=1e-3)
+
+
+def cup(side: float, wall: float) -> withe.solids.Mesh:
+    """Return a square cup, open above."""
+    square = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
+    rings = [(0.5 * side, 0.0), (0.5 * side, side), (0.5 * side - wall, side), (0.5 * side - wall, wall)]
+    vertices = np.array([(half * x, half * y, z) for half, z in rings for x, y in square])
+    triangles = [(0, 2, 1), (0, 3, 2), (12, 13, 14), (12, 14, 15)]
+    for k in range(4):
+        after = (k + 1) % 4
+        for low, high in ((0, 4), (4, 8), (8, 12)):
+            triangles += [(low + k, low + after, high + after), (low + k, high + after, high + k)]
+    return withe.solids.Mesh(vertices, np.array(triangles))
+
+
+@pytest.mark.parametrize("wall", [0.001, 0.02])
+def test_a_ball_rests_in_a_cup_with_thin_walls(wall: float) -> None:
+    """It touches the bottom from inside, and nothing behind it."""
+    scene = withe.Scene()
+    scene.enable_contact(restitution=0.0)
+    scene.clamp(scene.add_body(cup(0.1, wall), density=1000))
+    ball = scene.add_body(withe.solids.Sphere(0.01), density=1000, position=(0.01, 0.005, wall + 0.0102))
+    simulation = scene.build(time_step=2e-3)
+    simulation.step(100)
+    np.testing.assert_allclose(simulation.position(ball), (0.01, 0.005, wall + 0.01), atol=1e-4)
+
+
+def test_a_ball_beside_an_acute_edge_touches_one_face() -> None:
+    """And a ball beside a rounded edge touches the round."""
+    rise = 0.04 * np.tan(np.radians(20.0))
+    wedge = withe.solids.Hull(
+        [(0, y, 0) for y in (-0.02, 0.02)] + [(0.04, y, z) for y in (-0.02, 0.02) for z in (0, -rise)]
+    )
+    scene = withe.Scene(gravity=(0, 0, 0))
+    scene.enable_contact()
+    scene.clamp(scene.add_body(wedge, density=1000))
+    scene.add_body(withe.solids.Sphere(2e-3), density=1000, position=(0.003, 0, 0.00201))
+    contacts = scene.build().contacts()
+    assert len(contacts) == 1
+    assert contacts["gap"][0] == pytest.approx(1e-5, abs=1e-9)
+    side, rounding, radius = 0.06, 0.008, 0.002
+    away = 0.5 * side - rounding + (rounding + radius + 1e-6) / np.sqrt(2.0)
+    scene = withe.Scene(gravity=(0, 0, 0))
+    scene.enable_contact()
+    scene.clamp(scene.add_body(withe.solids.Box((side, 0.1, side), rounding=rounding), density=1000))
+    scene.add_body(withe.solids.Sphere(radius), density=1000, position=(away, 0, away))
+    assert scene.build().contacts()["gap"] == pytest.approx([1e-6], abs=1e-9)

@@ -13,8 +13,9 @@ FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 # Sine of the angle between two triangles up to which they are one flat face.
 _FLAT = 1e-6
-# Depth of the planes of faces over the thinnest extent.
-_DEPTH = 0.05
+# Outlines of faces reach over their rounded edges by at most this, over the thinnest extent: corners of equal boxes on
+# each other then lie within them.
+_MARGIN = 2e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,18 +32,18 @@ class Core:
         Distance of the surface from the segments.
     faces : tuple of (ndarray of shape (k, 2, 3) [m], ndarray of shape (3,))
         Outline of each face as segments in the plane of the face, and the normal of the face.
-    depth : float [m]
-        Distance of the faces from planes inside of the solid that nothing may come to.
     beside : ndarray of int, shape (m, 2)
         Faces on the left and on the right of each segment, as seen from outside; empty without faces.
+    triangles : ndarray of int, shape (k, 3)
+        Rows of `points` of the surface that is moved inwards by the radius; empty without faces.
     """
 
     points: FloatArray
     segments: IntArray
     radius: float
     faces: tuple[tuple[FloatArray, FloatArray], ...] = ()
-    depth: float = 0.0
     beside: IntArray = field(default_factory=lambda: np.zeros((0, 2), dtype=np.int64))
+    triangles: IntArray = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int64))
 
 
 def polyhedron_core(vertices: FloatArray, triangles: IntArray, rounding: float) -> Core:
@@ -59,8 +60,7 @@ def polyhedron_core(vertices: FloatArray, triangles: IntArray, rounding: float) 
     Returns
     -------
     Core
-        Its segments are the convex edges, moved inwards so that rounded edges end where faces are. Its faces are as
-        drawn: the corners of equal boxes on each other lie within them.
+        Its segments are the convex edges, moved inwards so that rounded edges end where faces are.
     """
     vertices, triangles = _welded(vertices, triangles)
     corners = vertices[triangles]
@@ -74,6 +74,8 @@ def polyhedron_core(vertices: FloatArray, triangles: IntArray, rounding: float) 
             _unite(face, k, other)
     face = np.array([_root(face, k) for k in range(len(face))])
     inset = vertices + _offsets(vertices, triangles, normals, face, -rounding)
+    margin = min(rounding, _MARGIN * float(np.ptp(vertices, axis=0).min()))
+    drawn = vertices + _offsets(vertices, triangles, normals, face, margin - rounding)
     sharp = [
         (a, b)
         for (a, b), k in owner.items()
@@ -85,16 +87,12 @@ def polyhedron_core(vertices: FloatArray, triangles: IntArray, rounding: float) 
     outlines = []
     for root in roots:
         ways = [way for way, k in owner.items() if face[k] == root and face[owner[way[1], way[0]]] != root]
-        outlines.append((vertices[np.array(ways)], normals[root]))
+        outline = drawn[np.array(ways)]
+        height = (corners[root, 0] - outline) @ normals[root]
+        outlines.append((outline + height[..., None] * normals[root], normals[root]))
     beside = np.searchsorted(roots, np.array([(face[owner[a, b]], face[owner[b, a]]) for a, b in sharp]).reshape(-1, 2))
-    return Core(
-        inset,
-        np.array(sharp, dtype=np.int64).reshape(-1, 2),
-        rounding,
-        tuple(outlines),
-        _DEPTH * float(np.ptp(vertices, axis=0).min()),
-        beside,
-    )
+    segments = np.array(sharp, dtype=np.int64).reshape(-1, 2)
+    return Core(inset, segments, rounding, tuple(outlines), beside, triangles)
 
 
 def trails(segments: IntArray) -> list[int]:

@@ -20,6 +20,8 @@ __all__ = ["check_surfaces", "core_of", "describe_surfaces", "make_surface", "su
 FloatArray = npt.NDArray[np.float64]
 # Length of the core of a ball over its radius: the ball turns with it, and it must not show.
 _POINT = 1e-3
+# Depth of the planes of faces over the radius of edges: what yields in impacts does not bring a corner to the plane.
+_DEPTH = 2.0
 # Default radius of rounded edges over the thinnest extent.
 _SHARP = 2e-4
 
@@ -55,9 +57,9 @@ def make_surface(
         is_reversed = segment is not None and core.segments[segment, 0] != tail
         beside.append(faces_beside[::-1] if is_reversed else faces_beside)
     points = [core.points[walk]]
-    faces = []
+    faces, depth = [], _DEPTH * core.radius
     for surface, normal in core.faces:
-        outline = surface - core.depth * normal
+        outline = surface - depth * normal
         middle = 0.5 * (outline.min(axis=(0, 1)) + outline.max(axis=(0, 1)))
         middle += ((outline[0, 0] - middle) @ normal) * normal
         size = float(np.linalg.norm(outline - middle, axis=-1).max())
@@ -69,7 +71,7 @@ def make_surface(
         radii += [0.0, 0.0]
         beside += [[-1, -1], [-1, -1]]
         points.append(np.array([middle, middle + size * normal]))
-        faces.append(BodyFace(len(radii) - 1, aside, core.depth, plane.reshape(-1, 4)))
+        faces.append(BodyFace(len(radii) - 1, aside, depth, plane.reshape(-1, 4)))
     return BodySurface(
         origin + np.concatenate(points) @ axes.T,
         np.array(radii),
@@ -118,12 +120,12 @@ def describe_surfaces(directory: Directory) -> list[_core.RodDescription]:
 
 
 def check_surfaces(directory: Directory) -> None:
-    """Refuse what faces of bodies do not touch, and rods that are drawn inside of bodies.
+    """Refuse what faces of bodies do not touch, and what is drawn inside of bodies.
 
     Raises
     ------
     ValueError
-        A sphere or capsule as an obstacle beside a body with faces, or a rod inside of such a body.
+        A sphere or capsule as an obstacle beside a body with faces, or a rod or body inside of such a body.
     """
     with_faces = [body for body in surfaces_of(directory) if body.surface is not None and body.surface.faces]
     for body in with_faces:
@@ -136,23 +138,39 @@ def check_surfaces(directory: Directory) -> None:
                 )
     if not directory.contact.rods:
         return
-    joined = {
-        frozenset((first, second))
-        for join in directory.all(JoinPart)
-        for first, second in itertools.pairwise(owner for owner, _ in join.nodes)
-    }
+    cores = {body.index: core_of(body.solid) for body in surfaces_of(directory)}
     for body in with_faces:
-        vertices, triangles = body.solid.surface()
-        for rod in directory.all(RodPart):
-            if frozenset((rod.index, -1 - body.index)) in joined or _ignored(directory, body.name, rod.name):
+        core = cores[body.index]
+        assert core is not None
+        step = 0.5 * float(np.ptp(core.points, axis=0).min())
+        rows = directory.layout.rows(-1 - body.index)
+        others: list[tuple[str, int, str, FloatArray]] = [
+            (rod.name, rod.index, "rod", _along(rod.points, step)) for rod in directory.all(RodPart)
+        ]
+        for other in surfaces_of(directory):
+            own = cores[other.index]
+            assert own is not None
+            ends = (other.position + own.points @ other.rotation.T)[own.segments]
+            points = np.concatenate([_along(segment, step) for segment in ends])
+            others.append((other.name, -1 - other.index, "body", points))
+        for name, owner, what, points in others:
+            if np.intersect1d(directory.layout.rows(owner), rows).size or _ignored(directory, body.name, name):
                 continue
-            places = (rod.points - body.position) @ body.rotation
-            nodes = np.flatnonzero(inside(vertices, triangles, places))
-            if len(nodes):
+            if inside(core.points, core.triangles, (points - body.position) @ body.rotation).any():
                 raise ValueError(
-                    f"node {nodes[0]} of rod {rod.name!r} is drawn inside of body {body.name!r}: draw them apart, join "
-                    "them, or leave the pair out with ignore_contact"
+                    f"{what} {name!r} is drawn inside of body {body.name!r}: draw them apart, join them, or leave the "
+                    "pair out with ignore_contact"
                 )
+
+
+def _along(points: FloatArray, step: float) -> FloatArray:
+    """Return points along a polyline, not farther than a step from each other."""
+    counts = np.ceil(np.linalg.norm(np.diff(points, axis=0), axis=1) / step).astype(int).clip(1, 1000)
+    found = [
+        start + np.arange(count)[:, None] / count * (end - start)
+        for start, end, count in zip(points, points[1:], counts, strict=False)
+    ]
+    return np.concatenate([*found, points[-1:]])
 
 
 def _ignored(directory: Directory, first: str, second: str) -> bool:
