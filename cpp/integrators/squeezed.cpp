@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "contact/pressing.hpp"
+#include "steps/carried_parts.hpp"
 
 namespace withe {
 namespace {
@@ -32,6 +33,10 @@ double free_slope(const Equations& equations, int contact, VectorX& out) {
   for (int k = 0; k < 12; ++k)
     if (dofs[k] >= 0) out(dofs[k]) += slope[k];
   const double all = out.norm();
+  if (!equations.model().carried.empty()) {  // contacts of bodies are on nodes that these carry
+    VectorX magnitude = VectorX::Zero(out.size());
+    fold_rows(equations.problem(), equations.contact()->contacts().q(), out, magnitude);
+  }
   equations.assembler().project(out);
   return all;
 }
@@ -48,7 +53,7 @@ int opposite_contact(const Equations& equations, int contact, double allowed, do
     if (j == contact || set[j].lagged >= 0 || set[j].pair.rod_a != set[contact].pair.rod_a) continue;
     int dofs[kContactUnknowns];
     equations.contact()->unknowns(j, dofs);
-    if (std::find(dofs, dofs + 12, steepest) == dofs + 12) continue;
+    if (equations.model().carried.empty() && std::find(dofs, dofs + 12, steepest) == dofs + 12) continue;
     free_slope(equations, j, other);
     const double c = size / std::max(other.norm(), 1e-300);
     if ((slope + c * other).norm() <= free * size && excess(set[contact], allowed) + c * excess(set[j], allowed) > 0.0)

@@ -22,6 +22,7 @@ std::string squeeze_warning(const Model& model, const Parameters& parameters, co
                             : name_of(model, model.edge_rod[at(t.pair.key.b)]);
   };
   const int edge = a.pair.key.a;
+  if (model.is_surface(edge)) return "";  // bodies have no modulus
   const double radius = contact->surfaces().radius(edge);
   const double modulus = parameters.edge_stretch(edge) / (std::numbers::pi * radius * radius);
   return "Rod '" + description.rods[at(model.edge_rod[at(edge)])].name + "' is squeezed between " + other(a) + " and " +
@@ -46,7 +47,9 @@ void fail_squeezed(const Model& model, const Equations& system, const State& sta
   const int node = model.edge_tail[at(t.pair.key.a)];
   const Place place = place_of_node(model, t.proximity.points.s > 0.5 ? model.edge_head[at(t.pair.key.a)] : node);
   const auto share = [&](double length) { return text(100.0 * length / t.pair.scale, 2); };
-  const std::string when = place.words + " (time " + text(state.time, 6) + " s, step " + text(dt) + " s)";
+  const bool of_body = model.is_surface(t.pair.key.a);  // which the words begin with
+  const std::string when =
+      (of_body ? "" : place.words) + " (time " + text(state.time, 6) + " s, step " + text(dt) + " s)";
   std::string what = rod_of(t.pair.key.a);
   if (squeezed.against < 0) {
     what += " is pressed " + text(depth) + " m into " + other(t.pair.key) + ", " + share(depth) +
@@ -59,7 +62,8 @@ void fail_squeezed(const Model& model, const Equations& system, const State& sta
     const Touching& a = set[squeezed.against];
     const double both = depth + a.pair.radii() - a.proximity.distance;
     what += " is squeezed between " + other(t.pair.key) + " and " + other(a.pair.key) + ", which leave a gap " +
-            text(both) + " m smaller than the rod is thick, " + share(both) + " % of its contact radius," + when +
+            text(both) + " m smaller than the " + (of_body ? "body" : "rod") + " is thick, " + share(both) +
+            " % of its contact radius," + when +
             ": both are rigid, so the force between them is not defined; the simulation "
             "keeps its last accepted state. Move them less near to each other, press with "
             "a part that yields, such as a hand with stiffness= or a rod on springs, or "

@@ -358,3 +358,22 @@ def test_a_ball_beside_an_acute_edge_touches_one_face() -> None:
     scene.clamp(scene.add_body(withe.solids.Box((side, 0.1, side), rounding=rounding), density=1000))
     scene.add_body(withe.solids.Sphere(radius), density=1000, position=(away, 0, away))
     assert scene.build().contacts()["gap"] == pytest.approx([1e-6], abs=1e-9)
+
+
+def test_a_box_between_two_held_boxes_that_close_is_squeezed() -> None:
+    """Both are rigid, so the error names them instead of a force that has no bound."""
+    scene = withe.Scene(gravity=(0, 0, 0))
+    scene.enable_contact()
+    scene.add_body(withe.solids.Box((0.04, 0.04, 0.04)), density=1000, name="box")
+    jaws = []
+    for side, name in ((-1, "left"), (1, "right")):
+        jaw = scene.add_body(
+            withe.solids.Box((0.02, 0.06, 0.06)), density=1000, position=(0.03 * side, 0, 0), name=name
+        )
+        scene.clamp(jaw)
+        jaws.append(jaw)
+    simulation = scene.build(time_step=1e-3, integrator="backward_euler")
+    for side, jaw in zip((-1, 1), jaws, strict=True):
+        simulation.move(jaw, (side * (0.03 - 2e-5), 0, 0), over=0.02)
+    with pytest.raises(withe.ConvergenceError, match="body 'box' is squeezed between body 'left' and body 'right'"):
+        simulation.step(30)

@@ -231,8 +231,10 @@ class Stepping:
 def convergence_error(session: Session, numbers: tuple[Any, ...]) -> ConvergenceError:
     """A failure of the engine, with the names of a scene."""
     message, time, step, rod, node, residual = numbers
-    name = session.directory.layout.rods[rod].name if rod >= 0 else None
-    return ConvergenceError(message, time, step, name, node if node >= 0 else None, residual)
+    rods = session.directory.layout.rods
+    of_rod = 0 <= rod < len(rods)  # else of a body, or of nothing
+    name = rods[rod].name if of_rod else None
+    return ConvergenceError(message, time, step, name, node if of_rod and node >= 0 else None, residual)
 
 
 def pass_on(sessions: Sequence[Session], found: _core.Warnings) -> None:
