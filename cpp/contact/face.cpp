@@ -44,7 +44,7 @@ FaceDistance distance_from(const Face& face, const FaceAxes& axes, const Vec3d& 
   FaceDistance d;
   d.height = dot(way, axes.normal);
   d.outside = face.outside(dot(way, axes.first), dot(way, axes.second));
-  d.distance = std::hypot(d.height, d.outside);
+  d.distance = std::sqrt(d.height * d.height + d.outside * d.outside);
   return d;
 }
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +16,7 @@ from withe.parts.handles import UnionFind
 from withe.parts.kinds import BodyFace, BodyPart, BodySurface, JoinPart, ObstaclePart, RodPart
 from withe.solids import Box, Capsule, Hull, Mesh, Sphere
 
-__all__ = ["check_surfaces", "core_of", "describe_surfaces", "make_surface", "surfaces_of"]
+__all__ = ["check_surfaces", "core_of", "describe_surfaces", "make_surface", "place_surfaces", "surfaces_of"]
 
 FloatArray = npt.NDArray[np.float64]
 # Length of the core of a ball over its radius: the ball turns with it, and it must not show.
@@ -83,8 +84,22 @@ def make_surface(
 
 
 def surfaces_of(directory: Directory) -> list[BodyPart]:
-    """Bodies that touch others, in the order in which the engine has their surfaces after all rods."""
-    return [body for body in directory.all(BodyPart) if body.surface is not None]
+    """Bodies that touch others, in the order in which the engine has their surfaces after all rods.
+
+    Without contact and obstacles, surfaces serve to warn of parts that pass through each other. Faces do not warn, and
+    are left out, so that such a scene may be planar.
+    """
+    touch = directory.contact.rods or directory.contact.pairs or directory.all(ObstaclePart)
+    surfaces = [(body, body.surface) for body in directory.all(BodyPart)]
+    return [body for body, surface in surfaces if surface is not None and (touch or not surface.faces)]
+
+
+def place_surfaces(directory: Directory) -> None:
+    """Give the bodies of a scene that is built the points of their surfaces, where these may touch something."""
+    for body in surfaces_of(directory) if _may_touch(directory) else ():
+        if body.surface is not None and not body.surface.nodes:
+            nodes = directory.layout.add_surface(body.index, body.surface.points)
+            directory.parts[body.name] = replace(body, surface=replace(body.surface, nodes=nodes))
 
 
 def describe_surfaces(directory: Directory) -> list[_core.RodDescription]:
@@ -93,9 +108,10 @@ def describe_surfaces(directory: Directory) -> list[_core.RodDescription]:
     Empty where they cannot touch anything, so that such a scene may be planar.
     """
     found = []
-    for body in surfaces_of(directory) if _may_touch(directory) else ():
+    for body in surfaces_of(directory):
         surface = body.surface
-        assert surface is not None
+        if surface is None or not surface.nodes:
+            continue
         ways = np.diff(surface.points, axis=0)
         lengths = np.linalg.norm(ways, axis=1)
         aside = np.cross(ways, np.eye(3)[np.abs(ways).argmin(axis=1)])

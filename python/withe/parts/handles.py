@@ -107,6 +107,13 @@ class Layout:
         self._rows = None
         return -1 - body, len(points)
 
+    def add_surface(self, body: int, positions: FloatArray) -> tuple[tuple[int, int], ...]:
+        """Add points of the surface of a body as a scene is built, and return them."""
+        points = self.body_points[body]
+        self.body_points[body] = (*points, *positions)
+        self._rows = None
+        return tuple((-1 - body, len(points) + i) for i in range(len(positions)))
+
     def restore_points(self, points: list[tuple[FloatArray, ...]]) -> None:
         """Take back points that bodies got for a joint that was refused."""
         self.body_points = list(points)

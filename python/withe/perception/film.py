@@ -11,14 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from withe.common.extras import require
+from withe.common.short_repr import ShortRepr
 
 __all__ = ["FilmFrame", "read_film"]
 
 _DEFAULT_RATE = 30.0  # of films whose file does not state it [1/s]
 
 
-@dataclass(frozen=True, eq=False)
-class FilmFrame:
+@dataclass(frozen=True, eq=False, repr=False)
+class FilmFrame(ShortRepr):
     """A frame of a film.
 
     Attributes

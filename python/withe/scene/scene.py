@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import uuid
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast, overload
 
@@ -343,11 +342,7 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         part = make_body(
             name, index, solid, density, mass, inertia, center, position, rotation, friction, restitution, touches
         )
-        layout = self._directory.layout
-        layout.add_body(part.center)
-        if part.surface is not None:
-            nodes = tuple(layout.body_point(index, point, -1.0) for point in part.surface.points)
-            part = replace(part, surface=replace(part.surface, nodes=nodes))
+        self._directory.layout.add_body(part.center)
         return cast(Body, self._directory.add(part))
 
     def add_robot(

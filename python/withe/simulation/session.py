@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe import _core
+from withe.parts.body_surfaces import place_surfaces
 from withe.parts.contacts import drawn_frictions
 from withe.parts.description import describe, parameters_of
 from withe.parts.directory import Directory
@@ -80,6 +81,7 @@ class Session:
         ValueError
             A scene that cannot be built.
         """
+        place_surfaces(scene)
         description = describe(scene, gravity, options.bending)
         if rods := scene.all(RodPart):
             check_tolerances(
