@@ -19,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import extras, validation
+from withe.common.polyhedra import convex_hull
 
 __all__ = ["Box", "Capsule", "Cylinder", "Hull", "Mesh", "Sphere"]
 
@@ -270,8 +271,43 @@ class Capsule:
         return _turned(self.radius * np.sin(angles), shift - self.radius * np.cos(angles))
 
 
+class _OfTriangles:
+    """A solid whose volume, centre and inertia follow from its surface."""
+
+    def surface(self) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+        """Return the surface, see `Solid`."""
+        raise NotImplementedError
+
+    def _corners(self) -> tuple[FloatArray, FloatArray]:
+        """Return the corners of the tetrahedra from the origin to each triangle, and their signed volumes."""
+        vertices, triangles = self.surface()
+        corners = vertices[triangles]
+        return corners, np.linalg.det(corners) / 6.0
+
+    @property
+    def volume(self) -> float:
+        """Volume [m^3]."""
+        return float(self._corners()[1].sum())
+
+    @property
+    def center(self) -> FloatArray:
+        """Centre of mass, shape (3,) [m]."""
+        corners, volumes = self._corners()
+        return np.asarray(volumes @ corners.sum(axis=1) / 4.0 / volumes.sum())
+
+    @property
+    def inertia_per_mass(self) -> FloatArray:
+        """Moment of inertia about the centre of mass over the mass, shape (3, 3) [m^2]."""
+        corners, volumes = self._corners()
+        sums = corners.sum(axis=1)
+        # Second moments of a tetrahedron with a corner at the origin: V / 20 (sum_i x_i x_i^T + s s^T).
+        second = np.einsum("m,mij,mik->jk", volumes, corners, corners) + np.einsum("m,mj,mk->jk", volumes, sums, sums)
+        second = second / 20.0 / volumes.sum() - np.outer(self.center, self.center)
+        return np.asarray(np.trace(second) * np.eye(3) - second)
+
+
 @dataclass(frozen=True, eq=False)
-class Mesh:
+class Mesh(_OfTriangles):
     """A closed surface of triangles, whose normals point outwards.
 
     Parameters
@@ -345,32 +381,6 @@ class Mesh:
         triangles = np.asarray(read.faces).reshape(-1, 4)[:, 1:].astype(np.int64)
         return cls(validation.positive(scale, "scale") * np.asarray(read.points, dtype=float), triangles, rounding)
 
-    def _corners(self) -> tuple[FloatArray, FloatArray]:
-        """Return the corners of the tetrahedra from the origin to each triangle, and their signed volumes."""
-        corners = np.asarray(self.vertices)[np.asarray(self.triangles)]
-        return corners, np.linalg.det(corners) / 6.0
-
-    @property
-    def volume(self) -> float:
-        """Volume [m^3]."""
-        return float(self._corners()[1].sum())
-
-    @property
-    def center(self) -> FloatArray:
-        """Centre of mass, shape (3,) [m]."""
-        corners, volumes = self._corners()
-        return np.asarray(volumes @ corners.sum(axis=1) / 4.0 / volumes.sum())
-
-    @property
-    def inertia_per_mass(self) -> FloatArray:
-        """Moment of inertia about the centre of mass over the mass, shape (3, 3) [m^2]."""
-        corners, volumes = self._corners()
-        sums = corners.sum(axis=1)
-        # Second moments of a tetrahedron with a corner at the origin: V / 20 (sum_i x_i x_i^T + s s^T).
-        second = np.einsum("m,mij,mik->jk", volumes, corners, corners) + np.einsum("m,mj,mk->jk", volumes, sums, sums)
-        second = second / 20.0 / volumes.sum() - np.outer(self.center, self.center)
-        return np.asarray(np.trace(second) * np.eye(3) - second)
-
     def surface(self) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         """Return the surface for pictures.
 
@@ -384,7 +394,7 @@ class Mesh:
 
 
 @dataclass(frozen=True, eq=False)
-class Hull:
+class Hull(_OfTriangles):
     """The convex hull of points.
 
     Parameters
@@ -404,39 +414,14 @@ class Hull:
     rounding: float | None = None
 
     def __post_init__(self) -> None:
-        from scipy.spatial import ConvexHull
-
         points = validation.number_array(self.points, "points of the hull", ("n", 3))
         object.__setattr__(self, "points", points)
         spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
         if len(points) < 4 or spread[2] < 1e-9 * spread[0]:
             raise ValueError("points of the hull must be at least four that are not in one plane")
-        hull = ConvexHull(points)
-        corners = points[hull.simplices]
-        ways = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        inward = np.einsum("ij,ij->i", ways, hull.equations[:, :3]) < 0.0
-        triangles = np.where(inward[:, None], hull.simplices[:, ::-1], hull.simplices)
-        used, rows = np.unique(triangles, return_inverse=True)
-        object.__setattr__(self, "_mesh", Mesh(points[used], rows.reshape(-1, 3), self.rounding))
-
-    @property
-    def _shape(self) -> Mesh:
-        return cast(Mesh, self.__dict__["_mesh"])
-
-    @property
-    def volume(self) -> float:
-        """Volume [m^3]."""
-        return self._shape.volume
-
-    @property
-    def center(self) -> FloatArray:
-        """Centre of mass, shape (3,) [m]."""
-        return self._shape.center
-
-    @property
-    def inertia_per_mass(self) -> FloatArray:
-        """Moment of inertia about the centre of mass over the mass, shape (3, 3) [m^2]."""
-        return self._shape.inertia_per_mass
+        vertices, triangles = convex_hull(points)
+        _check_rounding(self.rounding, float(np.ptp(vertices, axis=0).min()), "hull")
+        object.__setattr__(self, "_surface", (vertices, triangles))
 
     def surface(self) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         """Return the surface for pictures.
@@ -447,7 +432,7 @@ class Hull:
         triangles : ndarray of int, shape (m, 3)
             Rows of the vertices, counter-clockwise from outside.
         """
-        return self._shape.surface()
+        return cast("tuple[FloatArray, npt.NDArray[np.int64]]", self.__dict__["_surface"])
 
 
 def _check_closed(vertices: FloatArray, triangles: npt.NDArray[np.int64]) -> None:

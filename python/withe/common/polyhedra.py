@@ -7,7 +7,9 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Core", "inside", "polyhedron_core", "trails"]
+from withe.common.union_find import UnionFind
+
+__all__ = ["Core", "convex_hull", "inside", "polyhedron_core", "trails"]
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -62,37 +64,35 @@ def polyhedron_core(vertices: FloatArray, triangles: IntArray, rounding: float) 
     Core
         Its segments are the convex edges, moved inwards so that rounded edges end where faces are.
     """
-    vertices, triangles = _welded(vertices, triangles)
     corners = vertices[triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     owner = {(int(t[i]), int(t[(i + 1) % 3])): k for k, t in enumerate(triangles) for i in range(3)}
-    face = np.arange(len(triangles))
+    flat = UnionFind(len(triangles))
     for (a, b), k in owner.items():
         other = owner[b, a]
         if a < b and np.linalg.norm(np.cross(normals[k], normals[other])) < _FLAT and normals[k] @ normals[other] > 0.0:
-            _unite(face, k, other)
-    face = np.array([_root(face, k) for k in range(len(face))])
-    inset = vertices + _offsets(vertices, triangles, normals, face, -rounding)
+            flat.unite(k, other)
+    roots, face = np.unique([flat.find(k) for k in range(len(triangles))], return_inverse=True)
+    outwards = _outwards(vertices, triangles, normals[roots], face)
     margin = min(rounding, _MARGIN * float(np.ptp(vertices, axis=0).min()))
-    drawn = vertices + _offsets(vertices, triangles, normals, face, margin - rounding)
-    sharp = [
-        (a, b)
-        for (a, b), k in owner.items()
-        if a < b
-        and face[k] != face[owner[b, a]]
-        and np.cross(normals[k], normals[owner[b, a]]) @ (vertices[b] - vertices[a]) > 0.0
-    ]
-    roots = np.unique(face)
+    inset, drawn = vertices - rounding * outwards, vertices + (margin - rounding) * outwards
+    borders: list[list[tuple[int, int]]] = [[] for _ in roots]
+    segments, beside = [], []
+    for (a, b), k in owner.items():
+        left, right = face[k], face[owner[b, a]]
+        if left == right:
+            continue
+        borders[left].append((a, b))
+        if a < b and np.cross(normals[roots[left]], normals[roots[right]]) @ (vertices[b] - vertices[a]) > 0.0:
+            segments.append((a, b))
+            beside.append((left, right))
     outlines = []
-    for root in roots:
-        ways = [way for way, k in owner.items() if face[k] == root and face[owner[way[1], way[0]]] != root]
-        outline = drawn[np.array(ways)]
+    for root, border in zip(roots, borders, strict=True):
+        outline = drawn[np.array(border)]
         height = (corners[root, 0] - outline) @ normals[root]
         outlines.append((outline + height[..., None] * normals[root], normals[root]))
-    beside = np.searchsorted(roots, np.array([(face[owner[a, b]], face[owner[b, a]]) for a, b in sharp]).reshape(-1, 2))
-    segments = np.array(sharp, dtype=np.int64).reshape(-1, 2)
-    return Core(inset, segments, rounding, tuple(outlines), beside, triangles)
+    return Core(inset, _pairs(segments), rounding, tuple(outlines), _pairs(beside), triangles)
 
 
 def trails(segments: IntArray) -> list[int]:
@@ -155,31 +155,42 @@ def inside(vertices: FloatArray, triangles: IntArray, points: FloatArray) -> npt
     return found
 
 
-def _welded(vertices: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray]:
-    """Return a surface without repeated vertices."""
-    places, rows = np.unique(vertices, axis=0, return_inverse=True)
-    return places, np.asarray(rows).reshape(-1)[triangles]
+def convex_hull(points: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Return the convex hull of points.
+
+    Parameters
+    ----------
+    points : ndarray of shape (n, 3) [m]
+
+    Returns
+    -------
+    vertices : ndarray of shape (m, 3) [m]
+    triangles : ndarray of int, shape (k, 3)
+        Rows of the vertices, counter-clockwise from outside.
+    """
+    from scipy.spatial import ConvexHull
+
+    hull = ConvexHull(points)
+    rows = hull.simplices.astype(np.int64)
+    corners = points[rows]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    inwards = np.einsum("ij,ij->i", normals, hull.equations[:, :3]) < 0.0
+    rows[inwards] = rows[inwards, ::-1]
+    used, triangles = np.unique(rows, return_inverse=True)
+    return points[used], triangles.reshape(-1, 3)
 
 
-def _offsets(vertices: FloatArray, triangles: IntArray, normals: FloatArray, face: IntArray, by: float) -> FloatArray:
-    """Return how far vertices move as all faces move along their normals."""
+def _outwards(vertices: FloatArray, triangles: IntArray, normals: FloatArray, face: IntArray) -> FloatArray:
+    """Return how far vertices move as all faces move by one along their normals."""
     around: list[set[int]] = [set() for _ in vertices]
     for k, triangle in enumerate(triangles):
         for vertex in triangle:
             around[vertex].add(int(face[k]))
     moved = np.zeros_like(vertices)
     for i, faces in enumerate(around):
-        of_faces = normals[sorted(faces)]
-        moved[i] = np.linalg.pinv(of_faces, rcond=0.1) @ np.full(len(of_faces), by)
+        moved[i] = np.linalg.pinv(normals[sorted(faces)], rcond=0.1).sum(axis=1)
     return moved
 
 
-def _root(parents: IntArray, k: int) -> int:
-    while parents[k] != k:
-        k = int(parents[k])
-    return k
-
-
-def _unite(parents: IntArray, a: int, b: int) -> None:
-    a, b = _root(parents, a), _root(parents, b)
-    parents[max(a, b)] = min(a, b)
+def _pairs(rows: list[tuple[int, int]]) -> IntArray:
+    return np.array(rows, dtype=np.int64).reshape(-1, 2)

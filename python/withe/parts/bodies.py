@@ -9,9 +9,9 @@ import numpy.typing as npt
 
 from withe import _core
 from withe.common import validation
+from withe.common.union_find import UnionFind
 from withe.parts.body_surfaces import core_of, make_surface
 from withe.parts.directory import Directory
-from withe.parts.handles import UnionFind
 from withe.parts.kinds import BodyPart, JoinPart, SupportPart
 from withe.solids import Solid
 

@@ -11,8 +11,8 @@ import numpy.typing as npt
 from withe import _core
 from withe.common import validation
 from withe.common.polyhedra import Core, inside, polyhedron_core, trails
+from withe.common.union_find import UnionFind
 from withe.parts.directory import Directory
-from withe.parts.handles import UnionFind
 from withe.parts.kinds import BodyFace, BodyPart, BodySurface, JoinPart, ObstaclePart, RodPart
 from withe.solids import Box, Capsule, Hull, Mesh, Sphere
 
@@ -74,6 +74,7 @@ def make_surface(
         points.append(np.array([middle, middle + size * normal]))
         faces.append(BodyFace(len(radii) - 1, aside, depth, plane.reshape(-1, 4)))
     return BodySurface(
+        core,
         origin + np.concatenate(points) @ axes.T,
         np.array(radii),
         tuple(faces),
@@ -89,7 +90,7 @@ def surfaces_of(directory: Directory) -> list[BodyPart]:
     Without contact and obstacles, surfaces serve to warn of parts that pass through each other. Faces do not warn, and
     are left out, so that such a scene may be planar.
     """
-    touch = directory.contact.rods or directory.contact.pairs or directory.all(ObstaclePart)
+    touch = _has_contact(directory)
     surfaces = [(body, body.surface) for body in directory.all(BodyPart)]
     return [body for body, surface in surfaces if surface is not None and (touch or not surface.faces)]
 
@@ -143,8 +144,9 @@ def check_surfaces(directory: Directory) -> None:
     ValueError
         A sphere or capsule as an obstacle beside a body with faces, or a rod or body inside of such a body.
     """
-    with_faces = [body for body in surfaces_of(directory) if body.surface is not None and body.surface.faces]
-    for body in with_faces:
+    surfaces = [(body, body.surface) for body in surfaces_of(directory) if body.surface is not None]
+    with_faces = [(body, surface.core) for body, surface in surfaces if surface.faces]
+    for body, _ in with_faces:
         for obstacle in directory.all(ObstaclePart):
             if obstacle.kind == "capsule" and not _ignored(directory, body.name, obstacle.name):
                 raise ValueError(
@@ -154,24 +156,17 @@ def check_surfaces(directory: Directory) -> None:
                 )
     if not directory.contact.rods:
         return
-    cores = {body.index: core_of(body.solid) for body in surfaces_of(directory)}
-    for body in with_faces:
-        core = cores[body.index]
-        assert core is not None
+    lines = [(rod.name, rod.index, "rod", rod.points[None]) for rod in directory.all(RodPart)]
+    for body, surface in surfaces:
+        ends = (body.position + surface.core.points @ body.rotation.T)[surface.core.segments]
+        lines.append((body.name, -1 - body.index, "body", ends))
+    for body, core in with_faces:
         step = 0.5 * float(np.ptp(core.points, axis=0).min())
         rows = directory.layout.rows(-1 - body.index)
-        others: list[tuple[str, int, str, FloatArray]] = [
-            (rod.name, rod.index, "rod", _along(rod.points, step)) for rod in directory.all(RodPart)
-        ]
-        for other in surfaces_of(directory):
-            own = cores[other.index]
-            assert own is not None
-            ends = (other.position + own.points @ other.rotation.T)[own.segments]
-            points = np.concatenate([_along(segment, step) for segment in ends])
-            others.append((other.name, -1 - other.index, "body", points))
-        for name, owner, what, points in others:
+        for name, owner, what, polylines in lines:
             if np.intersect1d(directory.layout.rows(owner), rows).size or _ignored(directory, body.name, name):
                 continue
+            points = np.concatenate([_along(polyline, step) for polyline in polylines])
             if inside(core.points, core.triangles, (points - body.position) @ body.rotation).any():
                 raise ValueError(
                     f"{what} {name!r} is drawn inside of body {body.name!r}: draw them apart, join them, or leave the "
@@ -204,12 +199,15 @@ def _describe_face(face: BodyFace) -> _core.FaceDescription:
     return description
 
 
+def _has_contact(directory: Directory) -> bool:
+    return bool(directory.contact.rods or directory.contact.pairs or directory.all(ObstaclePart))
+
+
 def _may_touch(directory: Directory) -> bool:
     """Return True if there is contact, or if parts that are not joined may pass through each other without it."""
-    contact = directory.contact
-    if contact.rods or contact.pairs or directory.all(ObstaclePart):
+    if _has_contact(directory):
         return True
-    if contact.rods is not None:
+    if directory.contact.rods is not None:
         return False
     rods = len(directory.layout.rods)
     parts = UnionFind(rods + len(directory.all(BodyPart)))

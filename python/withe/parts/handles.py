@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from withe.common import validation
 from withe.common.attributes import of_a_simulation
+from withe.common.union_find import UnionFind
 
 __all__ = [
     "Body",
@@ -90,12 +91,9 @@ class Layout:
         return len(self.body_points) - 1
 
     def body_point(self, body: int, position: FloatArray, near: float) -> tuple[int, int]:
-        """Return the point of a body at a position, or as near to it, which is a new one if there is none.
-
-        A negative distance always makes a new one.
-        """
+        """Return the point of a body at a position, or as near to it, which is a new one if there is none."""
         points = self.body_points[body]
-        for i, point in enumerate(points if near >= 0.0 else ()):
+        for i, point in enumerate(points):
             if np.linalg.norm(point - position) <= near:
                 return -1 - body, i
         if not self._is_open:
@@ -174,25 +172,6 @@ def _ranks(points: tuple[FloatArray, ...]) -> npt.NDArray[np.int64]:
     ranks = np.zeros(len(points), np.int64)
     ranks[1 + np.lexsort(others.T[::-1])] = np.arange(1, len(points))
     return ranks
-
-
-class UnionFind:
-    """Groups of whole numbers; the root of a group is its smallest member."""
-
-    def __init__(self, count: int) -> None:
-        self._parents = list(range(count))
-
-    def find(self, i: int) -> int:
-        """The root of the group of i."""
-        while self._parents[i] != i:
-            self._parents[i] = self._parents[self._parents[i]]
-            i = self._parents[i]
-        return i
-
-    def unite(self, i: int, j: int) -> None:
-        """Make the groups of i and j one."""
-        low, high = sorted((self.find(i), self.find(j)))
-        self._parents[high] = low
 
 
 @dataclass(frozen=True)

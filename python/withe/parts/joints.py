@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe import _core
-from withe.parts.handles import UnionFind
+from withe.common.union_find import UnionFind
 from withe.parts.kinds import JoinPart, JointForm, Pass
 from withe.parts.table import kind_of
 

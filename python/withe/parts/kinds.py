@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common.drawing import voronoi_lengths
+from withe.common.polyhedra import Core
 from withe.parts.friction import Coefficients
 from withe.parts.parameters import RodParameters
 from withe.parts.sections import SectionProperties
@@ -127,6 +128,7 @@ class BodyFace:
 class BodySurface:
     """The surface of a rigid body that touches others: all points at a distance from edges, and flat faces."""
 
+    core: Core  # in the axes of the body
     points: FloatArray  # a chain of nodes as drawn, (n, 3) [m]
     radii: FloatArray  # of its edges; 0: an edge that touches nothing, (n - 1,) [m]
     faces: tuple[BodyFace, ...]

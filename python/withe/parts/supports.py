@@ -9,8 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common import validation
+from withe.common.union_find import UnionFind
 from withe.parts.directory import Directory
-from withe.parts.handles import Body, NodeHandle, UnionFind
+from withe.parts.handles import Body, NodeHandle
 from withe.parts.hands import check_free
 from withe.parts.kinds import BodyPart, JoinPart, Pass, RodPart, SupportKind, SupportPart
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from withe.common.polyhedra import convex_hull
 from withe.solids import Box, Capsule, Cylinder, Mesh, Solid, Sphere
 
 __all__ = ["Shape", "closed_surface", "combined", "drawn_geoms", "solid_of", "welded"]
@@ -137,22 +138,8 @@ def closed_surface(vertices: FloatArray, triangles: npt.NDArray[np.int64]) -> tu
         except ValueError:
             continue
         return (vertices, rows), False
-    from scipy.spatial import ConvexHull
-
     flat = np.linalg.matrix_rank(vertices - vertices[0], tol=1e-6 * float(np.abs(vertices).max())) < 3
     if flat:  # a sheet gets a thickness, because a hull has a volume
         normal = np.linalg.svd(vertices - vertices[0])[2][2] * 1e-3 * float(np.ptp(vertices, axis=0).max())
         vertices = np.concatenate([vertices - normal, vertices + normal])
-    hull = ConvexHull(vertices)
-    rows = hull.simplices.astype(np.int64)
-    corners = vertices[rows]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    inwards = np.einsum("ij,ij->i", normals, hull.equations[:, :3]) < 0.0
-    rows[inwards] = rows[inwards, ::-1]
-    return _used(vertices, rows), True
-
-
-def _used(vertices: FloatArray, triangles: npt.NDArray[np.int64]) -> Surface:
-    """Return a surface without vertices that no triangle has."""
-    kept, rows = np.unique(triangles, return_inverse=True)
-    return vertices[kept], rows.reshape(-1, 3)
+    return convex_hull(vertices), True
