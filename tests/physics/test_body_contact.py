@@ -9,16 +9,10 @@ import pytest
 import withe
 from cases import measured
 from convergence import assert_order, assert_order_at_least
+from loose_bodies import G, assert_momenta_and_energy_stay, cloud, on_slope
 
 Array = npt.NDArray[np.float64]
-G = 9.81
 RADIUS = 0.02
-
-
-def on_slope(degrees: float) -> Array:
-    """Return gravity on a slope that falls along x."""
-    angle = np.radians(degrees)
-    return G * np.array([np.sin(angle), 0.0, -np.cos(angle)])
 
 
 def acceleration(scene: withe.Scene, ball: withe.Body, step: float) -> float:
@@ -171,34 +165,11 @@ def test_a_ball_lies_on_two_rods() -> None:
     assert_order_at_least(errors, 1.2)
 
 
-def cloud(seed: int, friction: float) -> tuple[withe.Scene, list[tuple[withe.Rod | withe.Body, Array, Array | None]]]:
-    """Draw three rods and five bodies that fly at each other, with their velocities and spins."""
-    draw = np.random.default_rng(seed)
-    scene = withe.Scene(gravity=(0, 0, 0))
-    scene.enable_contact(friction=friction)
-    rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
-    axes = np.concatenate([np.eye(3), -np.eye(3), np.full((1, 3), 0.577), np.full((1, 3), -0.577)])
-    draw.shuffle(axes)
-    things: list[tuple[withe.Rod | withe.Body, Array, Array | None]] = []
-    for i, axis in enumerate(axes):
-        place = 0.13 * axis + draw.normal(size=3) * 0.005
-        turn = np.linalg.qr(draw.normal(size=(3, 3)))[0]
-        turn *= np.linalg.det(turn)
-        velocity = -0.5 * axis + draw.normal(size=3) * 0.05
-        if i < 3:
-            half = 0.05 * turn[:, 0]
-            rod = scene.add_rod(start=place - half, end=place + half, nodes=11, radius=0.004, material=rubber)
-            things.append((rod, velocity, None))
-            continue
-        is_ball = draw.random() < 0.5
-        solid = (
-            withe.solids.Sphere(draw.uniform(0.008, 0.02))
-            if is_ball
-            else withe.solids.Capsule(draw.uniform(0.006, 0.012), draw.uniform(0.02, 0.05))
-        )
-        body = scene.add_body(solid, density=10.0 ** draw.uniform(2.0, 4.0), position=place, rotation=turn)
-        things.append((body, velocity, draw.normal(size=3) * 15.0))
-    return scene, things
+def ball_or_capsule(draw: np.random.Generator) -> withe.solids.Solid:
+    """Draw a solid with a round surface."""
+    if draw.random() < 0.5:
+        return withe.solids.Sphere(draw.uniform(0.008, 0.02))
+    return withe.solids.Capsule(draw.uniform(0.006, 0.012), draw.uniform(0.02, 0.05))
 
 
 @pytest.mark.filterwarnings("ignore::withe.CoarseStepWarning")
@@ -206,28 +177,8 @@ def cloud(seed: int, friction: float) -> tuple[withe.Scene, list[tuple[withe.Rod
 @pytest.mark.parametrize("seed", range(6))
 def test_bodies_and_rods_that_meet_keep_momenta_and_energy(seed: int, friction: float) -> None:
     """Both momenta, and the balance of energy; without friction energy, but for contacts that stiffen in impacts."""
-    scene, things = cloud(seed, friction)
-    simulation = scene.build(time_step=1e-3)
-    for thing, velocity, spin in things:
-        if isinstance(thing, withe.Body):
-            simulation.set_velocity(thing, velocity, angular=spin)
-        else:
-            simulation.set_velocities(thing, np.tile(velocity, (11, 1)))
-    before, energy = simulation.momentum(), simulation.energy().total
-    scale = 2.0 * energy / 0.5  # sum of the moduli of linear momenta; times the size of the scene of angular ones
-    met: set[tuple[str, ...]] = set()
-    for _ in range(30):
-        simulation.step(10)
-        met |= {tuple(pair) for pair in simulation.contacts()["pair"]}
-    after, now = simulation.momentum(), simulation.energy()
-    assert len(met) >= 3
-    np.testing.assert_allclose(after.linear, before.linear, atol=1e-9 * scale)
-    np.testing.assert_allclose(after.angular, before.angular, atol=1e-8 * 0.13 * scale)
-    assert now.total + now.dissipated == pytest.approx(energy, rel=1e-6)
-    if friction == 0.0:
-        assert now.total == pytest.approx(energy, rel=1e-4)
-    else:
-        assert now.dissipated > 0.01 * energy
+    scene, things = cloud(seed, friction, ball_or_capsule)
+    assert_momenta_and_energy_stay(scene, things, friction, angular=1e-8, total=1e-4)
 
 
 def test_a_held_capsule_that_turns_pushes_rods_aside() -> None:

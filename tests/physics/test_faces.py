@@ -8,16 +8,10 @@ import pytest
 
 import withe
 from cases import measured
+from loose_bodies import G, assert_momenta_and_energy_stay, cloud, on_slope
 
 Array = npt.NDArray[np.float64]
-G = 9.81
 BLOCK = (0.04, 0.04, 0.10)
-
-
-def on_slope(degrees: float) -> Array:
-    """Return gravity on a slope that falls along x."""
-    angle = np.radians(degrees)
-    return G * np.array([np.sin(angle), 0.0, -np.cos(angle)])
 
 
 def table(scene: withe.Scene, friction: float) -> withe.Body:
@@ -212,31 +206,10 @@ def divided_plate(n: int) -> withe.solids.Mesh:
     return withe.solids.Mesh(np.concatenate([top, top - (0, 0, 0.05)]), np.array(triangles))
 
 
-def cloud(seed: int, friction: float) -> tuple[withe.Scene, list[tuple[withe.Rod | withe.Body, Array, Array | None]]]:
-    """Draw three rods and five bodies, most of them boxes, that fly at each other."""
-    draw = np.random.default_rng(seed)
-    scene = withe.Scene(gravity=(0, 0, 0))
-    scene.enable_contact(friction=friction)
-    rubber = withe.Material(youngs_modulus=1e6, density=1000.0)
-    axes = np.concatenate([np.eye(3), -np.eye(3), np.full((1, 3), 0.577), np.full((1, 3), -0.577)])
-    draw.shuffle(axes)
-    things: list[tuple[withe.Rod | withe.Body, Array, Array | None]] = []
-    for i, axis in enumerate(axes):
-        place = 0.13 * axis + draw.normal(size=3) * 0.005
-        turn = np.linalg.qr(draw.normal(size=(3, 3)))[0]
-        turn *= np.linalg.det(turn)
-        velocity = -0.5 * axis + draw.normal(size=3) * 0.05
-        if i < 3:
-            half = 0.05 * turn[:, 0]
-            rod = scene.add_rod(start=place - half, end=place + half, nodes=11, radius=0.004, material=rubber)
-            things.append((rod, velocity, None))
-            continue
-        sides = draw.uniform(0.015, 0.05, 3)
-        solids = [withe.solids.Box(tuple(sides)), withe.solids.Sphere(0.5 * sides[0])]
-        solid = solids[int(draw.random() < 0.25)]
-        body = scene.add_body(solid, density=10.0 ** draw.uniform(2.0, 4.0), position=place, rotation=turn)
-        things.append((body, velocity, draw.normal(size=3) * 15.0))
-    return scene, things
+def box_or_ball(draw: np.random.Generator) -> withe.solids.Solid:
+    """Draw a box, or less often a ball."""
+    sides = draw.uniform(0.015, 0.05, 3)
+    return withe.solids.Sphere(0.5 * sides[0]) if draw.random() < 0.25 else withe.solids.Box(tuple(sides))
 
 
 @pytest.mark.filterwarnings("ignore::withe.CoarseStepWarning")
@@ -244,28 +217,8 @@ def cloud(seed: int, friction: float) -> tuple[withe.Scene, list[tuple[withe.Rod
 @pytest.mark.parametrize("seed", range(5))
 def test_boxes_and_rods_that_meet_keep_momenta_and_energy(seed: int, friction: float) -> None:
     """Both momenta, and the balance of energy."""
-    scene, things = cloud(seed, friction)
-    simulation = scene.build(time_step=1e-3)
-    for thing, velocity, spin in things:
-        if isinstance(thing, withe.Body):
-            simulation.set_velocity(thing, velocity, angular=spin)
-        else:
-            simulation.set_velocities(thing, np.tile(velocity, (11, 1)))
-    before, energy = simulation.momentum(), simulation.energy().total
-    scale = 2.0 * energy / 0.5  # sum of the moduli of linear momenta; times the size of the scene of angular ones
-    met: set[tuple[str, ...]] = set()
-    for _ in range(30):
-        simulation.step(10)
-        met |= {tuple(pair) for pair in simulation.contacts()["pair"]}
-    after, now = simulation.momentum(), simulation.energy()
-    assert len(met) >= 3
-    np.testing.assert_allclose(after.linear, before.linear, atol=1e-9 * scale)
-    np.testing.assert_allclose(after.angular, before.angular, atol=1e-7 * 0.13 * scale)
-    assert now.total + now.dissipated == pytest.approx(energy, rel=1e-6)
-    if friction == 0.0:
-        assert now.total == pytest.approx(energy, rel=1e-3)
-    else:
-        assert now.dissipated > 0.01 * energy
+    scene, things = cloud(seed, friction, box_or_ball)
+    assert_momenta_and_energy_stay(scene, things, friction, angular=1e-7, total=1e-3)
 
 
 def test_what_lies_on_a_box_does_not_depend_on_the_axes_of_the_scene() -> None:
