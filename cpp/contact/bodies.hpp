@@ -16,12 +16,12 @@ struct Proximity {
   ClosestPoints points;         ///< for a curve only its s
   CurveDistance<double> curve;  ///< for a curve
   Vec3d normal{};               ///< from b to a
+  double distance = 0;          ///< distance of the centrelines, or of a centreline and the obstacle [m]
   double outside = 0;           ///< distance of a point's foot from the outline of a face, in its plane [m]
   bool beyond = false;          ///< true of surfaces that do not begin to touch here: others do in their place
 
   /// A lower bound of the distance from surfaces that may touch [m].
   double apart() const { return std::max(distance, outside); }
-  double distance = 0;  ///< distance of the centrelines, or of a centreline and the obstacle [m]
 };
 
 /// The point of an edge that touches a face, and the vector to it from its foot.

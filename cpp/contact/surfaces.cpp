@@ -250,10 +250,13 @@ std::vector<Surfaces::SurfaceNode> Surfaces::surface_nodes() const {
     const int rod = model_.edge_rod[at(surface.edge)];
     const auto add = [&](int node) {
       const Vec3d x = place(node);
+      // Distances are negative inside of the body, which the nearest face shows.
       double nearest = INFINITY, sign = 1.0;
+      std::vector<std::pair<int, double>> distances;  // edges, and how far they are
       for (const Face& face : faces_) {
         if (model_.edge_rod[at(face.edge)] != rod) continue;
         const FaceDistance d = distance_from(face, axes_of(model_, model_.initial_q, face), x);
+        distances.emplace_back(face.edge, d.distance);
         if (d.distance >= nearest) continue;
         nearest = d.distance;
         sign = d.height < 0.0 ? -1.0 : 1.0;
@@ -263,12 +266,9 @@ std::vector<Surfaces::SurfaceNode> Surfaces::surface_nodes() const {
         const Vec3d tail = place(model_.edge_tail[at(e)]), way = place(model_.edge_head[at(e)]) - tail,
                     apart = x - tail;
         const double s = std::clamp(dot(apart, way) / dot(way, way), 0.0, 1.0);
-        out.push_back({e, node, sign * std::max(0.0, norm(apart - s * way) - radius(e))});
+        distances.emplace_back(e, std::max(0.0, norm(apart - s * way) - radius(e)));
       }
-      for (const Face& face : faces_)
-        if (model_.edge_rod[at(face.edge)] == rod)
-          out.push_back(
-              {face.edge, node, sign * distance_from(face, axes_of(model_, model_.initial_q, face), x).distance});
+      for (const auto& [edge, distance] : distances) out.push_back({edge, node, sign * distance});
     };
     add(surface.base);
     for (const CarriedPart& part : model_.carried)
