@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 from reporting import Report
-from tracking_peers import CoherentPointDrift, TracedAnew
+from tracking_peers import CoherentPointDrift, TracedFrames
 
 from withe import _core
 from withe.perception import Camera, Tracker, color_filter, trace, trace_mask
@@ -238,8 +238,8 @@ def hidden_cables(count, first_seed):
             rod = rod if factor is None else replace(rod, bend_stiffness=factor * rod.bend_stiffness)
             tracker = Tracker(camera(), None if factor is None else rod, frame_rate=RATE)
             trackers[f"rod {name}"] = lambda mask, tracker=tracker: tracker.update(mask=mask)[0].nodes
-        anew, drift = TracedAnew(), CoherentPointDrift()
-        trackers["trace of each frame"] = lambda mask, anew=anew: anew.update(mask)[0]
+        traced, drift = TracedFrames(), CoherentPointDrift()
+        trackers["trace of each frame"] = lambda mask, traced=traced: traced.update(mask)[0]
         trackers["coherent point drift"] = drift.update
         for name, update in trackers.items():
             started = time.process_time()
@@ -267,10 +267,10 @@ def crossing_cables(count, first_seed):
     for seed in range(first_seed, first_seed + count):
         film = crossing_film(seed)
         truth = film.lines[:, :, :: (TRUE_NODES - 1) // (NODES - 1)]
-        tracker, anew = Tracker(), TracedAnew()
+        tracker, traced = Tracker(), TracedFrames()
         updates = {
             "Tracker": lambda mask, tracker=tracker: [cable.nodes for cable in tracker.update(mask=mask)],
-            "trace of each frame": lambda mask, anew=anew: list(anew.update(mask)),
+            "trace of each frame": lambda mask, traced=traced: list(traced.update(mask)),
         }
         nodes = {name: [] for name in updates}
         for mask in film.masks():

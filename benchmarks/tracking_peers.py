@@ -1,4 +1,4 @@
-"""Trackers to compare with: a trace of each frame anew, and coherent point drift."""
+"""Trackers to compare with: tracing of each frame by itself, and coherent point drift."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from withe.perception import trace_mask
 from withe.perception.chain import resample
 
 
-class TracedAnew:
+class TracedFrames:
     """A trace of each frame; the nearest trace of about the same length continues a cable."""
 
     def __init__(self, nodes=41, length_off=0.15):

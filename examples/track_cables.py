@@ -2,8 +2,8 @@
 
 The engine computes a cable that hangs between a pin and a hand. The hand moves, and a camera films the cable from the
 side at 60 frames per second. A tracker that knows length, stiffness and weight of the cable predicts the hidden part by
-an elastic rod. A tracker without this knowledge keeps the shape in which the part was last seen. A trace of each frame
-anew has neither the hidden part nor the order of the ends.
+an elastic rod. A tracker without this knowledge keeps the shape in which the part was last seen. Tracing of each frame
+by itself finds neither the hidden part nor the order of the ends.
 
 Writes out/track_cables.png.
 """

@@ -49,11 +49,8 @@ def draw(image: ArrayLike, tracing: Tracing) -> NDArray[np.uint8]:
     cv2 = require("cv2", "vision")
     picture = np.ascontiguousarray(check_image(image) // 2 + 20)
 
-    def fixed(points: NDArray[np.float64]) -> NDArray[np.int32]:
-        return np.round(np.atleast_2d(points) * (1 << _FRACTION_BITS)).astype(np.int32)
-
     def line(points: NDArray[np.float64], closed: bool, colour: tuple[int, int, int], thickness: int) -> None:
-        cv2.polylines(picture, [fixed(points)[:, None]], closed, colour, thickness, cv2.LINE_AA, _FRACTION_BITS)
+        cv2.polylines(picture, [_fixed(points)[:, None]], closed, colour, thickness, cv2.LINE_AA, _FRACTION_BITS)
 
     for index, (points, closed) in enumerate(zip(tracing.centrelines, tracing.closed, strict=True)):
         line(points, closed, cable_colour(index), 2)
@@ -72,7 +69,7 @@ def draw(image: ArrayLike, tracing: Tracing) -> NDArray[np.uint8]:
         if closed:
             continue
         for point, filled in ((points[0], -1), (points[-1], 2)):
-            center = tuple(int(v) for v in fixed(point)[0])
+            center = tuple(int(v) for v in _fixed(point)[0])
             cv2.circle(picture, center, 5 << _FRACTION_BITS, cable_colour(index), filled, cv2.LINE_AA, _FRACTION_BITS)
     for joint in tracing.joints:
         x, y = (int(v) for v in np.round(joint.point))
@@ -81,6 +78,11 @@ def draw(image: ArrayLike, tracing: Tracing) -> NDArray[np.uint8]:
         corners = doubt.point + 10 * np.array([[0.0, -1.0], [0.87, 0.5], [-0.87, 0.5]])
         line(corners, True, (255, 255, 0), 1)
     return picture
+
+
+def _fixed(points: NDArray[np.float64]) -> NDArray[np.int32]:
+    """Return points in fractions of a pixel, for OpenCV."""
+    return np.round(np.atleast_2d(points) * (1 << _FRACTION_BITS)).astype(np.int32)
 
 
 def draw_tracked(image: ArrayLike, cables: Sequence[TrackedCable]) -> NDArray[np.uint8]:
@@ -109,18 +111,15 @@ def draw_tracked(image: ArrayLike, cables: Sequence[TrackedCable]) -> NDArray[np
     picture = np.ascontiguousarray(check_image(image) // 2 + 20)
     bits = _FRACTION_BITS
 
-    def fixed(points: NDArray[np.float64]) -> NDArray[np.int32]:
-        return np.round(np.atleast_2d(points) * (1 << bits)).astype(np.int32)
-
     for index, cable in enumerate(cables):
         colour = cable_colour(index)
         both = cable.visible[:-1] & cable.visible[1:]
         for i in np.flatnonzero(both):
-            cv2.polylines(picture, [fixed(cable.nodes[i : i + 2])[:, None]], False, colour, 2, cv2.LINE_AA, bits)
-        for node, visible in zip(fixed(cable.nodes), cable.visible, strict=True):
+            cv2.polylines(picture, [_fixed(cable.nodes[i : i + 2])[:, None]], False, colour, 2, cv2.LINE_AA, bits)
+        for node, visible in zip(_fixed(cable.nodes), cable.visible, strict=True):
             if not visible:
                 cv2.circle(picture, (int(node[0]), int(node[1])), 3 << bits, colour, 1, cv2.LINE_AA, bits)
-        x, y = (int(v) for v in fixed(cable.nodes[0])[0])
+        x, y = (int(v) for v in _fixed(cable.nodes[0])[0])
         cv2.circle(picture, (x, y), 5 << bits, colour, -1, cv2.LINE_AA, bits)
         column, row = (int(v) for v in np.round(cable.nodes[0]))
         place = min(max(column + 8, 2), picture.shape[1] - 90), min(max(row - 8, 14), picture.shape[0] - 4)
