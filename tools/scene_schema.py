@@ -25,7 +25,7 @@ OBJECT = {"type": "object"}
 BY_NAME: dict[str, Any] = {
     "material": {"anyOf": [{"type": "string"}, {"$ref": "#/$defs/material"}]},
     "section": {"anyOf": [{"$ref": f"#/$defs/{name}"} for name in ("circle", "tube", "rectangle")]},
-    "solid": {"anyOf": [{"$ref": f"#/$defs/{name.lower()}"} for name in withe.solids.__all__]},
+    "solid": {"anyOf": [{"$ref": f"#/$defs/solid_{name.lower()}"} for name in withe.solids.__all__]},
     "friction": {"anyOf": [{"type": "number"}, {"type": "array", "items": {"type": "number"}}, OBJECT]},
     "points": {"anyOf": [{"type": "array"}, {"type": "string"}, {"$ref": "#/$defs/shape"}]},
     "guides": {"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]},
@@ -46,7 +46,7 @@ def schema() -> dict[str, Any]:
     for kind in (withe.Circle, withe.Tube, withe.Rectangle):
         definitions[kind.__name__.lower()] = table(kind, kind=kind.__name__.lower())
     for name in withe.solids.__all__:
-        definitions[name.lower()] = table(getattr(withe.solids, name), kind=name.lower())
+        definitions[f"solid_{name.lower()}"] = table(getattr(withe.solids, name), kind=name.lower())
     properties: dict[str, Any] = {
         "version": {"const": VERSION, "description": "Version of the format."},
         "gravity": {"type": "array", "items": {"type": "number"}, "description": "Acceleration of free fall [m/s^2]."},

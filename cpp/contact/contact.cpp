@@ -31,6 +31,9 @@ void set_start(const State& state, double duration, ContactProblem& problem) {
 /// Distance of a straight edge from an obstacle [m].
 double edge_distance(const Obstacle& o, const Vec3d& tail, const Vec3d& head) {
   if (o.kind == ObstacleKind::plane) return std::min(height_above(o, tail), height_above(o, head));
+  if (o.kind == ObstacleKind::shape)
+    return std::min(
+        {distance_to(o, tail).distance, distance_to(o, head).distance, distance_to(o, 0.5 * (tail + head)).distance});
   constexpr double kStrictlyConvex = 1e-12;  // share of the squared edge length: closest points of parallel edges
   const Vec3d way = head - tail;
   const double weight = kStrictlyConvex * dot(way, way);

@@ -3,9 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 #include "common/dual.hpp"
-#include "geometry/vec3.hpp"
+#include "geometry/shape.hpp"
 #include "model/model.hpp"
 
 namespace withe {
@@ -17,14 +18,16 @@ struct Obstacle {
   ObstacleKind kind = ObstacleKind::plane;
   Vec3d point{}, other{};  ///< `other` of a plane is its normal
   double radius = 0;
+  const Shape* shape = nullptr;  ///< in axes from `point` on
 };
 
 /// A point beside an obstacle.
 template <class Scalar>
 struct PointDistance {
-  Scalar distance;      ///< from a plane, or from the middle of a sphere or the axis of a capsule [m]
+  Scalar distance;      ///< from a plane, from the middle of a sphere, the axis of a capsule or that of `Shape` [m]
   Vec3<Scalar> normal;  ///< its gradient
   bool beside = false;  ///< a capsule's axis, between its ends
+  Vec3d place{};        ///< the point, in the axes of a shape [m]
 };
 
 /// Height above a plane that is taken back by `drift`.
@@ -45,6 +48,21 @@ PointDistance<Scalar> distance_to(const Obstacle& o, const Vec3<Scalar>& x, cons
     out.distance = height_above(o, x, drift);
     return out;
   }
+  if (o.kind == ObstacleKind::shape) {
+    out.place = Vec3d{value_of(x.x), value_of(x.y), value_of(x.z)} - (o.point - drift);
+    const ShapeDistance d = o.shape->distance(out.place);
+    if constexpr (std::is_same_v<Scalar, double>) {
+      out.distance = d.distance;
+      out.normal = d.normal;
+    } else {
+      const Vec3<Scalar> change = x - lift({value_of(x.x), value_of(x.y), value_of(x.z)});
+      const auto along = [&](const Vec3d& v) { return v.x * change.x + v.y * change.y + v.z * change.z; };
+      out.distance = d.distance + along(d.normal);
+      out.normal =
+          lift(d.normal) + Vec3<Scalar>{along(d.change.row[0]), along(d.change.row[1]), along(d.change.row[2])};
+    }
+    return out;
+  }
   Vec3<Scalar> way = x - lift(o.point - drift);
   const Vec3d axis = o.other - o.point;
   const double square = dot(axis, axis);
@@ -61,6 +79,10 @@ PointDistance<Scalar> distance_to(const Obstacle& o, const Vec3<Scalar>& x, cons
 /// Change of the normal as the point moves by `change`: the second derivative of the distance, times it.
 inline Vec3d normal_change(const Obstacle& o, const PointDistance<double>& p, const Vec3d& change) {
   if (o.kind == ObstacleKind::plane) return {};
+  if (o.kind == ObstacleKind::shape) {
+    const Mat3<double> by = o.shape->distance(p.place).change;
+    return {dot(by.row[0], change), dot(by.row[1], change), dot(by.row[2], change)};
+  }
   Vec3d across = change - dot(p.normal, change) * p.normal;
   if (p.beside) {
     const Vec3d axis = o.other - o.point;

@@ -367,10 +367,10 @@ void Surfaces::add_obstacles() {
   for (std::size_t o = 0; o < contact.obstacles.size(); ++o) {
     const ObstacleDescription& d = contact.obstacles[o];
     const ObstaclePlace place = obstacle_place(model_, d);
-    obstacles_.push_back({d.kind, place.point, place.other, d.radius});
+    obstacles_.push_back({d.kind, place.point, place.other, d.shape ? d.shape->radius() : d.radius, d.shape.get()});
     ContactPair p;
     p.key.b = -1 - static_cast<int>(o);
-    p.radius_b = d.radius;
+    p.radius_b = obstacles_.back().radius;
     for (int rod = 0; rod < static_cast<int>(model_.description.rods.size()); ++rod) {
       p.rod_a = rod;
       p.of_body = model_.description.rods[at(rod)].is_surface();
@@ -433,7 +433,7 @@ void Surfaces::unknowns_of_edges(const ContactKey& key, int (&dofs)[kContactUnkn
 
 /// The distance from a point to a smaller one is no parabola along an edge.
 bool Surfaces::smooth(const Obstacle& obstacle, int edge) const {
-  return radius(edge) > 0.0 && (ball(edge) || obstacle.kind == ObstacleKind::plane ||
+  return radius(edge) > 0.0 && (ball(edge) || obstacle.kind != ObstacleKind::capsule ||
                                 obstacle.radius + radius(edge) >= model_.edge_length(edge));
 }
 
@@ -461,11 +461,12 @@ void Surfaces::add_pieces(const ContactPair& prototype, const Obstacle& obstacle
     p.key.end = which;
     p.radius_a = 0.5 * (radius(before) + radius(behind));
     p.tolerance = std::min(tolerance(before), tolerance(behind));
-    p.scale = 0.5 * (scale(before) + scale(behind));
+    p.scale = 0.5 * (scale(before, obstacle) + scale(behind, obstacle));
+    if (p.scale < 0.5 * (scale(before) + scale(behind))) p.tolerance = std::min(p.tolerance, 0.1 * p.scale);
     p.piece = {&weights,
                {model_.edge_tail[at(before)], model_.edge_head[at(before)], -1},
                {before, -1},
-               12.0 * kDepth * std::min(p.radius_a, model_.edge_length(before))};
+               12.0 * kDepth * std::min({p.radius_a, p.scale, model_.edge_length(before)})};
     if (before != behind) {
       p.piece.node[2] = model_.edge_head[at(behind)];
       p.piece.edge[1] = behind;

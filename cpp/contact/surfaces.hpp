@@ -29,6 +29,10 @@ inline constexpr double kMaxPatternDistance = 0.5;
 /// which is a tenth of the scale, stay below the radius together, so that a corner stays on its side of a face.
 inline constexpr double kSharp = 4.0;
 
+/// Scale of the depth of contact in a channel, over the room that an edge has in it. A straight rod presses on both
+/// sides of a bend by a force in proportion to its sagitta less that room, which depth and tolerance change.
+inline constexpr double kChannel = 0.2;
+
 /// Unknowns of a contact: a0, a1, b0, b1 (3 each), angle of a, angle of b; of a piece of a curve: its nodes (3 each),
 /// three unused ones, the angles of its edges.
 inline constexpr int kContactUnknowns = 14;
@@ -119,10 +123,15 @@ class Surfaces {
   double scale(int edge) const {
     return (model_.description.rods[at(model_.edge_rod[at(edge)])].faces.empty() ? 1.0 : kSharp) * radius(edge);
   }
-  /// The smaller one of two surfaces; obstacles and faces have none [m].
+  /// The same beside an obstacle: no more than kChannel times the room of the edge in a channel [m].
+  double scale(int edge, const Obstacle& obstacle) const {
+    const double room = obstacle.shape == nullptr ? 0.0 : kChannel * (obstacle.shape->channel() - radius(edge));
+    return room > 0.0 ? std::min(scale(edge), room) : scale(edge);
+  }
+  /// The smaller one of two surfaces; planes, spheres, capsules and faces have none [m].
   double scale(const ContactKey& key) const {
-    const double other = key.b < 0 ? 0.0 : scale(key.b);
-    return other > 0.0 ? std::min(scale(key.a), other) : scale(key.a);
+    if (key.b < 0) return scale(key.a, obstacles_[static_cast<std::size_t>(-1 - key.b)]);
+    return scale(key.b) > 0.0 ? std::min(scale(key.a), scale(key.b)) : scale(key.a);
   }
   /// True if two edges may touch: not neighbours along rods and joints nearer than (pi / 2) (2 h + delta), not ignored,
   /// not surfaces of one body or of held bodies.

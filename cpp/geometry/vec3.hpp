@@ -25,6 +25,8 @@ struct Vec3 {
   }
 };
 
+using Vec3d = Vec3<double>;
+
 template <class Scalar>
 Vec3<Scalar> operator+(const Vec3<Scalar>& a, const Vec3<Scalar>& b) {
   return {a.x + b.x, a.y + b.y, a.z + b.z};

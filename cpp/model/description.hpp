@@ -4,10 +4,12 @@
 
 #include <array>
 #include <limits>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "common/types.hpp"
+#include "geometry/shape.hpp"
 
 namespace withe {
 
@@ -239,6 +241,7 @@ enum class Overlap {
 enum class ObstacleKind {
   plane,    ///< fills the half-space behind it
   capsule,  ///< a segment with a radius; a sphere where its ends coincide
+  shape,    ///< as its `Shape` says
 };
 
 /// Something solid, where it is drawn.
@@ -248,6 +251,7 @@ struct ObstacleDescription {
   Vector3 other = Vector3::UnitZ();  ///< unit normal of the plane, away from the solid; end of the segment [m]
   double radius = 0;                 ///< radius of a capsule [m]
   std::string name;
+  std::shared_ptr<const Shape> shape{};  ///< where the kind is `shape`, in axes from `point` on
 };
 
 /// Coefficients of a pair of bodies. Bodies are rods (their index) and obstacles (-1 - index).

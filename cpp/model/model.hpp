@@ -15,8 +15,6 @@
 
 namespace withe {
 
-using Vec3d = Vec3<double>;
-
 inline Vec3d to_vec3(const Vector3& v) { return {v.x(), v.y(), v.z()}; }
 inline Vector3 to_eigen(const Vec3d& v) { return {v.x, v.y, v.z}; }
 

@@ -65,6 +65,7 @@ void collect_directions(const SceneDescription& scene, std::vector<Vector3>& dir
 /// the plane of the rods, and a capsule whose axis lies in the plane of the rods or crosses it at a right angle.
 bool fits(const ObstacleDescription& o, const Vector3& corner, const Vector3& normal) {
   if (o.kind == ObstacleKind::plane) return std::abs(o.other.dot(normal)) < 1e-9;
+  if (o.kind == ObstacleKind::shape) return false;
   const double start = (o.point - corner).dot(normal), end = (o.other - corner).dot(normal);
   const double size = 1e-9 * (o.radius + (o.other - o.point).norm());
   if (std::abs(start) <= size && std::abs(end) <= size) return true;

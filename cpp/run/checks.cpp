@@ -86,6 +86,8 @@ void check_turn(const Model& model, int obstacle, const Vector3& turn) {
   const bool plane = drawn.kind == ObstacleKind::plane;
   const Vector3 axis = plane ? drawn.other : Vector3(drawn.other - drawn.point);
   require(turn.allFinite(), "turn of an obstacle must be finite");
+  require(drawn.kind != ObstacleKind::shape || turn.isZero(),
+          "obstacle '" + drawn.name + "' cannot turn: tubes and fields can be moved only");
   require(axis.cross(turn).norm() <= 1e-9 * axis.norm() * turn.norm(),
           "obstacle '" + drawn.name + "' can turn about " + (plane ? "its normal" : "its axis") + " only");
 }

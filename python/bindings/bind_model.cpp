@@ -2,6 +2,8 @@
 #include <pybind11/stl.h>
 
 #include "bindings.hpp"
+#include "geometry/distance_field.hpp"
+#include "geometry/tube.hpp"
 #include "model/actuation.hpp"
 #include "model/model.hpp"
 
@@ -36,7 +38,50 @@ constexpr Words<FrictionLaw, 4> kFrictionLaws{{{"implicit", FrictionLaw::implici
 constexpr Words<Overlap, 2> kOverlaps{{{"error", Overlap::error}, {"separate", Overlap::separate}}};
 constexpr Words<FluidModel, 3> kFluidModels{
     {{"none", FluidModel::none}, {"resistive", FluidModel::resistive}, {"stokeslets", FluidModel::stokeslets}}};
-constexpr Words<ObstacleKind, 2> kObstacleKinds{{{"plane", ObstacleKind::plane}, {"capsule", ObstacleKind::capsule}}};
+constexpr Words<ObstacleKind, 3> kObstacleKinds{
+    {{"plane", ObstacleKind::plane}, {"capsule", ObstacleKind::capsule}, {"shape", ObstacleKind::shape}}};
+
+std::vector<Vec3d> rows_of(const MatrixX3& points) {
+  std::vector<Vec3d> out;
+  for (const auto& point : points.rowwise()) out.push_back({point(0), point(1), point(2)});
+  return out;
+}
+
+VectorX distances(const Shape& shape, const MatrixX3& points) {
+  VectorX out(points.rows());
+  for (Eigen::Index i = 0; i < out.size(); ++i)
+    out(i) = shape.distance({points(i, 0), points(i, 1), points(i, 2)}).distance;
+  return out;
+}
+
+MatrixX3 normals(const Shape& shape, const MatrixX3& points) {
+  MatrixX3 out(points.rows(), 3);
+  for (Eigen::Index i = 0; i < out.rows(); ++i) {
+    const Vec3d normal = shape.distance({points(i, 0), points(i, 1), points(i, 2)}).normal;
+    out.row(i) << normal.x, normal.y, normal.z;
+  }
+  return out;
+}
+
+void register_shapes(py::module_& module) {
+  py::class_<Shape, std::shared_ptr<Shape>>(module, "Shape", "A solid that rods touch, in axes of its own.")
+      .def("distances", &distances, py::arg("points"), "Distances of points, shape (n,) [m].")
+      .def("normals", &normals, py::arg("points"), "Gradients of the distances, shape (n, 3) [-].");
+  py::class_<Tube, Shape, std::shared_ptr<Tube>>(module, "Tube", "A tube about an axis of quadratic Bezier curves.")
+      .def(py::init([](const MatrixX3& ends, const MatrixX3& middles, double radius, double wall) {
+             return std::make_shared<Tube>(rows_of(ends), rows_of(middles), radius, wall);
+           }),
+           py::arg("ends"), py::arg("middles"), py::arg("radius"), py::arg("wall"));
+  py::class_<DistanceField, Shape, std::shared_ptr<DistanceField>>(module, "DistanceField",
+                                                                   "A signed distance as a cubic spline on a grid.")
+      .def(py::init([](const VectorX& coefficients, const std::array<int, 3>& points, const Vector3& origin,
+                       const Vector3& spacing) {
+             return std::make_shared<DistanceField>(std::vector<double>(coefficients.begin(), coefficients.end()),
+                                                    points, Vec3d{origin.x(), origin.y(), origin.z()},
+                                                    Vec3d{spacing.x(), spacing.y(), spacing.z()});
+           }),
+           py::arg("coefficients"), py::arg("points"), py::arg("origin"), py::arg("spacing"));
+}
 
 void register_rod(py::module_& module) {
   py::class_<FaceDescription>(module, "FaceDescription", "A face of the surface of a rigid body.")
@@ -87,7 +132,8 @@ void register_contact(py::module_& module) {
       .def_readwrite("point", &ObstacleDescription::point)
       .def_readwrite("other", &ObstacleDescription::other)
       .def_readwrite("radius", &ObstacleDescription::radius)
-      .def_readwrite("name", &ObstacleDescription::name);
+      .def_readwrite("name", &ObstacleDescription::name)
+      .def("set_shape", [](ObstacleDescription& o, const std::shared_ptr<Shape>& shape) { o.shape = shape; });
   def_word(obstacle, "kind", &ObstacleDescription::kind, kObstacleKinds);
   py::class_<ContactPairDescription>(module, "ContactPairDescription", "What two bodies have of their own.")
       .def(py::init<>())
@@ -238,6 +284,7 @@ void register_model(py::module_& module) {
   register_springs(module);
   register_tendons(module);
   register_torsions(module);
+  register_shapes(module);
   register_contact(module);
   register_fluid(module);
   py::class_<SceneDescription> scene(module, "SceneDescription", "What the scene layer hands to the engine.");

@@ -17,6 +17,7 @@ __all__: list[str] = [
     "ContactTable",
     "ConvergenceFailure",
     "Deflection",
+    "DistanceField",
     "Energy",
     "EquilibriumGradient",
     "EquilibriumPath",
@@ -47,6 +48,7 @@ __all__: list[str] = [
     "RodState",
     "RunJacobian",
     "SceneDescription",
+    "Shape",
     "SheetManifold",
     "SheetWidth",
     "SpringDescription",
@@ -56,6 +58,7 @@ __all__: list[str] = [
     "Tape",
     "TendonDescription",
     "TorsionDescription",
+    "Tube",
     "Warnings",
     "World",
     "check_turns",
@@ -427,6 +430,47 @@ class TorsionDescription:
         rest_angle: typing.SupportsFloat | typing.SupportsIndex,
     ) -> None: ...
 
+class Shape:
+    """
+    A solid that rods touch, in axes of its own.
+    """
+    def distances(
+        self, points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"]
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        Distances of points, shape (n,) [m].
+        """
+    def normals(
+        self, points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"]
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]:
+        """
+        Gradients of the distances, shape (n, 3) [-].
+        """
+
+class Tube(Shape):
+    """
+    A tube about an axis of quadratic Bezier curves.
+    """
+    def __init__(
+        self,
+        ends: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+        middles: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"],
+        radius: typing.SupportsFloat | typing.SupportsIndex,
+        wall: typing.SupportsFloat | typing.SupportsIndex,
+    ) -> None: ...
+
+class DistanceField(Shape):
+    """
+    A signed distance as a cubic spline on a grid.
+    """
+    def __init__(
+        self,
+        coefficients: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        points: typing.Annotated[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(3)"],
+        origin: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
+        spacing: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
+    ) -> None: ...
+
 class ObstacleDescription:
     """
     Something solid that does not move.
@@ -435,6 +479,7 @@ class ObstacleDescription:
     kind: str
     name: str
     def __init__(self) -> None: ...
+    def set_shape(self, arg0: Shape) -> None: ...
     @property
     def other(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...
     @other.setter

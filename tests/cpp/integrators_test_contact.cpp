@@ -7,6 +7,7 @@
 #include <array>
 
 #include "derivative_check.hpp"
+#include "geometry/tube.hpp"
 #include "integrators/dynamics.hpp"
 #include "states.hpp"
 
@@ -77,6 +78,10 @@ std::vector<Named> touching_scenes() {
   obstacle("plane", {ObstacleKind::plane, Vector3::Zero(), Vector3(0.1, 0.2, 1).normalized(), 0, ""}, false);
   obstacle("sphere", {ObstacleKind::capsule, Vector3(0.1, 0, -0.4), Vector3(0.1, 0, -0.4), 0.4, ""}, false);
   obstacle("capsule", {ObstacleKind::capsule, Vector3(0.1, -1, -0.4), Vector3(0.3, 1, -0.3), 0.4, ""}, false);
+  ObstacleDescription tube{ObstacleKind::shape, Vector3::Zero(), Vector3::Zero(), 0, ""};
+  tube.shape = std::make_shared<Tube>(std::vector<Vec3d>{{-0.8, 0.05, 3.01}, {0.8, -0.05, 3.19}},
+                                      std::vector<Vec3d>{{0.0, 0.1, 3.1}}, 3.0, 0.05);
+  obstacle("tube", tube, false);
   obstacle("plane in a plane", {ObstacleKind::plane, Vector3::Zero(), Vector3(0.1, 0, 1).normalized(), 0, ""}, true);
   obstacle("sphere in a plane", {ObstacleKind::capsule, Vector3(0.1, 0, -0.4), Vector3(0.1, 0, -0.4), 0.4, ""}, true);
   return scenes;

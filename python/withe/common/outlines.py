@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -67,17 +67,23 @@ class ObstacleOutline(ShortRepr):
     Attributes
     ----------
     name : str
-    kind : {"plane", "capsule"}
+    kind : {"plane", "capsule", "shape"}
         Kind of the obstacle; a sphere is a capsule of length zero.
     axis : ndarray of shape (3,)
         Normal of a plane; or the vector from the start of a capsule's axis to its end [m].
     radius : float [m]
+    vertices : ndarray of shape (vertices, 3) [m]
+        Of a shape, from its position; otherwise none.
+    triangles : ndarray of int, shape (triangles, 3)
+        Rows of `vertices`, counter-clockwise from outside.
     """
 
     name: str
     kind: str
     axis: FloatArray
     radius: float
+    vertices: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+    triangles: npt.NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int64))
 
 
 @dataclass(frozen=True, repr=False)

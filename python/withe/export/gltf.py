@@ -199,6 +199,10 @@ def _add_obstacle(
         normals = np.tile(obstacle.axis / np.linalg.norm(obstacle.axis), (4, 1))
         triangles = np.array([[0, 1, 2], [0, 2, 3]])
         material = document.material(obstacle.name, rgb(PLANE_COLOR), two_sided=True)
+    elif obstacle.kind == "shape":
+        points, normals = shaded(obstacle)
+        triangles = np.arange(len(points)).reshape(-1, 3)
+        material = document.material(obstacle.name, rgb(SOLID_COLOR), two_sided=True)
     else:
         grid = scenery.surface(obstacle, origin)
         first, second = scenery.ends(obstacle, origin)

@@ -115,23 +115,28 @@ def _add_rod(stage: Any, path: str, record: Frames, rod: RodOutline, codes: list
 
 def _add_body(stage: Any, path: str, record: Frames, body: BodyOutline, codes: list[float], color: FloatArray) -> None:
     """Add a body as a mesh that moves and turns."""
-    geometry, vectors = require("pxr.UsdGeom", "export"), require("pxr.Gf", "export")
-    arrays = require("pxr.Vt", "export")
-    shape = geometry.Mesh.Define(stage, path)
+    vectors = require("pxr.Gf", "export")
+    shape = _define_mesh(stage, path, body)
     shape.GetPrim().SetCustomDataByKey("body", body.name)
-    shape.CreatePointsAttr(arrays.Vec3fArray.FromNumpy(body.vertices.astype(np.float32)))
-    shape.CreateFaceVertexCountsAttr(arrays.IntArray.FromNumpy(np.full(len(body.triangles), 3, np.int32)))
-    shape.CreateFaceVertexIndicesAttr(arrays.IntArray.FromNumpy(body.triangles.ravel().astype(np.int32)))
-    shape.CreateNormalsAttr(arrays.Vec3fArray.FromNumpy(shaded(body)[1].astype(np.float32)))
-    shape.SetNormalsInterpolation(geometry.Tokens.faceVarying)
-    shape.CreateSubdivisionSchemeAttr(geometry.Tokens.none)
-    shape.CreateExtentAttr(geometry.PointBased.ComputeExtent(shape.GetPointsAttr().Get()))
     _paint(shape, color)
     move, turn = shape.AddTranslateOp(), shape.AddOrientOp()
     turns = quaternions(np.swapaxes(record.body_rotation(body), -1, -2)[:, None])[:, 0]
     for code, place, (x, y, z, w) in zip(codes, record.body_position(body).tolist(), turns.tolist(), strict=True):
         move.Set(vectors.Vec3d(*place), code)
         turn.Set(vectors.Quatf(w, x, y, z), code)
+
+
+def _define_mesh(stage: Any, path: str, part: BodyOutline | ObstacleOutline) -> Any:
+    geometry, arrays = require("pxr.UsdGeom", "export"), require("pxr.Vt", "export")
+    shape = geometry.Mesh.Define(stage, path)
+    shape.CreatePointsAttr(arrays.Vec3fArray.FromNumpy(part.vertices.astype(np.float32)))
+    shape.CreateFaceVertexCountsAttr(arrays.IntArray.FromNumpy(np.full(len(part.triangles), 3, np.int32)))
+    shape.CreateFaceVertexIndicesAttr(arrays.IntArray.FromNumpy(part.triangles.ravel().astype(np.int32)))
+    shape.CreateNormalsAttr(arrays.Vec3fArray.FromNumpy(shaded(part)[1].astype(np.float32)))
+    shape.SetNormalsInterpolation(geometry.Tokens.faceVarying)
+    shape.CreateSubdivisionSchemeAttr(geometry.Tokens.none)
+    shape.CreateExtentAttr(geometry.PointBased.ComputeExtent(shape.GetPointsAttr().Get()))
+    return shape
 
 
 def _add_obstacle(
@@ -151,6 +156,10 @@ def _add_obstacle(
         shape.CreateSubdivisionSchemeAttr(geometry.Tokens.none)
         shape.CreateExtentAttr(geometry.PointBased.ComputeExtent(shape.GetPointsAttr().Get()))
         _paint(shape, rgb(PLANE_COLOR))
+    elif obstacle.kind == "shape":
+        shape = _define_mesh(stage, path, obstacle)
+        shape.CreateDoubleSidedAttr(True)
+        _paint(shape, rgb(SOLID_COLOR))
     else:
         length = float(np.linalg.norm(obstacle.axis))
         shape = (geometry.Capsule if length > 0.0 else geometry.Sphere).Define(stage, path)
@@ -168,7 +177,7 @@ def _add_obstacle(
     for code, place in zip([None] if still else codes, places.tolist(), strict=False):
         at = () if code is None else (code,)
         move.Set(vectors.Vec3d(*place), *at)
-    if obstacle.kind != "plane" and np.any(obstacle.axis):
+    if obstacle.kind == "capsule" and np.any(obstacle.axis):
         turn = vectors.Rotation(vectors.Vec3d(0.0, 0.0, 1.0), vectors.Vec3d(*obstacle.axis.tolist())).GetQuat()
         shape.AddOrientOp().Set(vectors.Quatf(turn))
 

@@ -13,7 +13,8 @@ from withe.common.union_find import UnionFind
 from withe.parts.body_surfaces import core_of, make_surface
 from withe.parts.directory import Directory
 from withe.parts.kinds import BodyPart, JoinPart, SupportPart
-from withe.solids import Solid
+from withe.solids import Field, Tube
+from withe.solids.bodies import Solid
 
 __all__ = ["describe_bodies", "make_body"]
 
@@ -39,6 +40,8 @@ def make_body(
     owner = f"body {name!r}"
     origin = validation.vector(position, f"position of {owner}")
     axes = np.eye(3) if rotation is None else validation.rotation_matrix(rotation, f"rotation of {owner}")
+    if isinstance(solid, Tube | Field):
+        raise ValueError(f"solid of {owner} is a {type(solid).__name__.lower()}, an obstacle: use add_obstacle")
     if solid is not None and (isinstance(solid, type) or not all(hasattr(solid, word) for word in _OF_SOLIDS)):
         raise ValueError(
             f"solid of {owner} must be one of withe.solids, for example withe.solids.Box((0.1, 0.1, 0.1)), got "

@@ -14,7 +14,7 @@ from withe.common.polyhedra import Core, inside, polyhedron_core, trails
 from withe.common.union_find import UnionFind
 from withe.parts.directory import Directory
 from withe.parts.kinds import BodyFace, BodyPart, BodySurface, JoinPart, ObstaclePart, RodPart
-from withe.solids import Box, Capsule, Hull, Mesh, Sphere
+from withe.solids import Box, Capsule, Hull, Mesh, Sphere, Tube
 
 __all__ = ["check_surfaces", "core_of", "describe_surfaces", "make_surface", "place_surfaces", "surfaces_of"]
 
@@ -142,18 +142,24 @@ def check_surfaces(directory: Directory) -> None:
     Raises
     ------
     ValueError
-        A sphere or capsule as an obstacle beside a body with faces, or a rod or body inside of such a body.
+        Obstacles other than planes beside a body with faces, a rod or body inside of such a body, or a rod that is
+        drawn inside of a tube that is no wider.
     """
     surfaces = [(body, body.surface) for body in surfaces_of(directory) if body.surface is not None]
     with_faces = [(body, surface.core) for body, surface in surfaces if surface.faces]
     for body, _ in with_faces:
         for obstacle in directory.all(ObstaclePart):
-            if obstacle.kind == "capsule" and not _ignored(directory, body.name, obstacle.name):
-                raise ValueError(
-                    f"obstacle {obstacle.name!r} does not touch the faces of body {body.name!r}. Add it as a body, by "
-                    "add_body and a sphere or capsule of withe.solids, and hold it with clamp; or leave the pair out "
-                    "with ignore_contact"
+            if obstacle.kind != "plane" and not _ignored(directory, body.name, obstacle.name):
+                instead = (
+                    "Add it as a body, by add_body and a sphere or capsule of withe.solids, and hold it with clamp; or"
+                    if obstacle.kind == "capsule"
+                    else "Use a sphere or capsule as body, or"
                 )
+                raise ValueError(
+                    f"obstacle {obstacle.name!r} does not touch the faces of body {body.name!r}. {instead} leave the "
+                    "pair out with ignore_contact"
+                )
+    _check_channels(directory)
     if not directory.contact.rods:
         return
     lines = [(rod.name, rod.index, "rod", rod.points[None]) for rod in directory.all(RodPart)]
@@ -171,6 +177,26 @@ def check_surfaces(directory: Directory) -> None:
                 raise ValueError(
                     f"{what} {name!r} is drawn inside of body {body.name!r}: draw them apart, join them, or leave the "
                     "pair out with ignore_contact"
+                )
+
+
+def _check_channels(directory: Directory) -> None:
+    """Refuse rods in tubes that they do not fit."""
+    for obstacle in directory.all(ObstaclePart):
+        tube = obstacle.solid
+        if not isinstance(tube, Tube):
+            continue
+        axis = obstacle.point + tube.axis()
+        for rod in directory.all(RodPart):
+            radius = float(rod.contact_radius.max())
+            if radius < tube.radius or _ignored(directory, rod.name, obstacle.name):
+                continue
+            gaps = np.linalg.norm(rod.points[:, None] - axis[None], axis=2).min(axis=1)
+            if (gaps < 0.9 * tube.radius).any():
+                raise ValueError(
+                    f"rod {rod.name!r} with a contact radius of {radius:g} m is drawn inside of {obstacle.name!r}, "
+                    f"whose inner radius is {tube.radius:g} m: give a thinner rod or a wider tube, or leave the pair "
+                    "out with ignore_contact"
                 )
 
 

@@ -21,6 +21,8 @@ from withe.parts.kinds import (
     PairSettings,
     RodPart,
 )
+from withe.parts.obstacle_shapes import shape_of
+from withe.solids import Field, Tube
 
 __all__ = [
     "CONTACT",
@@ -58,19 +60,20 @@ CONTACT = np.dtype(
 
 def make_obstacle(
     name: str,
-    kind: Literal["plane", "capsule"],
+    kind: Literal["plane", "capsule", "shape"],
     point: FloatArray,
     other: FloatArray,
     radius: float,
     friction: Friction,
     restitution: float,
     rolling_friction: float,
+    solid: Tube | Field | None = None,
 ) -> ObstaclePart:
     """An obstacle, checked; not yet in the directory."""
     both = coefficients(friction, f"friction of {name!r}")
     restitution = validation.share(restitution, f"restitution of {name!r}")
     rolling = validation.non_negative(rolling_friction, f"rolling_friction of {name!r}")
-    return ObstaclePart(name, kind, point, other, radius, both, restitution, rolling)
+    return ObstaclePart(name, kind, point, other, radius, both, restitution, rolling, solid)
 
 
 def pair_of(directory: Directory, a: Toucher, b: Toucher) -> tuple[str, str]:
@@ -200,6 +203,8 @@ def _describe_obstacle(part: ObstaclePart) -> _core.ObstacleDescription:
     obstacle.other = part.other
     obstacle.radius = part.radius
     obstacle.name = part.name
+    if part.solid is not None:
+        obstacle.set_shape(shape_of(part.solid))
     return obstacle
 
 

@@ -247,7 +247,7 @@ class CustomForce(Handle):
 
 @dataclass(frozen=True)
 class Obstacle(Handle):
-    """Handle of an obstacle, made by `Scene.add_floor`, `add_plane`, `add_sphere` and `add_capsule`."""
+    """Handle of an obstacle, made by `Scene.add_floor`, `add_plane`, `add_sphere`, `add_capsule`, `add_obstacle`."""
 
 
 @dataclass(frozen=True)

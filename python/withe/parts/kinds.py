@@ -14,6 +14,7 @@ from withe.common.polyhedra import Core
 from withe.parts.friction import Coefficients
 from withe.parts.parameters import RodParameters
 from withe.parts.sections import SectionProperties
+from withe.solids import Field, Tube
 
 __all__ = [
     "LOAD_KINDS",
@@ -278,13 +279,14 @@ class Actuation:
 class ObstaclePart(Part):
     """Something solid, as it was drawn."""
 
-    kind: Literal["plane", "capsule"]
-    point: FloatArray  # on the plane; start of the axis (3,) [m]
+    kind: Literal["plane", "capsule", "shape"]
+    point: FloatArray  # on the plane; start of the axis; where the origin of a shape is (3,) [m]
     other: FloatArray  # normal; end of the axis (3,)
     radius: float
     friction: Coefficients
     restitution: float
     rolling_friction: float
+    solid: Tube | Field | None = None  # of a shape
 
     @property
     def axis(self) -> FloatArray | None:

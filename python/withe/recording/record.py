@@ -33,6 +33,7 @@ __all__ = ["ROD_READOUTS", "EnergyHistory", "Record", "RunGradient"]
 FloatArray = npt.NDArray[np.float64]
 
 _FILE_VERSION = 1
+_SURFACE = ("vertices", "triangles")
 _UNITS = {
     "times": "s",
     "positions": "m",
@@ -198,12 +199,14 @@ class Record:
             if f"rod_{index}_spins" in self._arrays:  # missing in old files
                 self._array(f"rod_{index}_spins", (frames, rod.edges))
         for index, body in enumerate(self._bodies):
-            _check_body(body)
+            _check_surface(body)
             self._array(f"body_{index}_position", (frames, 3))
             self._array(f"body_{index}_rotation", (frames, 3, 3))
         for index, obstacle in enumerate(self._obstacles):
             self._array(f"obstacle_{index}_place", (frames, 3))
-            if obstacle.kind not in ("plane", "capsule") or obstacle.axis.shape != (3,) or not obstacle.radius >= 0.0:
+            if obstacle.kind == "shape":
+                _check_surface(obstacle)
+            elif obstacle.kind not in ("plane", "capsule") or obstacle.axis.shape != (3,) or not obstacle.radius >= 0.0:
                 raise ValueError(f"obstacle {obstacle.name!r} must be a plane or a capsule with an axis and a radius")
         for spring in self._springs:
             if len(spring.rows) != 2 or not all(0 <= row < nodes for row in spring.rows):
@@ -605,6 +608,10 @@ class Record:
         for index, body in enumerate(self._bodies):
             arrays[f"body_{index}_vertices"] = body.vertices
             arrays[f"body_{index}_triangles"] = body.triangles
+        for index, obstacle in enumerate(self._obstacles):
+            if obstacle.kind == "shape":
+                arrays[f"obstacle_{index}_vertices"] = obstacle.vertices
+                arrays[f"obstacle_{index}_triangles"] = obstacle.triangles
         return io.save_arrays(path, "record", _FILE_VERSION, header, arrays)
 
     @classmethod
@@ -644,8 +651,14 @@ class Record:
                 for index, rod in enumerate(header["rods"])
             ]
             obstacles = [
-                ObstacleOutline(str(o["name"]), str(o["kind"]), np.array(o["axis"], float), float(o["radius"]))
-                for o in header.get("obstacles", [])  # missing in old files
+                ObstacleOutline(
+                    str(each["name"]),
+                    str(each["kind"]),
+                    np.array(each["axis"], float),
+                    float(each["radius"]),
+                    *(arrays.pop(f"obstacle_{i}_{part}") for part in _SURFACE if each["kind"] == "shape"),
+                )
+                for i, each in enumerate(header.get("obstacles", []))  # missing in old files
             ]
             springs = [
                 SpringOutline(str(each["name"]), (int(each["rows"][0]), int(each["rows"][1])))
@@ -880,12 +893,12 @@ class Record:
         return view.picture(self, path, **options)
 
 
-def _check_body(body: BodyOutline) -> None:
+def _check_surface(part: BodyOutline | ObstacleOutline) -> None:
     """Refuse a surface whose arrays do not fit together."""
-    vertices, triangles = body.vertices, body.triangles
+    vertices, triangles = part.vertices, part.triangles
     if vertices.ndim != 2 or vertices.shape[1] != 3 or vertices.dtype != np.float64 or not len(vertices):
-        raise ValueError(f"vertices of body {body.name!r} must be floats of shape (n, 3)")
+        raise ValueError(f"vertices of {part.name!r} must be floats of shape (n, 3)")
     if triangles.ndim != 2 or triangles.shape[1] != 3 or triangles.dtype.kind != "i" or not len(triangles):
-        raise ValueError(f"triangles of body {body.name!r} must be integers of shape (n, 3)")
+        raise ValueError(f"triangles of {part.name!r} must be integers of shape (n, 3)")
     if triangles.min() < 0 or triangles.max() >= len(vertices):
-        raise ValueError(f"triangles of body {body.name!r} must lie in 0..{len(vertices) - 1}")
+        raise ValueError(f"triangles of {part.name!r} must lie in 0..{len(vertices) - 1}")

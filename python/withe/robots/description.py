@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from withe.solids import Solid
+from withe.solids.bodies import Solid
 
 __all__ = ["RobotBody", "RobotDescription", "RobotJoint"]
 

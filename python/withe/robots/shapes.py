@@ -10,7 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common.polyhedra import convex_hull
-from withe.solids import Box, Capsule, Cylinder, Mesh, Solid, Sphere
+from withe.solids import Box, Capsule, Cylinder, Mesh, Sphere
+from withe.solids.bodies import Solid
 
 __all__ = ["Shape", "closed_surface", "combined", "drawn_geoms", "solid_of", "welded"]
 

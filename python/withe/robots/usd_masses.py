@@ -12,7 +12,8 @@ import numpy.typing as npt
 from withe.common.extras import require
 from withe.robots.composing import MassProperties, united
 from withe.robots.shapes import Shape, closed_surface, welded
-from withe.solids import Box, Capsule, Cylinder, Mesh, Solid, Sphere
+from withe.solids import Box, Capsule, Cylinder, Mesh, Sphere
+from withe.solids.bodies import Solid
 
 __all__ = ["StageUnits", "UsdShape", "mass_properties", "shape_of", "world_axes"]
 

@@ -20,6 +20,7 @@ from withe.parts.directory import Directory
 from withe.parts.friction import Coefficients, Friction
 from withe.parts.handles import Body, Obstacle, Rod
 from withe.parts.kinds import ContactModel, FrictionModel, Overlap, PairSettings
+from withe.solids import Capsule, Field, Sphere, Tube
 
 __all__ = ["Contacts"]
 
@@ -247,6 +248,72 @@ class Contacts:
                 make_obstacle(name, "capsule", first, last, radius, friction, restitution, rolling_friction)
             ),
         )
+
+    def add_obstacle(
+        self,
+        solid: Tube | Field,
+        *,
+        position: npt.ArrayLike = (0.0, 0.0, 0.0),
+        friction: Friction = 0.0,
+        restitution: float = 1.0,
+        rolling_friction: float = 0.0,
+        name: str | None = None,
+    ) -> Obstacle:
+        """Add a tube, or a solid that is given by its signed distance.
+
+        Contact acts on the smooth curve through the nodes of a rod. `Simulation.move` moves the obstacle without
+        turning it.
+
+        Parameters
+        ----------
+        solid : Tube or Field of withe.solids
+            Shape of the obstacle.
+        position : array_like of shape (3,) [m]
+            Where the origin of the solid's axes is.
+        friction : float, pair or tuple of three of float [-], or callable
+            Friction coefficient, as in `add_floor`.
+        restitution, rolling_friction : float [-]
+            Coefficients of restitution and rolling friction, as in `add_floor`.
+        name : str
+            Name of the obstacle. By default "tube 1", "field 1", ...
+
+        Returns
+        -------
+        Obstacle
+
+        Raises
+        ------
+        ValueError
+            Another solid, a position that is not finite, negative friction, or a restitution outside of 0 to 1. The
+            simulation refuses a rod that is drawn inside of a tube that is no wider, and a body with faces.
+
+        See Also
+        --------
+        add_sphere, add_capsule : Add round obstacles.
+        Scene.add_body : Add a box, hull or mesh, which `clamp` holds.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import withe
+        >>> scene = withe.Scene(gravity=(0,0,0))
+        >>> vessel = scene.add_obstacle(withe.solids.Tube([(0, 0, 0), (0.2, 0, 0)], radius=0.002), friction=0.1)
+        >>> steel = withe.Material(youngs_modulus=2e11, density=7800)
+        >>> wire = scene.add_rod(start=(0.01, 0, 0), end=(0.19, 0, 0), nodes=61, radius=2e-4, material=steel)
+        """
+        if not isinstance(solid, Tube | Field):
+            instead = (
+                "use add_sphere or add_capsule"
+                if isinstance(solid, Sphere | Capsule)
+                else "use add_body, and hold the body with clamp"
+            )
+            raise ValueError(
+                f"solid of an obstacle must be a Tube or Field of withe.solids, got {solid!r:.80}: {instead}"
+            )
+        name = self._directory.new_name(name, type(solid).__name__.lower())
+        where = validation.vector(position, f"position of {name!r}")
+        part = make_obstacle(name, "shape", where, where, 0.0, friction, restitution, rolling_friction, solid)
+        return cast(Obstacle, self._directory.add(part))
 
     def enable_contact(
         self,

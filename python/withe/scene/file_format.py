@@ -47,7 +47,14 @@ SECTIONS = (
     Section("drags", {"": "add_drag"}),
     Section("fluid", {"": "add_fluid"}, is_single=True),
     Section(
-        "obstacles", {"floor": "add_floor", "plane": "add_plane", "sphere": "add_sphere", "capsule": "add_capsule"}
+        "obstacles",
+        {
+            "floor": "add_floor",
+            "plane": "add_plane",
+            "sphere": "add_sphere",
+            "capsule": "add_capsule",
+            "solid": "add_obstacle",
+        },
     ),
     Section("contact", {"": "enable_contact"}, is_single=True),
     Section("contact_groups", {"": "set_contact_group"}),

@@ -39,7 +39,7 @@ from withe.simulation.logs import log_build
 from withe.simulation.parameters import Settable
 from withe.simulation.schedule import check_actuations
 from withe.simulation.simulation import Simulation
-from withe.solids import Solid
+from withe.solids.bodies import Solid
 
 __all__ = ["Scene"]
 

@@ -57,6 +57,8 @@ def move_obstacle(
         raise ValueError(f"position, roll or path of {name!r} must be given")
     place = None if position is None else validation.vector(position, f"position of {name!r}")
     turn, axis = None, part.axis
+    if part.kind == "shape" and (roll is not None or tangent is not None):
+        raise ValueError(f"{name!r} can be moved, but not turned: leave out roll and tangent")
     if (tangent is None) != (axis is not None or roll is None):
         what = "a sphere needs a tangent as the axis of its roll"
         raise ValueError(
@@ -97,6 +99,7 @@ def obstacle_outlines(directory: Directory) -> list[ObstacleOutline]:
             part.kind,
             np.array(part.other if part.kind == "plane" else part.other - part.point, float),
             float(part.radius),
+            *(part.solid.surface() if part.solid is not None else ()),
         )
         for part in directory.all(ObstaclePart)
     ]

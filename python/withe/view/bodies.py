@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe.common.frames import Frames
-from withe.common.outlines import BodyOutline
+from withe.common.outlines import BodyOutline, ObstacleOutline
 from withe.view.colors import body_color
 
 __all__ = ["BodySurfaces", "Pose", "body_points", "mixed_rotations", "shaded", "silhouette", "triangle_normals"]
@@ -49,12 +49,14 @@ class BodySurfaces:
         self._casting: list[tuple[FloatArray, FloatArray]] = []
 
     def _add(self, body: BodyOutline, color: FloatArray) -> Any:
-        points, normals = shaded(body)
-        faces = np.column_stack([np.full(len(body.triangles), 3), np.arange(len(points)).reshape(-1, 3)])
-        mesh = self._pyvista.PolyData(points, faces.ravel())
-        mesh.point_data.active_normals = normals
         actor = self._plotter.add_mesh(
-            mesh, color=color, ambient=0.3, diffuse=0.8, specular=0.2, specular_power=20.0, reset_camera=False
+            shaded_mesh(self._pyvista, body),
+            color=color,
+            ambient=0.3,
+            diffuse=0.8,
+            specular=0.2,
+            specular_power=20.0,
+            reset_camera=False,
         )
         actor.prop.interpolation = "Phong"
         return actor
@@ -118,7 +120,16 @@ def triangle_normals(points: FloatArray, triangles: npt.NDArray[np.int64]) -> Fl
     return np.asarray(np.cross(b - a, c - a))
 
 
-def shaded(body: BodyOutline) -> tuple[FloatArray, FloatArray]:
+def shaded_mesh(pyvista: Any, body: BodyOutline | ObstacleOutline) -> Any:
+    """Return a surface with its normals, as PyVista has it."""
+    points, normals = shaded(body)
+    faces = np.column_stack([np.full(len(body.triangles), 3), np.arange(len(points)).reshape(-1, 3)])
+    mesh = pyvista.PolyData(points, faces.ravel())
+    mesh.point_data.active_normals = normals
+    return mesh
+
+
+def shaded(body: BodyOutline | ObstacleOutline) -> tuple[FloatArray, FloatArray]:
     """Return the corners of all triangles and their normals: smooth surfaces between sharp edges.
 
     Returns

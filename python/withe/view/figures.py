@@ -136,7 +136,9 @@ def _plot_shapes(figure: Any, place: Any, record: Frames, count: int, colors: st
         still = bool(np.all(places == places[0]))
         for place, time in zip(places[: 1 if still else None], times[frames], strict=False):
             ink = colors.grey if still else scale.to_rgba(time)
-            if three:
+            if obstacle.kind == "shape":
+                _draw_body(axes, obstacle, place + obstacle.vertices, None if three else shown, factor, ink, colors)
+            elif three:
                 _draw_solid(axes, obstacle, place, np.concatenate([nodes, *around]), factor, ink, colors)
             else:
                 _draw_section(axes, obstacle, place, nodes, shown, factor, ink, colors)
@@ -157,7 +159,7 @@ def _points(record: Frames) -> FloatArray:
 
 def _draw_body(
     axes: Any,
-    body: BodyOutline,
+    body: BodyOutline | ObstacleOutline,
     points: FloatArray,
     shown: list[int] | None,
     factor: float,
@@ -166,7 +168,8 @@ def _draw_body(
 ) -> None:
     """A body by its silhouette along the coordinate that is not shown; in three dimensions by its shaded surface."""
     if shown is None:
-        axes.plot_trisurf(*(points * factor).T, triangles=body.triangles, color=ink, alpha=0.6, linewidth=0.0)
+        alpha = 0.6 if isinstance(body, BodyOutline) else 0.15
+        axes.plot_trisurf(*(points * factor).T, triangles=body.triangles, color=ink, alpha=alpha, linewidth=0.0)
         return
     towards = np.cross(np.eye(3)[shown[0]], np.eye(3)[shown[1]])
     flat = points[:, shown] * factor

@@ -17,7 +17,7 @@ from withe.common.extras import require
 from withe.common.frames import Frames
 from withe.common.outlines import ObstacleOutline
 from withe.view import scenery
-from withe.view.bodies import BodySurfaces, Pose, body_points, mixed_rotations
+from withe.view.bodies import BodySurfaces, Pose, body_points, mixed_rotations, shaded_mesh
 from withe.view.colors import (
     BARS,
     SOLID_COLOR,
@@ -47,6 +47,7 @@ _DIRECTIONS = {
 _VIEW_ANGLE = 24.0  # [degrees]
 _BAR_SHARE = 0.16
 _INK = "#33383d"
+_SEE_THROUGH = 0.35  # opacity of tubes and fields
 _PATCH = 1.3  # half a side of the patch of a slope or wall, over the diagonal of the scene
 _MAX_FINE_PIXELS = 38_000_000  # rendered pixels of a picture with smooth edges: about 0.5 GB
 _MAX_SAMPLES = 6000  # rings of all rods together
@@ -441,6 +442,13 @@ class Stage:
                 normal = obstacle.axis / np.linalg.norm(obstacle.axis)
                 actor = add_faded_patch(pyvista, self.plotter, scenery.patch(obstacle, places[0], nodes, _PATCH))
                 self._obstacles.append((actor, index, normal, None))
+                continue
+            if obstacle.kind == "shape":  # rods are seen through it, and it casts no shadow
+                mesh = shaded_mesh(pyvista, obstacle)
+                mesh.points += places[0]
+                actor = self.plotter.add_mesh(mesh, color=SOLID_COLOR, opacity=_SEE_THROUGH, reset_camera=False)
+                actor.prop.interpolation = "Phong"
+                self._obstacles.append((actor, index, None, None))
                 continue
             start, end = scenery.ends(obstacle, places[0])
             length = float(np.linalg.norm(end - start))

@@ -77,6 +77,9 @@ def framing(outline: ObstacleOutline, places: FloatArray, points: FloatArray) ->
         rows = points[:: max(1, len(points) // 2000)]
         above = (rows - middle) @ normal
         return np.concatenate([rows + np.outer(height - above, normal) for height in (near.min(), near.max())])
+    if outline.kind == "shape":
+        found = (places[[0, -1], None] + outline.vertices).reshape(-1, 3)
+        return np.asarray(found[np.linalg.norm(found - middle, axis=1) <= _FAR * diagonal])
     sides = outline.radius * np.concatenate([np.eye(3), -np.eye(3)])
     size = float(np.linalg.norm(outline.axis)) + 2.0 * outline.radius
     found = (places[:, None] + ends(outline, np.zeros(3))).reshape(-1, 3)

@@ -1,12 +1,4 @@
-"""Solids: mass, centre and inertia of rigid bodies from their shapes.
-
-Give one of them to `Scene.add_body`, with a density:
-
->>> import withe
->>> plug = withe.solids.Box((0.04, 0.02, 0.02))
->>> round(plug.volume * 1e6, 6)
-16.0
-"""
+"""Solids of rigid bodies: mass, centre and inertia from their shapes."""
 
 from __future__ import annotations
 
