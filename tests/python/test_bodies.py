@@ -72,6 +72,33 @@ def test_copies_pickles_and_snapshots_go_on_with_the_same_bits(integrator, tmp_p
     assert bits(simulation) == bits(fresh)
 
 
+def test_snapshots_keep_what_holds_bodies(tmp_path):
+    """A clamp, a hinge of the world beside the centre of mass, and a moving pin; without any rod."""
+    scene = withe.Scene()
+    held, door, ball = (
+        scene.add_body(Box((0.1, 0.1, 0.1)), density=500, position=(x, 0, 0), name=name)
+        for x, name in ((0.0, "held"), (1.0, "door"), (2.0, "ball"))
+    )
+    scene.clamp(held)
+    scene.clamp(door, at=(1.0, 0.05, 0.0), spin=(1, 0, 0), name="hinge")
+    grip = scene.pin(ball, at=(2.0, 0.0, 0.05))
+    simulation = scene.build(time_step=2e-3)
+
+    def state():
+        places = [simulation.position(door), simulation.position(ball), simulation.reaction("hinge").force]
+        return np.concatenate([*places, simulation.rotation(door).ravel()]).tobytes()
+
+    simulation.move(grip, position=(2.1, 0, 0.05), over=0.1)
+    simulation.step(20)
+    snapshot = simulation.snapshot()
+    simulation.step(20)
+    end = state()
+    for again in (snapshot, withe.Snapshot.load(snapshot.save(tmp_path / "s.npz"))):
+        simulation.restore(again)
+        simulation.step(20)
+        assert state() == end
+
+
 def test_a_scene_with_bodies_is_copied_and_pickled():
     scene = robot()
     end = scene.build(time_step=2e-3)

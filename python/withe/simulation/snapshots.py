@@ -15,7 +15,7 @@ from withe import io
 from withe.common import validation
 from withe.parts.directory import Directory
 from withe.parts.hands import pose_of
-from withe.parts.kinds import LOAD_KINDS, SUPPORT_KINDS, Grasp, LoadPart, ObstaclePart, SupportPart
+from withe.parts.kinds import LOAD_KINDS, SUPPORT_KINDS, BodyPart, Grasp, LoadPart, ObstaclePart, Pass, SupportPart
 from withe.parts.parameters import RodParameters
 from withe.simulation.motion import POSE_WORDS, PathTable, Turn, Waypoints
 from withe.simulation.session import Session
@@ -128,9 +128,11 @@ class Snapshot:
             arrays |= {f"rod_{index}_{word}": values for word, values in rod.arrays().items()}
         supports = []
         for number, (name, (index, part)) in enumerate(settings.supports.items()):
-            entry = {"name": name, "index": index, "kind": part.kind, "node": part.node_name}
+            entry = {"name": name, "index": index, "kind": part.kind, "node": part.node_name, "point": part.node[1]}
             supports.append(entry | (_written(part.grasp) if part.grasp is not None else {}))
             arrays[f"support_{number}_free"] = part.free
+            if part.axis is not None:
+                arrays[f"support_{number}_axis"] = part.axis
             for half in POSE_WORDS:
                 moving = settings.paths.get((name, half))
                 if isinstance(moving, Turn | Waypoints):
@@ -189,7 +191,7 @@ class Snapshot:
     @classmethod
     def _from_file(cls, header: dict[str, Any], arrays: dict[str, npt.NDArray[Any]]) -> Snapshot:
         rods = []
-        for index in range(validation.integer(header["rods"], "rods", 1, 10_000_000)):
+        for index in range(validation.integer(header["rods"], "rods", 0, 10_000_000)):
             mine = {
                 name.removeprefix(f"rod_{index}_"): values
                 for name, values in arrays.items()
@@ -202,9 +204,13 @@ class Snapshot:
             name, kind = str(entry["name"]), validation.choice(entry["kind"], "kind", SUPPORT_KINDS)
             free = validation.number_array(arrays[f"support_{number}_free"], "free", (3, 3))
             index = validation.integer(entry["index"], "index", 0, 10_000_000)
-            # The restoring simulation finds the node by the name.
+            # The restoring simulation finds the node of a rod by the name.
+            point = validation.integer(entry.get("point", 0), "point", 0, 10_000_000)
             grasp = _read(entry) if kind == "hand" else None
-            supports[name] = index, SupportPart(name, kind, (-1, -1), str(entry["node"]), free, grasp)  # type: ignore[arg-type]
+            axis = arrays.get(f"support_{number}_axis")
+            if axis is not None:
+                axis = validation.unit_vector(axis, "axis")
+            supports[name] = index, SupportPart(name, kind, (-1, point), str(entry["node"]), free, grasp, axis)  # type: ignore[arg-type]
             for half in POSE_WORDS:
                 if (way := _read_path(arrays, f"support_{number}_{half}_")) is not None:
                     paths[name, half] = way
@@ -282,6 +288,16 @@ def adopt(session: Session, settings: Settings) -> None:
     find_friction_fields(session)
 
 
+def _held_node(part: SupportPart, directory: Directory) -> Pass:
+    """Return the node of a rod or the point of a body that a support of a snapshot holds."""
+    if not directory.is_body(part.node_name):
+        return directory.node(part.node_name, f"node held by {part.name!r}")[0]
+    body = directory.find(part.node_name, BodyPart, f"body held by {part.name!r}")
+    if part.node[1] >= len(directory.layout.body_points[body.index]):
+        raise ValueError(f"snapshot belongs to another scene: body {body.name!r} has no point that {part.name!r} holds")
+    return -1 - body.index, part.node[1]
+
+
 def _matched(snapshot: Snapshot, mine: Settings, directory: Directory, scene: Directory) -> Settings:
     """Return the settings of a snapshot, completed by the simulation that restores it.
 
@@ -308,8 +324,7 @@ def _matched(snapshot: Snapshot, mine: Settings, directory: Directory, scene: Di
     ):
         raise ValueError("snapshot belongs to another scene")
     for name, (index, part) in settings.supports.items():
-        node, _ = directory.node(part.node_name, f"node held by {name!r}")
-        settings.supports[name] = index, replace(part, node=node)
+        settings.supports[name] = index, replace(part, node=_held_node(part, directory))
         known = scene.parts.get(name)
         if known is not None and not isinstance(known, SupportPart):
             raise ValueError(f"snapshot belongs to another scene: {name!r} is not a support of this scene")
