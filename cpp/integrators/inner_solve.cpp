@@ -30,6 +30,10 @@ constexpr int kMaxTrialIterations = 12;
 // Slip tolerance of friction, over that of the scene, in the steps of the continuation.
 constexpr std::array<double, 7> kRegularisation{8192.0, 4096.0, 512.0, 64.0, 16.0, 4.0, 1.0};
 
+// Steps in which supports get to their places, and what may be left of the way, over the size of the scene.
+constexpr int kMaxSupportSteps = 8;
+constexpr double kReached = 1e-14;
+
 /// Axial forces at the start of a step [N]. The mixed method starts from these. Axial forces of an extrapolated motion
 /// would be meaningless, because its edges turn along straight lines and so stretch.
 void start_axial_force(const Equations& equations, const VectorX& q, VectorX& out) {
@@ -42,6 +46,37 @@ void start_axial_force(const Equations& equations, const VectorX& q, VectorX& ou
     for (int i = 0; i < model.dimension; ++i) square += (q(b + i) - q(a + i)) * (q(b + i) - q(a + i));
     out(e) = axial_force(std::sqrt(square), model.edge_length(e), k.stretch_stiffness(e), k.stretch_natural(e));
   }
+}
+
+/// The way of supports that is left from q + `move` to their places in a part of the step; returns the greatest.
+double way_of_supports(const Equations& equations, double part, const State& state, const VectorX& move,
+                       VectorX& held) {
+  const Assembler& assembler = equations.assembler();
+  held.setZero(state.q.size());
+  assembler.add_held_change(state.q, equations.problem().prescribed->held.q, part, held);
+  assembler.add_held_part(move, -1.0, held);
+  return held.lpNorm<Eigen::Infinity>();
+}
+
+/// Adds the step of Newton's method from q + `move` in which supports move by `held`. Where that is farther than rods
+/// can deform, they respond to a small share of it. Without a factorisation rods do not respond.
+void step_with_supports(Equations& equations, const Newton& newton, const State& state, const VectorX& held,
+                        StepWorkspace& work) {
+  StepData& e = work.newton.data;
+  work.newton.matrix.owner = nullptr;
+  work.z = state.q + work.move;
+  equations.evaluate(work.z, true, nullptr, e);
+  VectorX& force = work.change;
+  force = -e.residual;
+  if (equations.assembler().solver().factorize().status == FactorStatus::ok) {
+    const double little = 1e-6 * newton.norms().cap(held);
+    work.z += little * held;
+    equations.evaluate(work.z, false, nullptr, e);
+    force = force - (e.residual + force) / little;
+    equations.assembler().solver().solve({force.data(), static_cast<std::size_t>(force.size())});
+    if (force.allFinite()) work.move += force;
+  }
+  work.move += held;
 }
 
 /// Adds the displacement of supports within a part of the step to `work.move`. If supports move farther than the edges
@@ -60,23 +95,10 @@ void follow_supports(Equations& equations, const Newton& newton, const Options& 
   held.setZero(state.q.size());
   assembler.add_held_change(state.q, target, part, held);
   const double bearable = newton.norms().cap(held);
-  if (bearable < 1.0) {
-    StepData& e = work.newton.data;
-    work.newton.matrix.owner = nullptr;
-    work.z = state.q + work.move;
-    equations.evaluate(work.z, true, nullptr, e);
-    VectorX& force = work.change;
-    force = -e.residual;
-    if (equations.assembler().solver().factorize().status == FactorStatus::ok) {
-      const double little = 1e-6 * bearable;
-      work.z += little * held;
-      equations.evaluate(work.z, false, nullptr, e);
-      force = force - (e.residual + force) / little;
-      equations.assembler().solver().solve({force.data(), static_cast<std::size_t>(force.size())});
-      if (force.allFinite()) work.move += force;
-    }
-  }
-  work.move += held;
+  if (bearable < 1.0)
+    step_with_supports(equations, newton, state, held, work);
+  else
+    work.move += held;
 }
 
 class InnerSolve {
@@ -130,8 +152,8 @@ class InnerSolve {
 
   bool uses(Heuristic h) const { return options_.heuristics.uses(h); }
 
-  /// Writes the guess to `work.z`.
-  void guess_at(Guess guess) {
+  /// Writes the guess to `work.z`; returns false if surfaces are in the way of supports.
+  bool guess_at(Guess guess) {
     if (guess == Guess::accelerated) {
       predictor_.predict({state_.time + 0.5 * plan_.dt, h_, plan_.dt, plan_.slot}, state_.v, work_.mean);
       work_.move = h_ * work_.mean;
@@ -142,12 +164,33 @@ class InnerSolve {
     work_.move *= newton_.norms().cap(work_.move);
     if (equations_.contact() && uses(Heuristic::hold_sticking)) equations_.contact()->hold_sticking(state_, work_.move);
     follow_supports(equations_, newton_, options_, h_ / plan_.dt, state_, work_);
-    work_.z = state_.q + work_.move * equations_.allowed(state_.q, work_.move);
+    const double allowed = equations_.allowed(state_.q, work_.move);
+    const bool reached = allowed == 1.0 || reach_supports(allowed);
+    if (allowed == 1.0) work_.z = state_.q + work_.move;
     start_axial_force(equations_, state_.q, work_.newton.axial_force);
+    return reached;
+  }
+
+  /// Moves supports to their places from where surfaces have stopped a guess, by steps of Newton's method.
+  bool reach_supports(double allowed) {
+    work_.move *= allowed;
+    const double part = h_ / plan_.dt;
+    VectorX &left = work_.difference, &before = work_.mean;
+    for (int k = 0; k <= kMaxSupportSteps; ++k) {
+      const double way = way_of_supports(equations_, part, state_, work_.move, left);
+      work_.z = state_.q + work_.move;
+      if (way <= kReached * equations_.model().length_scale) return true;
+      before = work_.move;
+      step_with_supports(equations_, newton_, state_, left, work_);
+      work_.z = state_.q + before;
+      work_.change = work_.move - before;
+      work_.move = before + equations_.allowed(work_.z, work_.change) * work_.change;
+    }
+    return false;
   }
 
   NewtonResult solve_from(Guess guess) {
-    guess_at(guess);
+    if (!guess_at(guess)) return {};
     if (guess == Guess::continuation) return solve_by_continuation();
     // The extrapolated motion need not lead to the solution, and is rejected early.
     const bool trial = guess == Guess::accelerated && uses(Heuristic::few_iterations);
