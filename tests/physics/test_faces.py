@@ -271,3 +271,85 @@ def test_a_rope_slides_over_the_edge_of_a_table() -> None:
         x, z = simulation.positions(rope)[:, [0, 2]].T
         assert not ((x < -1e-4) & (z < 0.0039) & (z > -0.1)).any()
     assert z.max() < -0.05
+
+
+def over_an_edge(angle: float, friction: float) -> float:
+    """Ratio of tensions over the smallest that the elastica needs to be pulled over a sharp edge, by its own angle."""
+    from scipy.optimize import fsolve
+
+    def missing(unknown: Array) -> list[float]:
+        ratio, first = unknown
+        second = angle - first
+        slip = ratio * np.cos(second) - np.cos(first)
+        normal = np.sin(first) + ratio * np.sin(second)
+        return [1.0 - np.cos(first) - ratio * (1.0 - np.cos(second)), slip - friction * normal]
+
+    return float(fsolve(missing, [np.exp(friction * angle), 0.5 * angle], xtol=1e-12)[0])
+
+
+@pytest.mark.parametrize(("angle", "friction"), [(90.0, 0.3), (90.0, 0.1), (80.0, 0.3)])
+@pytest.mark.case("bodies", "Rod drawn over a sharp edge: tension ratio", source="elastica; not exp(mu phi)")
+def test_a_rod_is_drawn_over_the_edge_of_a_box(angle: float, friction: float) -> None:
+    """Bending shares the angle between both sides, so the ratio is below that of a capstan."""
+    half, radius, size, speed = 0.5 * np.radians(angle), 1e-4, 2e-3, 0.02
+    scene = withe.Scene(gravity=(0, 0, 0))
+    scene.enable_contact(friction=friction, slip_tolerance=1e-4)
+    block = scene.add_body(withe.solids.Box((0.4, 0.1, 0.4)), density=1000, position=(-0.2, 0, -0.2), friction=friction)
+    scene.clamp(block)
+    up, along = np.array([1, 0, 1]) / np.sqrt(2.0), np.array([1, 0, -1]) / np.sqrt(2.0)
+    ways = [side * along * np.cos(half) - up * np.sin(half) for side in (-1, 1)]
+    turn = np.linspace(-half, half, 1 + round(2.0 * half * 0.02 / size))[:, None]
+    bow = 0.02 * (np.sin(turn) * along + (np.cos(turn) - 1.0) * up)
+    reach = size * np.arange(1, 81)[:, None]
+    points = np.concatenate([bow[0] + reach[::-1] * ways[0], bow, bow[-1] + reach * ways[1]]) + (radius + 1e-6) * up
+    stiffness = withe.Stiffness(stretch=1e4, bend=(4e-4, 4e-4), twist=4e-4)
+    rod = scene.add_rod(points=points, radius=radius, stiffness=stiffness, line_density=5e-3, natural="straight")
+    scene.ignore_contact(rod, rod)
+    scene.add_force(rod.start, ways[0])
+    scene.add_drag(0.02)
+    grip = scene.pin(rod.end)
+    simulation = scene.build(integrator="backward_euler", time_step=1e-3)
+    simulation.move(grip, position=points[-1] + 2.0 * speed * ways[1], over=2.0)
+    simulation.step(500)
+    pulls = []
+    for _ in range(300):
+        simulation.step()
+        pulls.append(simulation.reaction(grip).force)
+    pull = np.mean(pulls, axis=0)
+    tension = float(np.linalg.norm(pull))
+    error = tension / over_an_edge(float(np.arccos(-(pull @ ways[0]) / tension)), friction) - 1.0
+    measured(error)
+    assert abs(error) < 5e-3
+
+
+@pytest.mark.parametrize("kind", ["floor", "table"])
+@pytest.mark.case("bodies", "Ball on a turntable, after a second", source="circle of 7/2 turns")
+def test_a_ball_on_a_turntable_rolls_in_a_circle(kind: str) -> None:
+    """Slower than the table by 2/7."""
+    rate, radius, friction = 2.0 * np.pi, 0.02, 0.8
+    scene = withe.Scene()
+    scene.enable_contact(friction=friction)
+    if kind == "floor":
+        turning: withe.Obstacle | withe.Support = scene.add_floor(friction=friction)
+    else:
+        body = scene.add_body(
+            withe.solids.Box((0.4, 0.4, 0.05)), density=1000, position=(0, 0, -0.025), friction=friction
+        )
+        turning = scene.clamp(body)
+    ball = scene.add_body(withe.solids.Sphere(radius), density=1000, position=(0.1, 0, radius), friction=friction)
+    simulation = scene.build(time_step=2e-3)
+    velocity, surface = np.array([0.0, 0.05, 0.0]), np.array([0.0, 0.1 * rate, 0.0])
+    simulation.set_velocity(ball, velocity, angular=np.cross([0, 0, 1], velocity - surface) / radius)
+    if kind == "floor":
+        simulation.move(turning, roll=rate, over=1.0)
+    else:
+
+        def path(time: float) -> tuple[tuple[float, ...], Array]:
+            c, s = np.cos(rate * time), np.sin(rate * time)
+            return (0.0, 0.0, -0.025), np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+
+        simulation.move(turning, path=path)
+    simulation.run(1.0, progress=False)
+    error = np.linalg.norm(simulation.position(ball)[:2] - (0.06595021, 0.02715380)) / 0.02785212
+    measured(error)
+    assert error < 5e-3
