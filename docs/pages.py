@@ -112,7 +112,7 @@ EXAMPLES = {
         "follow_by_gradients",
         "learn_follow",
     ),
-    "Contact and friction": ("friction", "spider", "gripper", "flagella", "flagella_contact"),
+    "Contact and friction": ("friction", "spider", "gripper", "flagella", "flagella_contact", "guidewire"),
     "Rigid bodies": ("hanging_plug", "satellite", "crane_load", "lift_ball", "soft_legs"),
     "Hands, cables and sheets": (
         "carry_rope",

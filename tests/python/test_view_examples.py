@@ -37,6 +37,7 @@ EXAMPLES = {
         12.0,
     ),
     "gripper.py": (["--duration", "4"], r"friction 0.5: \d+ contacts, nearest ([-+.\d]+) radii", -0.05, 0.1),
+    "guidewire.py": ([], r"dissipated, \+?(-?[.\d]+) % unaccounted", -1.0, 1.0),
     "hanging_plug.py": (["--duration", "10"], r"theory within ([.\d]+) %", 0.0, 0.1),
     "helix.py": ([], r"(\d+) um from the public code", 0.0, 100.0),
     "knot.py": (["--nodes", "201", "--points", "2", "--speed", "8e-3"], r" 200 .*?([-+.\d]+)%", -6.0, 6.0),
