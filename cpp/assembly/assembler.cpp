@@ -403,13 +403,17 @@ void Assembler::fold_carried(const std::vector<Carrying>& carrying) {
   for (std::size_t i = folds_.size(); i-- > 0;) {  // parts of parts first
     const Fold& fold = folds_[i];
     const int d = fold.own, u = fold.body, n = fold.others, all = d + u;
-    const Small G = carrying[i].follow.topLeftCorner(d, u), H = carrying[i].act.topLeftCorner(u, d);
+    const auto G = carrying[i].follow.topLeftCorner(d, u);
+    const auto H = carrying[i].act.topLeftCorner(u, d);
     for (int j = 0; j < n; ++j) {
       double row[3] = {0, 0, 0}, column[3] = {0, 0, 0};
+      bool any = false;
       for (int a = 0; a < d; ++a) {
         row[a] = taken(values, fold.rows[at(a * n + j)]);
         if (!symmetric) column[a] = taken(values, fold.columns[at(j * d + a)]);
+        any = any || row[a] != 0.0 || column[a] != 0.0;
       }
+      if (!any) continue;  // most parts of a surface touch nothing
       for (int b = 0; b < u; ++b) {
         double down = 0.0, right = 0.0;
         for (int a = 0; a < d; ++a) {
@@ -424,11 +428,12 @@ void Assembler::fold_carried(const std::vector<Carrying>& carrying) {
       return values[static_cast<std::size_t>(fold.square[at(r * all + c)])];
     };
     Small dd(d, d), du(d, u), ud(u, d);
+    bool any = false;
     for (int a = 0; a < d; ++a) {
-      for (int b = 0; b < d; ++b) dd(a, b) = square(a, b);
+      for (int b = 0; b < d; ++b) any = (dd(a, b) = square(a, b)) != 0.0 || any;
       for (int b = 0; b < u; ++b) {
-        du(a, b) = square(a, d + b);
-        ud(b, a) = square(d + b, a);
+        any = (du(a, b) = square(a, d + b)) != 0.0 || any;
+        any = (ud(b, a) = square(d + b, a)) != 0.0 || any;
       }
     }
     const double size = dd.norm() / std::sqrt(d);
@@ -437,7 +442,11 @@ void Assembler::fold_carried(const std::vector<Carrying>& carrying) {
       values[static_cast<std::size_t>(fold.diagonal[at(a)])] = square(a, a);
       for (int b = 0; b < u; ++b) square(a, d + b) = square(d + b, a) = 0.0;
     }
-    const Small uu = H * du + ud * G + H * dd * G + carrying[i].slope.topLeftCorner(u, u);
+    Small uu = carrying[i].slope.topLeftCorner(u, u);
+    if (any) {
+      const Small right = dd * G;
+      uu = H * du + ud * G + H * right + uu;
+    }
     for (int a = 0; a < u; ++a)
       for (int b = 0; b < (symmetric ? a + 1 : u); ++b) square(d + a, d + b) += uu(a, b);
   }
