@@ -113,7 +113,7 @@ EXAMPLES = {
         "learn_follow",
     ),
     "Contact and friction": ("friction", "spider", "gripper", "flagella", "flagella_contact", "guidewire"),
-    "Rigid bodies": ("hanging_plug", "satellite", "crane_load", "lift_ball", "soft_legs"),
+    "Rigid bodies": ("hanging_plug", "satellite", "crane_load", "lift_ball", "pinch_box", "soft_legs"),
     "Hands, cables and sheets": (
         "carry_rope",
         "pull_rope",

@@ -382,6 +382,19 @@ void fold_rows(const StepProblem& problem, const VectorX& z, VectorX& rows, Vect
        });
 }
 
+void fold_bounds(const StepProblem& problem, VectorX& bounds) {
+  const std::vector<CarriedPart>& carried = problem.model.carried;
+  for (std::size_t i = carried.size(); i-- > 0;) {
+    const CarriedPart& part = carried[i];
+    with_kind(problem, part, [&]<class Kind>(const Kind& kind) {
+      double size[Kind::kOwn], bound[Kind::kBody];
+      for (int k = 0; k < Kind::kOwn; ++k) size[k] = bounds[part.own_dof + k];
+      kind.bound(size, bound);
+      for (int b = 0; b < Kind::kBody; ++b) bounds[part.body_dofs[at(b)]] += bound[b];
+    });
+  }
+}
+
 void expand_step(const StepProblem& problem, const VectorX& z, VectorX& step) {
   for (const CarriedPart& part : problem.model.carried)
     with_kind(problem, part, [&]<class Kind>(const Kind& kind) {

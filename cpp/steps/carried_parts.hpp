@@ -35,6 +35,9 @@ void fold_rows(const StepProblem& problem, const VectorX& z, VectorX& rows, Vect
 void fold_rows(const StepProblem& problem, const VectorX& z, VectorX& rows, VectorX& magnitude,
                std::vector<Carrying>& carrying);
 
+/// Adds bounds of the rows of carried parts to those of their bodies.
+void fold_bounds(const StepProblem& problem, VectorX& bounds);
+
 /// Sets the displacements of carried parts in a step from z by those of their bodies.
 void expand_step(const StepProblem& problem, const VectorX& z, VectorX& step);
 

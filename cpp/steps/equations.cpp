@@ -161,6 +161,7 @@ void Equations::finish(StepData& data) const {
     data.magnitude = data.row_magnitude.head(n);
     data.floor = data.rounding.rows + data.rounding.relative * data.magnitude;
     for (const std::unique_ptr<Term>& term : terms_.all) term->add_rounding(problem_, data);
+    if (!model().carried.empty()) fold_bounds(problem_, data.floor);
   }
   data.residual = data.full_residual;
   assembler_.project(data.residual);

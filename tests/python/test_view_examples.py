@@ -44,6 +44,7 @@ EXAMPLES = {
     "knot_limit.py": (["--points", "4"], r"at epsilon = 0: pull ([.\d]+) of the limit", 0.97, 1.03),
     "lift_ball.py": ([], r"forces equal weights within ([.\d]+) %", 0.0, 0.05),
     "overhand.py": (["--knots", "1", "--speed", "8e-3"], r" 200 .* ([.\d]+)\n", 0.75, 0.92),
+    "pinch_box.py": ([], r"1\.50 of the least force.* ([.\d]+) mm above", 59.9, 60.1),
     "plectoneme.py": (["--forces", ".01", "--turns", "2"], r"moment at most ([.\d]+)% off", 0.0, 3.0),
     "ring_buckling.py": (["--nodes", "40"], r"\(([-+.\d]+) %\)", -3.0, 3.0),
     "place_cable.py": (["--nodes", "110", "--letters", "U"], r"U, exact: passes (\d+) of 14 posts", 14.0, 14.0),
