@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "solvers/pattern_lookup.hpp"
+#include "solvers/supernodes.hpp"
 
 namespace withe {
 
@@ -22,16 +23,20 @@ struct KluSolver::Klu {
   }
 };
 
-KluSolver::KluSolver(const SparsityPattern& pattern) : pattern_(pattern), klu_(std::make_unique<Klu>()) {
+KluSolver::KluSolver(const SparsityPattern& pattern) : KluSolver(pattern, find_supernodes(pattern).order) {}
+
+KluSolver::KluSolver(const SparsityPattern& pattern, const std::vector<int>& order)
+    : pattern_(pattern), order_(order), klu_(std::make_unique<Klu>()) {
   klu_defaults(&klu_->common);
   // A structurally symmetric matrix with a full diagonal has no block triangular form worth the search, and
   // the search could move the diagonal away.
   klu_->common.btf = 0;
-  klu_->symbolic = klu_analyze(pattern.size, pattern_.column_starts.data(), pattern_.row_indices.data(), &klu_->common);
+  klu_->symbolic = klu_analyze_given(pattern_.size, pattern_.column_starts.data(), pattern_.row_indices.data(),
+                                     order_.data(), order_.data(), &klu_->common);
   if (!klu_->symbolic) throw std::bad_alloc();
 }
 
-KluSolver::KluSolver(const KluSolver& other) : KluSolver(other.pattern_) {
+KluSolver::KluSolver(const KluSolver& other) : KluSolver(other.pattern_, other.order_) {
   if (other.factorized()) factorize(other.values_);
 }
 

@@ -28,7 +28,10 @@ class KluSolver {
 
  private:
   struct Klu;
+  KluSolver(const SparsityPattern& pattern, const std::vector<int>& order);
+
   SparsityPattern pattern_;
+  std::vector<int> order_;  ///< that of the fronts: new -> old
   std::vector<double> values_;
   std::unique_ptr<Klu> klu_;
 };

@@ -1,5 +1,5 @@
 #pragma once
-/// Sparse solver without pivoting: P A P^T = L D W^T, W = L where A is symmetric; approximate minimum degree ordering.
+/// Sparse solver without pivoting: P A P^T = L D W^T, W = L where A is symmetric; the order is that of find_supernodes.
 
 #include <memory>
 

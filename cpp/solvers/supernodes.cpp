@@ -1,8 +1,10 @@
 #include "solvers/supernodes.hpp"
 
-#include <Eigen/OrderingMethods>
-#include <Eigen/SparseCore>
 #include <algorithm>
+#include <utility>
+
+#include "solvers/dissection.hpp"
+#include "solvers/minimum_degree.hpp"
 
 namespace withe {
 namespace {
@@ -10,16 +12,9 @@ namespace {
 // Wider supernodes are divided, so that the columns that update a column stay in the cache.
 constexpr int kMostColumns = 48;
 
-/// New order of the unknowns that keeps L sparse: order[new] = old.
-std::vector<int> minimum_degree_order(const SparsityPattern& pattern) {
-  const std::vector<double> ones(pattern.row_indices.size(), 1.0);
-  const Eigen::Map<const Eigen::SparseMatrix<double>> matrix(
-      pattern.size, pattern.size, static_cast<Eigen::Index>(pattern.row_indices.size()), pattern.column_starts.data(),
-      pattern.row_indices.data(), ones.data());
-  Eigen::AMDOrdering<int>::PermutationType order;
-  Eigen::AMDOrdering<int>()(Eigen::SparseMatrix<double>(matrix), order);
-  return {order.indices().begin(), order.indices().end()};
-}
+// Operations per unknown above which dissection is tried too. It takes as long as ten factorisations of this cost, and
+// an order serves for a hundred.
+constexpr double kWorthDissecting = 5e3;
 
 std::vector<int> inverse(const std::vector<int>& order) {
   std::vector<int> place(order.size());
@@ -88,6 +83,25 @@ std::vector<int> column_counts(const SparsityPattern& pattern, const std::vector
   }
   return counts;
 }
+
+/// An order of elimination, and what it leads to.
+struct Elimination {
+  std::vector<int> order, parent, counts;
+
+  /// Takes an order, and sorts it so that subtrees are together, which changes nothing of L.
+  Elimination(const SparsityPattern& pattern, const std::vector<int>& given) {
+    for (int k : postorder(elimination_tree(pattern, given))) order.push_back(given[k]);
+    parent = elimination_tree(pattern, order);
+    counts = column_counts(pattern, order, parent);
+  }
+
+  /// Additions and multiplications for L of a symmetric matrix.
+  double operations() const {
+    double sum = 0.0;
+    for (int count : counts) sum += static_cast<double>(count) * count;
+    return sum;
+  }
+};
 
 /// Columns that become one supernode: number of stored entries, and number of entries that are not zero.
 struct Group {
@@ -165,15 +179,28 @@ void add_groups(const SparsityPattern& pattern, const std::vector<Group>& groups
 
 }  // namespace
 
+double Supernodes::entries() const {
+  double sum = 0.0;
+  for (int s = 0; s < count(); ++s) sum += columns(s) * (0.5 * (columns(s) + 1.0) + rest(s));
+  return sum;
+}
+
+double Supernodes::operations() const {
+  double sum = 0.0;
+  for (int s = 0; s < count(); ++s)
+    for (double length = rest(s) + 1.0; length <= rest(s) + columns(s); ++length) sum += length * length;
+  return sum;
+}
+
 Supernodes find_supernodes(const SparsityPattern& pattern) {
+  Elimination best(pattern, minimum_degree_order(pattern));
+  if (best.operations() > kWorthDissecting * pattern.size) {
+    Elimination other(pattern, dissection_order(pattern));
+    if (other.operations() < best.operations()) best = std::move(other);
+  }
   Supernodes result;
-  result.order = minimum_degree_order(pattern);
-  const std::vector<int> sorted = postorder(elimination_tree(pattern, result.order));
-  std::vector<int> order;
-  for (int k : sorted) order.push_back(result.order[k]);
-  result.order = std::move(order);
-  const std::vector<int> parent = elimination_tree(pattern, result.order);
-  add_groups(pattern, group_columns(parent, column_counts(pattern, result.order, parent)), result);
+  result.order = std::move(best.order);
+  add_groups(pattern, group_columns(best.parent, best.counts), result);
   return result;
 }
 

@@ -19,9 +19,13 @@ struct Supernodes {
   int count() const { return static_cast<int>(parent.size()); }
   int columns(int s) const { return column_starts[s + 1] - column_starts[s]; }
   int rest(int s) const { return row_starts[s + 1] - row_starts[s]; }
+  /// Numbers that L takes, its diagonal included, and additions and multiplications to find them; A is symmetric.
+  double entries() const;
+  double operations() const;
 };
 
-/// By approximate minimum degree; children come right before their parent.
+/// By approximate minimum degree, or by nested dissection where this is costly and dissection is not. Children come
+/// right before their parent.
 Supernodes find_supernodes(const SparsityPattern& pattern);
 
 }  // namespace withe

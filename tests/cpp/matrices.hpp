@@ -58,6 +58,40 @@ inline SparsityPattern rods_pattern(int size, Random& random) {
   return SparsityPattern::from_cliques(size, cliques);
 }
 
+enum class Crossings { pinned, rigid };
+
+/// A square net of cords, with a node at each crossing. Rigid crossings have a frame, to which each edge is bent; at
+/// pinned ones each cord is bent on its own.
+inline SparsityPattern net_pattern(int cords, Crossings crossings) {
+  const int nodes = cords * cords, own = crossings == Crossings::rigid ? 6 : 3;  // of a node: position, and frame
+  const auto node = [&](int cord, int place, bool across) {
+    return across ? place * cords + cord : cord * cords + place;
+  };
+  const auto angle = [&](int cord, int place, bool across) {
+    return own * nodes + (across * cords + cord) * (cords - 1) + place;
+  };
+  std::vector<std::vector<int>> cliques;
+  for (bool across : {false, true}) {
+    for (int cord = 0; cord < cords; ++cord) {
+      for (int place = 0; place + 1 < cords; ++place) {
+        const int first = node(cord, place, across), second = node(cord, place + 1, across);
+        std::vector<int> clique{angle(cord, place, across)};
+        for (int i = 0; i < 3; ++i) clique.insert(clique.end(), {own * first + i, own * second + i});
+        for (int i = 3; i < own; ++i) {  // two half stencils
+          cliques.push_back(clique);
+          for (int k = 3; k < own; ++k) cliques.back().push_back(own * (i == 3 ? first : second) + k);
+        }
+        if (own == 3 && place + 2 < cords) {
+          clique.push_back(angle(cord, place + 1, across));
+          for (int i = 0; i < 3; ++i) clique.push_back(own * node(cord, place + 2, across) + i);
+        }
+        cliques.push_back(clique);
+      }
+    }
+  }
+  return SparsityPattern::from_cliques(own * nodes + 2 * cords * (cords - 1), cliques);
+}
+
 enum class Nature { definite, indefinite };
 
 /// Random entries; off-diagonal ones at most 1, diagonal ones large enough for elimination without pivoting, or

@@ -65,6 +65,23 @@ TEST(UnsymmetricSolvers, PivotWhereOneDiagonalEntryIsZeroOrTinyWhateverTheUnits)
   }
 }
 
+TEST(UnsymmetricSolvers, SolveNetsWithAndWithoutPivotsOffTheDiagonal) {
+  Random random(10);
+  const SparsityPattern p = testing::net_pattern(12, testing::Crossings::pinned);
+  const auto solver = make_linear_solver(p, Symmetry::unsymmetric);
+  for (const auto& [nature, greatest_error] : {std::pair{Nature::definite, 1e-14}, {Nature::indefinite, 1e-12}}) {
+    const Matrix a = random_matrix(p, Symmetry::unsymmetric, nature, random);
+    fill(*solver, p, a);
+    ASSERT_EQ(solver->factorize().status, FactorStatus::ok);
+    const Vector b = random_vector(p.size, random);
+    Vector x = b, transposed = b;
+    solver->solve(view(x));
+    solver->solve_transposed(view(transposed));
+    EXPECT_LT(backward_error(a, x, b), greatest_error);
+    EXPECT_LT(backward_error(a.transpose(), transposed, b), greatest_error);
+  }
+}
+
 TEST(UnsymmetricSolvers, ForgetThatAnEarlierMatrixNeededPivots) {
   Random random(9);
   for (const SparsityPattern& p : {rods_pattern(180, random), band_pattern(180, 10)}) {
