@@ -1,6 +1,6 @@
 // Time to factorise the matrix of a Newton iteration, and to solve with it once, for rods that are joined or touch. The
 // benchmark compares our sparse LDL^T with Eigen's SimplicialLDLT and CHOLMOD. Each uses its own approximate minimum
-// degree ordering, computed beforehand. It also runs conjugate gradients on settled piles.
+// degree ordering, computed beforehand, CHOLMOD also METIS. It also runs conjugate gradients on settled piles.
 
 #include <benchmark/benchmark.h>
 
@@ -10,6 +10,7 @@
 #include <memory>
 #include <random>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -87,11 +88,24 @@ SceneDescription pile(int rods, int layers) {
   return builder.scene;
 }
 
+/// Square net of cords, which are pinned to each other at their nodes.
+SceneDescription net(int cords) {
+  testing::SceneBuilder builder;
+  for (int cord = 0; cord < cords; ++cord) {
+    for (bool across : {false, true}) {
+      MatrixX3 points(cords, 3);
+      for (int i = 0; i < cords; ++i) points.row(i) << (across ? cord : i), (across ? i : cord), 0;
+      builder.add_rod(0.05 * points, slender());
+    }
+  }
+  return builder.scene;
+}
+
 /// The matrix of a step that sets out from where a scene is drawn.
 struct Problem : BenchmarkProblem {
   VectorX force;
 
-  explicit Problem(const SceneDescription& scene) : BenchmarkProblem(scene, false) {
+  explicit Problem(const SceneDescription& scene) : BenchmarkProblem(scene, false, Integrator::backward_euler) {
     if (Contact* contact = equations.contact()) contact->initialise(state, parameters);
     equations.begin(state, parameters, StepRule::backward_euler, 1e-3);
     StepData e;
@@ -172,7 +186,7 @@ struct Settled : BenchmarkProblem {
   Eigen::SparseMatrix<double> matrix;    // all of it
   VectorX residual;
 
-  explicit Settled(const SceneDescription& scene) : BenchmarkProblem(scene, false) {
+  explicit Settled(const SceneDescription& scene) : BenchmarkProblem(scene, false, Integrator::backward_euler) {
     const Newton newton(model, options);
     Predictor predictor;
     StepWorkspace work;
@@ -285,14 +299,14 @@ void by_eigen(benchmark::State& run, const SceneDescription& scene) {
 }
 
 #ifdef WITHE_HAS_CHOLMOD
-void by_cholmod(benchmark::State& run, const SceneDescription& scene, int supernodal) {
+void by_cholmod(benchmark::State& run, const SceneDescription& scene, int supernodal, int ordering) {
   Problem p(scene);
   Eigen::SparseMatrix<double> matrix = lower_triangle(p);
   cholmod_common common;
   cholmod_start(&common);
   common.supernodal = supernodal;
   common.nmethods = 1;
-  common.method[0].ordering = CHOLMOD_AMD;
+  common.method[0].ordering = ordering;
   cholmod_sparse a{};
   a.nrow = a.ncol = static_cast<std::size_t>(matrix.rows());
   a.nzmax = static_cast<std::size_t>(matrix.nonZeros());
@@ -329,7 +343,9 @@ int main(int argc, char** argv) {
   using Scene = std::pair<std::string, withe::SceneDescription>;
   const std::vector<Scene> scenes{{"star of 8 limbs", withe::star()},
                                   {"tree of 16 limbs", withe::tree()},
-                                  {"pile of 60 rods", withe::pile(60, 20)}};
+                                  {"pile of 60 rods", withe::pile(60, 20)},
+                                  {"net of 20 x 20 cords", withe::net(20)},
+                                  {"net of 40 x 40 cords", withe::net(40)}};
   const auto add = [](const std::string& name, auto action) {
     benchmark::RegisterBenchmark(name.c_str(), action)->Unit(benchmark::kMicrosecond);
   };
@@ -337,10 +353,12 @@ int main(int argc, char** argv) {
     add(name + "/withe", [&scene](benchmark::State& run) { withe::by_withe(run, scene); });
     add(name + "/Eigen SimplicialLDLT", [&scene](benchmark::State& run) { withe::by_eigen(run, scene); });
 #ifdef WITHE_HAS_CHOLMOD
-    for (const auto& [how, supernodal] :
-         {std::pair{"simplicial", CHOLMOD_SIMPLICIAL}, {"supernodal", CHOLMOD_SUPERNODAL}})
-      add(name + "/CHOLMOD " + how,
-          [&scene, supernodal](benchmark::State& run) { withe::by_cholmod(run, scene, supernodal); });
+    for (const auto& [how, supernodal, ordering] : {std::tuple{"simplicial", CHOLMOD_SIMPLICIAL, CHOLMOD_AMD},
+                                                    {"supernodal", CHOLMOD_SUPERNODAL, CHOLMOD_AMD},
+                                                    {"supernodal, METIS", CHOLMOD_SUPERNODAL, CHOLMOD_METIS}})
+      add(name + "/CHOLMOD " + how, [&scene, supernodal, ordering](benchmark::State& run) {
+        withe::by_cholmod(run, scene, supernodal, ordering);
+      });
 #endif
   }
   for (int rods : {60, 250, 1000}) {

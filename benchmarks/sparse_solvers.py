@@ -1,4 +1,4 @@
-"""Our sparse LDL^T beside Eigen's and CHOLMOD on trees of rods and a pile: builds and runs sparse_solvers.cpp.
+"""Our sparse LDL^T beside Eigen's and CHOLMOD on trees of rods, a pile and nets: builds and runs sparse_solvers.cpp.
 
     python benchmarks/sparse_solvers.py [--quick] [--executable build/make/benchmarks/sparse_solvers]
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
+#include <cstdlib>
 #include <numeric>
 #include <queue>
 #include <utility>
@@ -102,10 +104,13 @@ class Division {
     for (int v = 0; v < graph.count(); ++v) weight(parts_[v]) += graph.weights[v];
   }
 
+  /// Weight of a part that is too heavy, then the weight of the separator: unequal parts must be worth a lighter one.
+  using Cost = std::pair<int, std::int64_t>;
+  Cost cost() const {
+    const int heavier = std::max(held_[0], held_[1]), difference = std::abs(held_[0] - held_[1]);
+    return {std::max(0, heavier - most()), std::int64_t{held_[2]} * (total_ + difference)};
+  }
   const std::vector<Part>& parts() const { return parts_; }
-  int separator() const { return held_[2]; }
-  int heavier() const { return std::max(held_[0], held_[1]); }
-  bool balanced() const { return heavier() <= most(); }
 
   /// Grows the left part from a vertex, until both are equal: always by the vertex that adds least to the separator.
   void grow(int seed) {
@@ -136,13 +141,10 @@ class Division {
     bool operator<(const Move& other) const { return gain != other.gain ? gain < other.gain : vertex > other.vertex; }
   };
   using Moves = std::priority_queue<Move>;
-  using Cost = std::pair<int, int>;
 
   static std::size_t index(Part part) { return static_cast<std::size_t>(part); }
   int& weight(Part part) { return held_[index(part)]; }
   int most() const { return static_cast<int>(kGreatestShare * total_); }
-  /// By weight out of balance, then by the separator.
-  Cost cost() const { return {std::max(0, heavier() - most()), separator()}; }
 
   /// Weight by which the separator becomes lighter if a vertex leaves it.
   int gain_of(int v, Part to) const {
@@ -251,16 +253,15 @@ class Division {
 std::vector<Part> grow_separator(const WeightedGraph& graph) {
   const std::vector<Part> start(graph.count(), Part::right);
   std::vector<Part> best;
-  std::pair<int, int> cost;
+  Division::Cost cost;
   const int seeds = std::min(kSeeds, graph.count());
   for (int k = 0; k < seeds; ++k) {
     Division division(graph, start);
     division.grow(k * (graph.count() - 1) / std::max(1, seeds - 1));
     division.refine();
-    const std::pair<int, int> own{division.balanced() ? 0 : division.heavier(), division.separator()};
-    if (!best.empty() && own >= cost) continue;
+    if (!best.empty() && division.cost() >= cost) continue;
     best = division.parts();
-    cost = own;
+    cost = division.cost();
   }
   return best;
 }
