@@ -109,7 +109,7 @@ Proximity Bodies::proximity(const ContactPair& pair, const VectorX& q, bool whol
     p.normal = o.other;
     if (o.kind == ObstacleKind::plane) return p;
     end_points(pair, q, x);
-    p.normal = distance_to(o, curve_point(*pair.piece.weights, x, p.curve.s)).normal;
+    p.normal = direction_of(o, distance_to(o, curve_point(*pair.piece.weights, x, p.curve.s)));
     return p;
   }
   end_points(pair, q, x);

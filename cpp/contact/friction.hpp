@@ -114,7 +114,7 @@ Vec3<Scalar> piece_obstacle_arm(const ContactPair& pair, const Obstacle& o, cons
   const Vec3<Scalar> c = curve_point(*pair.piece.weights, x, s);
   const PointDistance<Scalar> d = distance_to(o, c);
   return c - Vec3<Scalar>{Scalar(o.point.x), Scalar(o.point.y), Scalar(o.point.z)} -
-         (d.distance - Scalar(pair.radius_b)) * d.normal;
+         (d.distance - Scalar(pair.radius_b)) * direction_of(o, d);
 }
 
 /// tanh(c |S|) / |S| as a function of |S|^2.
@@ -276,7 +276,7 @@ void find_contact(const FrictionSetting& f, const SlipStart<Scalar>& start, cons
     const CurveDistance<Scalar> d = distance_of(f, x);
     c.s = d.s;
     c.distance = d.distance;
-    c.normal = distance_to(*f.obstacle, curve_point(*pair.piece.weights, x, c.s)).normal;
+    c.normal = direction_of(*f.obstacle, distance_to(*f.obstacle, curve_point(*pair.piece.weights, x, c.s)));
   } else if (pair.face != nullptr) {
     const FaceVectors<Scalar> v(x, pair.point);
     const double over = v.over(*pair.face);

@@ -54,7 +54,7 @@ void add_contact_slopes(const FrictionSetting& f, const SlippingSurfaces<double>
   curve.each_way(false, [&](int j) {
     d.s[j] = slopes.s[j];
     d.pressing[j] = -c.law.by_end * slopes.distance[j];
-    d.normal[j] = normal_change(*f.obstacle, point, curve.weight[j / 3] * kUnitVectors[j % 3] + d.s[j] * tangent);
+    d.normal[j] = direction_change(*f.obstacle, point, curve.weight[j / 3] * kUnitVectors[j % 3] + d.s[j] * tangent);
   });
 }
 
@@ -91,7 +91,8 @@ Vec3d obstacle_arm_slope(const FrictionSetting& f, const Curve& curve, const Vec
   const PointDistance<double> point = distance_to(*f.obstacle, curve_point(curve.w, x, curve.s));
   Vec3d moved = d.s[j] * curve_direction(curve.w, x, curve.s);
   if (j < kCurveAngle) moved += curve.weight[j / 3] * kUnitVectors[j % 3];
-  return moved - dot(point.normal, moved) * point.normal - (point.distance - f.pair->radius_b) * d.normal[j];
+  return moved - dot(point.normal, moved) * direction_of(*f.obstacle, point) -
+         (point.distance - f.pair->radius_b) * d.normal[j];
 }
 
 void add_force_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c, const Curve& curve,

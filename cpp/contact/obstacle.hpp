@@ -91,4 +91,21 @@ inline Vec3d normal_change(const Obstacle& o, const PointDistance<double>& p, co
   return (1.0 / std::max(p.distance, 1e-300)) * across;
 }
 
+/// Unit vector of the normal: the gradient of a field's spline is of length 1 about.
+template <class Scalar>
+Vec3<Scalar> direction_of(const Obstacle& o, const PointDistance<Scalar>& p) {
+  using std::sqrt;
+  if (o.kind != ObstacleKind::shape) return p.normal;
+  return (1.0 / sqrt(dot(p.normal, p.normal))) * p.normal;
+}
+
+/// Its change as the point moves by `change`.
+inline Vec3d direction_change(const Obstacle& o, const PointDistance<double>& p, const Vec3d& change) {
+  const Vec3d turned = normal_change(o, p, change);
+  if (o.kind != ObstacleKind::shape) return turned;
+  const double inverse = 1.0 / std::sqrt(dot(p.normal, p.normal));
+  const Vec3d direction = inverse * p.normal;
+  return inverse * (turned - dot(direction, turned) * direction);
+}
+
 }  // namespace withe

@@ -6,7 +6,10 @@ import pytest
 import withe
 from gradient_scenes import NODES, TIGHT, difference, move_with_directors
 
-CONTACTS = ("floor", "slope in a plane", "sphere", "capsule", "post", "crossing", "floor lying", "floor slowly")
+CONTACTS = (
+    *("floor", "slope in a plane", "sphere", "capsule", "post", "crossing", "floor lying", "floor slowly"),
+    *("tube", "field"),
+)
 FRICTIONS = ("none", "implicit", "lagged", "directed", "scaly", "rolling")
 INTEGRATORS = ("backward_euler", "implicit_midpoint", "energy_momentum")
 
@@ -45,6 +48,14 @@ class Touching:
         elif kind == "post":  # smaller than an edge, so that it touches straight ones
             ends = offset + np.array([(0.1, -0.1, -0.008), (0.14, 0.1, -0.004)])
             self.other = scene.add_capsule(*ends, 8e-3, **kept)
+        elif kind == "tube":
+            axis = [(-0.1, 0, 0.08), (0.15, 0, 0.085), (0.4, 0, 0.08)]
+            self.other = scene.add_obstacle(withe.solids.Tube(axis, radius=0.08), position=offset, **kept)
+        elif kind == "field":
+            waves = withe.solids.Field(
+                lambda p: p[:, 2] - 2e-3 * np.sin(30.0 * p[:, 0]), bounds=[(-0.2, -0.1, -0.05), (0.5, 0.1, 0.1)]
+            )
+            self.other = scene.add_obstacle(waves, position=offset, **kept)
         else:
             ends = {"start": (0.11, -0.1, -0.008), "end": (0.15, 0.1, -0.004)}
             rod = scene.add_rod(**ends, nodes=7, radius=1e-2, material=material)
