@@ -393,7 +393,8 @@ double taken(std::span<double> values, std::ptrdiff_t place) {
 }  // namespace
 
 /// With d its unknowns, u those of its body, dd = G du, and rows r_u += H r_d: K_uj += H K_dj, K_ju += K_jd G.
-void Assembler::fold_carried(const std::vector<Carrying>& carrying) {
+/// Most parts of a surface touch nothing: their rows and columns are zero.
+void Assembler::fold_carried(const CarryingOf& carrying_of) {
   const std::span<double> values = solver_->values();
   const bool symmetric = symmetry_ == Symmetry::symmetric;
   const auto add = [&](std::ptrdiff_t place, double value) {
@@ -403,8 +404,7 @@ void Assembler::fold_carried(const std::vector<Carrying>& carrying) {
   for (std::size_t i = folds_.size(); i-- > 0;) {  // parts of parts first
     const Fold& fold = folds_[i];
     const int d = fold.own, u = fold.body, n = fold.others, all = d + u;
-    const auto G = carrying[i].follow.topLeftCorner(d, u);
-    const auto H = carrying[i].act.topLeftCorner(u, d);
+    const Carrying* carrying = carrying_of(i, false);
     for (int j = 0; j < n; ++j) {
       double row[3] = {0, 0, 0}, column[3] = {0, 0, 0};
       bool any = false;
@@ -413,7 +413,10 @@ void Assembler::fold_carried(const std::vector<Carrying>& carrying) {
         if (!symmetric) column[a] = taken(values, fold.columns[at(j * d + a)]);
         any = any || row[a] != 0.0 || column[a] != 0.0;
       }
-      if (!any) continue;  // most parts of a surface touch nothing
+      if (!any) continue;
+      if (carrying == nullptr) carrying = carrying_of(i, true);
+      const auto& G = carrying->follow;
+      const auto& H = carrying->act;
       for (int b = 0; b < u; ++b) {
         double down = 0.0, right = 0.0;
         for (int a = 0; a < d; ++a) {
@@ -442,8 +445,12 @@ void Assembler::fold_carried(const std::vector<Carrying>& carrying) {
       values[static_cast<std::size_t>(fold.diagonal[at(a)])] = square(a, a);
       for (int b = 0; b < u; ++b) square(a, d + b) = square(d + b, a) = 0.0;
     }
-    Small uu = carrying[i].slope.topLeftCorner(u, u);
+    if (any && carrying == nullptr) carrying = carrying_of(i, true);
+    if (carrying == nullptr) continue;
+    Small uu = carrying->slope.topLeftCorner(u, u);
     if (any) {
+      const auto G = carrying->follow.topLeftCorner(d, u);
+      const auto H = carrying->act.topLeftCorner(u, d);
       const Small right = dd * G;
       uu = H * du + ud * G + H * right + uu;
     }

@@ -2,6 +2,7 @@
 /// Stencil -> matrix: the pattern of a model, and where each stencil's numbers go, found once.
 
 #include <algorithm>
+#include <functional>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -75,7 +76,10 @@ struct Carrying {
   Eigen::Matrix<double, 3, kMost> follow;     ///< of its unknowns by those of the body
   Eigen::Matrix<double, kMost, 3> act;        ///< of the rows of the body by the forces on the part
   Eigen::Matrix<double, kMost, kMost> slope;  ///< of these rows by the unknowns of the body, with these forces constant
+  bool known = false;
 };
+/// The derivatives of a part; null where they are neither known nor needed.
+using CarryingOf = std::function<const Carrying*(std::size_t part, bool needed)>;
 
 /// Ordinary stencils for the kernels of stencil_kernels.hpp, and the other stencils.
 struct RegularStencils {
@@ -138,7 +142,7 @@ class Assembler {
 
   /// Adds the rows and columns of parts that bodies carry, which lie beside the matrix, to those of their bodies. In
   /// the matrix they have a positive diagonal alone.
-  void fold_carried(const std::vector<Carrying>& carrying);
+  void fold_carried(const CarryingOf& carrying_of);
 
   /// Removes held unknowns: rows and columns are projected onto the free directions. Held directions get a positive
   /// diagonal, so that the pattern stays and held increments vanish.

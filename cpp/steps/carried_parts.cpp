@@ -1,5 +1,6 @@
 #include "steps/carried_parts.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -351,7 +352,9 @@ void fold(const StepProblem& problem, const VectorX& z, VectorX& rows, VectorX& 
         force[k] = rows[part.own_dof + k];
         size[k] = magnitude[part.own_dof + k];
       }
-      find(kind, i, body, force, acting);
+      const bool pressed = std::any_of(force, force + Kind::kOwn, [](double f) { return f != 0.0; });
+      std::fill(acting, acting + Kind::kBody, 0.0);
+      find(kind, i, body, force, pressed, acting);
       kind.bound(size, bound);
       for (int b = 0; b < Kind::kBody; ++b) {
         const int dof = part.body_dofs[at(b)];
@@ -368,8 +371,8 @@ void fold(const StepProblem& problem, const VectorX& z, VectorX& rows, VectorX& 
 
 void fold_rows(const StepProblem& problem, const VectorX& z, VectorX& rows, VectorX& magnitude) {
   fold(problem, z, rows, magnitude,
-       [&](const auto& kind, std::size_t, const auto& body, const auto& force, auto& acting) {
-         kind.act(body, force, acting);
+       [&](const auto& kind, std::size_t, const auto& body, const auto& force, bool pressed, auto& acting) {
+         if (pressed) kind.act(body, force, acting);
        });
 }
 
@@ -377,9 +380,21 @@ void fold_rows(const StepProblem& problem, const VectorX& z, VectorX& rows, Vect
                std::vector<Carrying>& carrying) {
   carrying.resize(problem.model.carried.size());
   fold(problem, z, rows, magnitude,
-       [&](const auto& kind, std::size_t i, const auto& body, const auto& force, auto& acting) {
-         find_carrying(kind, body, force, acting, carrying[i]);
+       [&](const auto& kind, std::size_t i, const auto& body, const auto& force, bool pressed, auto& acting) {
+         carrying[i].known = pressed;
+         if (pressed) find_carrying(kind, body, force, acting, carrying[i]);
        });
+}
+
+void find_carrying(const StepProblem& problem, const VectorX& z, std::size_t i, Carrying& out) {
+  const CarriedPart& part = problem.model.carried[i];
+  with_kind(problem, part, [&]<class Kind>(const Kind& kind) {
+    double body[Kind::kBody], acting[Kind::kBody];
+    const double force[Kind::kOwn] = {};
+    gather(part, z, body);
+    find_carrying(kind, body, force, acting, out);
+  });
+  out.known = true;
 }
 
 void fold_bounds(const StepProblem& problem, VectorX& bounds) {

@@ -31,9 +31,12 @@ void place_carried(const StepProblem& problem, VectorX& z);
 
 /// Adds the rows of carried parts to those of their bodies, and clears them.
 void fold_rows(const StepProblem& problem, const VectorX& z, VectorX& rows, VectorX& magnitude);
-/// The same, and sets the derivatives at z, one per carried part.
+/// The same, and sets the derivatives at z of parts on which forces act, one per carried part.
 void fold_rows(const StepProblem& problem, const VectorX& z, VectorX& rows, VectorX& magnitude,
                std::vector<Carrying>& carrying);
+
+/// Sets the derivatives at z of a part on which no forces act.
+void find_carrying(const StepProblem& problem, const VectorX& z, std::size_t i, Carrying& out);
 
 /// Adds bounds of the rows of carried parts to those of their bodies.
 void fold_bounds(const StepProblem& problem, VectorX& bounds);

@@ -2,6 +2,7 @@
 #include <utility>
 
 #include "gradients/state_vector.hpp"
+#include "steps/carried_parts.hpp"
 #include "steps/strain_parts.hpp"
 #include "world/implementation.hpp"
 
@@ -50,13 +51,16 @@ SparseMatrix matrix_of(const Model& model, const MassMatrix& mass) {
 }
 
 /// The basis of free motions, in which parts that bodies carry follow them.
-SparseMatrix with_carried(const Model& model, const std::vector<Carrying>& carrying, SparseMatrix basis) {
-  for (std::size_t i = 0; i < carrying.size(); ++i) {
+SparseMatrix with_carried(const StepProblem& problem, StepData& data, SparseMatrix basis) {
+  const Model& model = problem.model;
+  for (std::size_t i = 0; i < model.carried.size(); ++i) {
     const CarriedPart& part = model.carried[i];
+    Carrying& carrying = data.carrying[i];
+    if (!carrying.known) find_carrying(problem, data.z, i, carrying);
     Entries follow;
     for (int d = 0; d < part.own_size; ++d)
       for (std::size_t b = 0; b < part.body_dofs.size(); ++b)
-        follow.emplace_back(part.own_dof + d, part.body_dofs[b], carrying[i].follow(d, static_cast<Eigen::Index>(b)));
+        follow.emplace_back(part.own_dof + d, part.body_dofs[b], carrying.follow(d, static_cast<Eigen::Index>(b)));
     basis = (basis + assembled(model.dof_count, model.dof_count, follow) * basis).eval();
   }
   return basis;
@@ -74,7 +78,7 @@ Linearisation World::linearise() const {
   system.begin(self.state, self.parameters, StepRule::statics, 0.0, prescribed);
   StepData evaluation;
   system.evaluate(self.state.q, true, nullptr, evaluation);
-  const SparseMatrix free = free_basis(model), basis = with_carried(model, evaluation.carrying, free),
+  const SparseMatrix free = free_basis(model), basis = with_carried(system.problem(), evaluation, free),
                      back = basis.transpose();
   const StrainParts parts(system, self.state, evaluation.configuration);
   const VectorX imbalance = evaluation.residual;  // forces on carried nodes are among those of their bodies
