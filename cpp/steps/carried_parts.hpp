@@ -38,7 +38,7 @@ void fold_rows(const StepProblem& problem, const VectorX& z, VectorX& rows, Vect
 /// Sets the derivatives at z of a part on which no forces act.
 void find_carrying(const StepProblem& problem, const VectorX& z, std::size_t i, Carrying& out);
 
-/// Adds bounds of the rows of carried parts to those of their bodies.
+/// Adds bounds on the rounding errors of carried parts to those of their bodies.
 void fold_bounds(const StepProblem& problem, VectorX& bounds);
 
 /// Sets the displacements of carried parts in a step from z by those of their bodies.
