@@ -159,7 +159,7 @@ class Builder {
     if (joint.links.front().slides) return add_slide(joint, base);
     if (model_.planar()) return add_planar_links(joint, base);
     const int root = root_of(joint, base);
-    for (const RevoluteLink& link : joint.links) {
+    for (const JointLink& link : joint.links) {
       const bool swapped = base + link.child == root;
       const int turning = base + (swapped ? link.parent : link.child);
       Cluster& cluster = clusters_[at(turning)];
@@ -174,7 +174,7 @@ class Builder {
 
   /// The turning cluster of a slide: of two bodies that which the other one carries, else that of rods.
   void add_slide(const JointDescription& joint, int base) {
-    const RevoluteLink& link = joint.links.front();
+    const JointLink& link = joint.links.front();
     require(joint.links.size() == 1, "a sliding joint must be the only joint at its point");
     const int parent_body = joint.body_of(at(link.parent)), child_body = joint.body_of(at(link.child));
     require(parent_body >= 0 || child_body >= 0, "a sliding joint must slide on a body");
@@ -189,15 +189,15 @@ class Builder {
   /// In a plane, a hinge lies between two frames. A hinge about an axis in the plane cannot turn, so its clusters are
   /// merged first.
   void add_planar_links(const JointDescription& joint, int base) {
-    const auto along = [&](const RevoluteLink& link) { return link.axis.normalized().dot(model_.plane->normal); };
+    const auto along = [&](const JointLink& link) { return link.axis.normalized().dot(model_.plane->normal); };
     const auto now = [&](int cluster) {
       int out = base + cluster;
       while (clusters_[at(out)].merged_into >= 0) out = clusters_[at(out)].merged_into;
       return out;
     };
-    for (const RevoluteLink& link : joint.links)
+    for (const JointLink& link : joint.links)
       if (std::abs(along(link)) < 0.5) merge(now(link.parent), now(link.child));
-    for (const RevoluteLink& link : joint.links) {
+    for (const JointLink& link : joint.links) {
       const int parent = now(link.parent), child = now(link.child);
       links_.push_back({parent, child, along(link) < 0.0 ? -1.0 : 1.0, -1, parent != child, -1, link.stops});
     }
@@ -207,9 +207,9 @@ class Builder {
   int root_of(const JointDescription& joint, int base) const {
     const auto in_all = [&](int cluster) {
       return std::all_of(joint.links.begin(), joint.links.end(),
-                         [&](const RevoluteLink& link) { return link.parent == cluster || link.child == cluster; });
+                         [&](const JointLink& link) { return link.parent == cluster || link.child == cluster; });
     };
-    const RevoluteLink& first = joint.links.front();
+    const JointLink& first = joint.links.front();
     for (std::size_t c = 0; c < joint.clusters.size(); ++c)
       if (joint.body_of(c) >= 0 && !is_carried(joint, joint.body_of(c))) {
         require(in_all(static_cast<int>(c)), "rods at a point of a body must be joined to the body");

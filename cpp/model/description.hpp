@@ -73,7 +73,7 @@ struct JointStops {
 /// A link inside a joint: the second cluster turns about `axis` relative to the first. If it slides, it moves along the
 /// axis instead and does not turn; the first cluster is then that of a body. Its coordinate is in metres, and the
 /// numbers below are forces [N] instead of moments.
-struct RevoluteLink {
+struct JointLink {
   int parent = 0;  ///< index of a cluster of the joint
   int child = 0;
   Vector3 axis = Vector3::UnitZ();  ///< unit length, in the drawn configuration
@@ -92,11 +92,11 @@ enum class JointForm {
 };
 
 /// A node that several rods share. Passes in one cluster are rigidly connected; clusters are connected by
-/// revolute links, or (pinned) only by the shared node.
+/// links, or (pinned) only by the shared node.
 struct JointDescription {
   std::vector<std::vector<RodPass>> clusters;
   std::vector<int> bodies;  ///< per cluster: the rigid body in it, or -1; empty: no body
-  std::vector<RevoluteLink> links;
+  std::vector<JointLink> links;
   JointForm form = JointForm::frame;
 
   int body_of(std::size_t cluster) const { return cluster < bodies.size() ? bodies[cluster] : -1; }

@@ -102,13 +102,13 @@ constexpr ParameterInfo kIndex[]{
         spring_rest_length, "spring_rest_length", Extent::spring, "m", Range::non_negative),
     number_of_parts<&PartNumbers::spring_damping, drawn<&SceneDescription::springs, &SpringDescription::damping>>(
         spring_damping, "spring_damping", Extent::spring, "N s/m", Range::non_negative),
-    number_of_parts<&PartNumbers::joint_stiffness, drawn_joint<&RevoluteLink::stiffness>>(
+    number_of_parts<&PartNumbers::joint_stiffness, drawn_joint<&JointLink::stiffness>>(
         joint_stiffness, "joint_stiffness", Extent::joint, "N m/rad", Range::non_negative),
-    number_of_parts<&PartNumbers::joint_rest_angle, drawn_joint<&RevoluteLink::rest_angle>>(
+    number_of_parts<&PartNumbers::joint_rest_angle, drawn_joint<&JointLink::rest_angle>>(
         joint_rest_angle, "joint_rest_angle", Extent::joint, "rad", Range::any),
-    number_of_parts<&PartNumbers::joint_damping, drawn_joint<&RevoluteLink::damping>>(
+    number_of_parts<&PartNumbers::joint_damping, drawn_joint<&JointLink::damping>>(
         joint_damping, "joint_damping", Extent::joint, "N m s/rad", Range::non_negative),
-    number_of_parts<&PartNumbers::joint_moment, drawn_joint<&RevoluteLink::moment>>(joint_moment, "joint_moment",
+    number_of_parts<&PartNumbers::joint_moment, drawn_joint<&JointLink::moment>>(joint_moment, "joint_moment",
                                                                                     Extent::joint, "N m", Range::any),
     number_of_parts<&PartNumbers::tendon_tension, drawn<&SceneDescription::tendons, &TendonDescription::tension>>(
         tendon_tension, "tendon_tension", Extent::tendon, "N", Range::non_negative),

@@ -77,7 +77,7 @@ bool fits(const ObstacleDescription& o, const Vector3& corner, const Vector3& no
 std::optional<Vector3> turning_across(const SceneDescription& scene, const Vector3& line) {
   std::vector<Vector3> axes;
   for (const JointDescription& joint : scene.joints)
-    for (const RevoluteLink& link : joint.links)
+    for (const JointLink& link : joint.links)
       if (!link.slides) axes.push_back(link.axis);
   for (const TorsionDescription& torsion : scene.torsions) axes.push_back(torsion.axis);
   for (const Vector3& axis : axes)
@@ -161,12 +161,12 @@ bool is_mirrored(const Vector3& direction, const Vector3& normal) {
 }
 
 /// True if something turns a revolute joint about an axis in the plane.
-bool turns_out(const RevoluteLink& link, const Vector3& normal) {
+bool turns_out(const JointLink& link, const Vector3& normal) {
   return (link.moment != 0.0 || link.rest_angle != 0.0) && std::abs(link.axis.dot(normal)) < 0.5;
 }
 
 /// True if a link turns bodies against each other.
-bool turns_body(const JointDescription& joint, const RevoluteLink& link) {
+bool turns_body(const JointDescription& joint, const JointLink& link) {
   return joint.body_of(static_cast<std::size_t>(link.parent)) >= 0 &&
          joint.body_of(static_cast<std::size_t>(link.child)) >= 0;
 }
@@ -196,7 +196,7 @@ bool leans(const SceneDescription& scene, const SupportDescription& support, con
 std::string why_off_plane(const SceneDescription& scene, const Vector3& normal) {
   const auto across = [&](const Vector3& v) { return v.cross(normal).norm() > kTolerance * 100 * v.norm(); };
   for (const JointDescription& joint : scene.joints)
-    for (const RevoluteLink& link : joint.links)
+    for (const JointLink& link : joint.links)
       if (link.slides && std::abs(link.axis.dot(normal)) > 1e-9)
         return "a sliding joint leaves the plane";
       else if (!is_mirrored(link.axis, normal))

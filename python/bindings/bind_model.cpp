@@ -180,26 +180,26 @@ void register_joints_and_supports(py::module_& module) {
       .def_readwrite("rod", &RodPass::rod)
       .def_readwrite("node", &RodPass::node);
 
-  py::class_<RevoluteLink>(module, "RevoluteLink", "The child cluster turns about an axis relative to the parent.")
+  py::class_<JointLink>(module, "JointLink", "The child cluster turns about an axis relative to the parent.")
       .def(py::init([](int parent, int child, const Vector3& axis) {
-             RevoluteLink link;
+             JointLink link;
              link.parent = parent;
              link.child = child;
              link.axis = axis;
              return link;
            }),
            py::arg("parent"), py::arg("child"), py::arg("axis"))
-      .def_readwrite("parent", &RevoluteLink::parent)
-      .def_readwrite("child", &RevoluteLink::child)
-      .def_readwrite("axis", &RevoluteLink::axis)
-      .def_readwrite("slides", &RevoluteLink::slides)
-      .def_readwrite("stiffness", &RevoluteLink::stiffness)
-      .def_readwrite("rest_angle", &RevoluteLink::rest_angle)
-      .def_readwrite("damping", &RevoluteLink::damping)
-      .def_readwrite("moment", &RevoluteLink::moment)
+      .def_readwrite("parent", &JointLink::parent)
+      .def_readwrite("child", &JointLink::child)
+      .def_readwrite("axis", &JointLink::axis)
+      .def_readwrite("slides", &JointLink::slides)
+      .def_readwrite("stiffness", &JointLink::stiffness)
+      .def_readwrite("rest_angle", &JointLink::rest_angle)
+      .def_readwrite("damping", &JointLink::damping)
+      .def_readwrite("moment", &JointLink::moment)
       .def(
           "set_stops",
-          [](RevoluteLink& link, double low, double high, double stiffness) { link.stops = {low, high, stiffness}; },
+          [](JointLink& link, double low, double high, double stiffness) { link.stops = {low, high, stiffness}; },
           py::arg("low"), py::arg("high"), py::arg("stiffness"));
 
   py::class_<JointDescription> joint(module, "JointDescription", "A node that several rods share.");

@@ -41,7 +41,7 @@ __all__: list[str] = [
     "Reached",
     "Reaction",
     "ReadoutAdjoint",
-    "RevoluteLink",
+    "JointLink",
     "RingPassage",
     "RodDescription",
     "RodPass",
@@ -232,7 +232,7 @@ class RodPass:
     @rod.setter
     def rod(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
 
-class RevoluteLink:
+class JointLink:
     """
     The child cluster turns about an axis relative to the parent.
     """
@@ -295,9 +295,9 @@ class JointDescription:
     @clusters.setter
     def clusters(self, arg0: collections.abc.Sequence[collections.abc.Sequence[RodPass]]) -> None: ...
     @property
-    def links(self) -> list[RevoluteLink]: ...
+    def links(self) -> list[JointLink]: ...
     @links.setter
-    def links(self, arg0: collections.abc.Sequence[RevoluteLink]) -> None: ...
+    def links(self, arg0: collections.abc.Sequence[JointLink]) -> None: ...
 
 class HandDescription:
     """

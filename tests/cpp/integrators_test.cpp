@@ -161,7 +161,7 @@ std::vector<Case> driven(bool planar, double damping) {
   }
   const Vector3 moment = planar ? Vector3(0.0, 0.8, 0.0) : Vector3(0.3, 0.8, -0.5);
   for (bool follower : {false, true}) builder.load(LoadKind::moment, {planar ? 1 : 2, 0}, moment, follower);
-  for (RevoluteLink& link : builder.scene.joints[0].links) {
+  for (JointLink& link : builder.scene.joints[0].links) {
     link.stiffness = 2.0;
     link.rest_angle = 0.7;
     link.damping = damping;

@@ -279,7 +279,7 @@ TEST(Joints, RodsThatAPlaneLetsTurnByNothingAreOneWhoeverIsJoinedToWhom) {
   builder.add_rod(testing::line(Vector3(-2, 0, 0), o, 3), isotropic(), false, y);
   builder.add_rod(testing::line(o, Vector3(1, 0, 2), 3), isotropic(), false, y);
   builder.add_rod(testing::line(o, Vector3(1, 0, -2), 3), isotropic(), false, y);
-  RevoluteLink first, second;
+  JointLink first, second;
   first.parent = 0, first.child = 1, first.axis = Vector3::UnitX();
   second.parent = 2, second.child = 1, second.axis = Vector3::UnitX();
   builder.scene.joints.push_back(
@@ -294,7 +294,7 @@ TEST(Joints, EveryHingeTurnsAgainstTheHubWhicheverComesFirst) {
   for (bool first_swapped : {false, true})
     for (bool second_swapped : {false, true}) {
       SceneDescription scene = testing::hinged().scene;
-      std::vector<RevoluteLink>& links = scene.joints[0].links;
+      std::vector<JointLink>& links = scene.joints[0].links;
       if (first_swapped) std::swap(links[0].parent, links[0].child);
       if (second_swapped) std::swap(links[1].parent, links[1].child);
       const Model model = build_model(scene, std::nullopt);

@@ -118,9 +118,9 @@ def describe_joint(group: JointGroup) -> _core.JointDescription:
     return joint
 
 
-def _describe_link(parent: int, child: int, join: JoinPart) -> _core.RevoluteLink:
+def _describe_link(parent: int, child: int, join: JoinPart) -> _core.JointLink:
     assert join.axis is not None
-    link = _core.RevoluteLink(parent, child, join.axis)
+    link = _core.JointLink(parent, child, join.axis)
     link.slides = join.kind == "sliding"
     for word in kind_of(join).words:
         setattr(link, word.name, getattr(join, word.name))
