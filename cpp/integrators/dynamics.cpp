@@ -295,6 +295,7 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   if (euler && options.adaptive)
     find_pressure_gains(equations.problem(), work.newton.data, equations.assembler(), work.velocity, work.pressure);
   const double contact_loss = account(equations, parameters, plan, state, q1, work, result);
+  equations.find_joint_wrenches(work.newton.data);
   VectorX& acceleration = work.mean;
   acceleration = rate * (work.velocity - state.v);
   if (options.tolerance) result.error = estimated_error(equations, newton, options, plan, predictor, work);

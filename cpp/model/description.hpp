@@ -110,6 +110,7 @@ struct BodyDescription {
   std::vector<int> carried;           ///< rows of further points of the body
   Matrix3 inertia = Matrix3::Zero();  ///< about the centre of mass, axes as drawn [kg m^2]
   int carrier = -1;                   ///< body on whose hinge or slide it is; -1: none
+  int center = -1;                    ///< row of its centre of mass
 };
 
 enum class SupportKind {

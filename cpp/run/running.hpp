@@ -133,6 +133,7 @@ struct Moving {
   /// Impulses of supports in the parts of a time step so far, per support as in `reaction_of` [N s], [N m s]; and the
   /// length of these parts [s]. Empty where the last time step had one part.
   std::vector<Wrench> impulses;
+  std::vector<Wrench> joint_impulses;  ///< the same of the parts at joints of bodies
   double impulse_time = 0;
 };
 
@@ -156,6 +157,7 @@ struct Found {
   VectorX reaction_residual;          ///< full residual of the last solve
   VectorX reaction_place;             ///< the configuration in which its forces act, in the middle of midpoint steps
   std::vector<Wrench> hand_wrenches;  ///< of hands that yield, per support, about the origin
+  std::vector<Wrench> joint_wrenches;  ///< on the parts at joints of bodies, see steps/joint_wrenches.hpp
   VectorX tensions;                   ///< per edge, in the middle of a midpoint step [N]; none: those of the state
   bool reaction_current = false;
 };

@@ -415,6 +415,18 @@ void fold_bounds(const StepProblem& problem, VectorX& bounds) {
   }
 }
 
+void sum_rows(const StepProblem& problem, const VectorX& z, VectorX& rows) {
+  const std::vector<CarriedPart>& carried = problem.model.carried;
+  for (std::size_t i = carried.size(); i-- > 0;)
+    with_kind(problem, carried[i], [&]<class Kind>(const Kind& kind) {
+      double body[Kind::kBody], force[Kind::kOwn], acting[Kind::kBody];
+      gather(carried[i], z, body);
+      for (int k = 0; k < Kind::kOwn; ++k) force[k] = rows[carried[i].own_dof + k];
+      kind.act(body, force, acting);
+      for (int b = 0; b < Kind::kBody; ++b) rows[carried[i].body_dofs[at(b)]] += acting[b];
+    });
+}
+
 void expand_step(const StepProblem& problem, const VectorX& z, VectorX& step) {
   for (const CarriedPart& part : problem.model.carried)
     with_kind(problem, part, [&]<class Kind>(const Kind& kind) {

@@ -41,6 +41,10 @@ void find_carrying(const StepProblem& problem, const VectorX& z, std::size_t i, 
 /// Adds bounds on the rounding errors of carried parts to those of their bodies.
 void fold_bounds(const StepProblem& problem, VectorX& bounds);
 
+/// Adds the rows of carried parts to those of their bodies without clearing them: rows of a carried part are then those
+/// of everything that its body carries there.
+void sum_rows(const StepProblem& problem, const VectorX& z, VectorX& rows);
+
 /// Sets the displacements of carried parts in a step from z by those of their bodies.
 void expand_step(const StepProblem& problem, const VectorX& z, VectorX& step);
 

@@ -39,7 +39,8 @@ Equations::Equations(const Model& model, const EquationOptions& options)
       asymmetries_(asymmetries_of(model, problem_.loads, terms_, options.rule, options.exact)),
       assembler_(model, tables_of(terms_), asymmetries_.empty() ? Symmetry::symmetric : Symmetry::unsymmetric,
                  options.solver, options.exact),
-      static_duration_(options.static_duration) {
+      static_duration_(options.static_duration),
+      joint_wrenches_(model) {
   problem_.exact = options.exact;
   if (contact()) {
     assembler_.couple(terms_.contact->rows().unknowns(), kContactUnknowns);
@@ -133,6 +134,7 @@ void Equations::evaluate(const VectorX& z, bool with_matrix, const double* axial
     std::fill(values.begin(), values.end(), 0.0);
   }
   for (const std::unique_ptr<Term>& term : terms_.all) term->add(problem_, data, assembler_, values);
+  if (joint_wrenches_.any()) data.unfolded = data.gradient.head(model().dof_count);
   if (!model().carried.empty()) fold(data, values);
   finish(data);
   if (with_matrix && !problem_.exact) assembler_.project_matrix();

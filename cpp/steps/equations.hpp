@@ -7,6 +7,7 @@
 
 #include "assembly/assembler.hpp"
 #include "steps/carried_parts.hpp"
+#include "steps/joint_wrenches.hpp"
 #include "steps/terms.hpp"
 
 namespace withe {
@@ -107,6 +108,10 @@ class Equations {
            (problem_.parameters->joint_moment.array() != 0.0).any() ||
            (problem_.parameters->tendon_tension.array() != 0.0).any();
   }
+  /// Sets the wrenches at joints of bodies, by the last evaluation of a problem whose start is not changed yet.
+  void find_joint_wrenches(StepData& data) const {
+    if (joint_wrenches_.any()) joint_wrenches_.find(problem_, assembler_, data);
+  }
   /// Force of loads, motors of joints, tendons and custom forces in the last evaluation, per unknown.
   void load_force(const StepData& data, VectorX& out) const;
 
@@ -136,6 +141,7 @@ class Equations {
   std::vector<std::string> asymmetries_;
   Assembler assembler_;
   double static_duration_;
+  JointWrenches joint_wrenches_;
   enum class Mark { none, set, passed };
   Mark mark_ = Mark::none;
   EquationsMemory at_mark_;

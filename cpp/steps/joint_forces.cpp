@@ -152,3 +152,10 @@ double joint_energy(const Model& model, const PartNumbers& numbers, const Vector
 }
 
 }  // namespace withe
+double joint_row(const StepProblem& problem, const StepData& data, int joint) {
+  const JointAngle& angle = problem.model.joint_angles[at(joint)];
+  if (!angle.turns()) return 0.0;
+  const JointTorque torque = joint_torque(problem.model, *problem.parameters, problem.elastic, joint);
+  return angle.sign * torque_now(problem, data, torque, angle);
+}
+

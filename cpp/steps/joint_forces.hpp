@@ -30,6 +30,8 @@ class JointForces final : public Term {
 JointTorque joint_torque(const Model& model, const Parameters& parameters, const ElasticCoefficients& elastic,
                          int joint);
 /// Energy of the spring and the stops of one joint at q [J].
+/// Torque of a joint in a step [N m]: minus the row of the unknown `JointAngle::turning`, and the row of `against`.
+double joint_row(const StepProblem& problem, const StepData& data, int joint);
 double joint_energy(const Model& model, const PartNumbers& numbers, const VectorX& q, int joint);
 
 }  // namespace withe

@@ -132,6 +132,8 @@ struct StepData {
   VectorX contact_gradient, contact_floor;
   std::vector<Wrench> hands;           ///< per support that yields: wrench on the rod about the origin
   std::vector<Carrying> carrying;      ///< per part that a body carries
+  VectorX unfolded;                    ///< `gradient` before the rows of carried parts are added to those of bodies
+  std::vector<Wrench> joints;          ///< on the parts at joints of bodies, see joint_wrenches.hpp
   std::vector<TurningSlopes> turning;  ///< per edge, of an exact matrix in space
 };
 

@@ -161,6 +161,7 @@ EquilibriumResult World::Implementation::settle(Equations& system, StaticResult&
   const Prescribed still = custom().at_rest();
   system.begin(state, parameters, StepRule::statics, 0.0, still);
   system.evaluate(state.q, false, nullptr, systems.work.newton.data);
+  system.find_joint_wrenches(systems.work.newton.data);
   note_reactions();
   systems.newton().balance(systems.work.newton.data, r.newton);
   check_resolution();
@@ -278,6 +279,7 @@ void World::Implementation::refresh_reactions() {
   const Prescribed still = custom().at_rest();
   system.begin(state, parameters, StepRule::statics, 0.0, still);
   system.evaluate(state.q, false, nullptr, systems.work.newton.data);
+  system.find_joint_wrenches(systems.work.newton.data);
   note_reactions();
 }
 

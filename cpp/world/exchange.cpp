@@ -151,7 +151,7 @@ void exchange(Archive& io, std::vector<Wrench>& wrenches) {
 
 template <class Archive>
 void exchange(Archive& io, Moving& moving) {
-  auto& [state, predictor, motions, ledger, impulses, impulse_time] = moving;
+  auto& [state, predictor, motions, ledger, impulses, joint_impulses, impulse_time] = moving;
   exchange(io, state);
   predictor.exchange(io);
   for (auto& motion : motions) {
@@ -164,6 +164,7 @@ void exchange(Archive& io, Moving& moving) {
   auto& [support_work, actuation_work, dissipated, load_work] = ledger;
   for (double* x : {&support_work, &actuation_work, &dissipated, &load_work, &impulse_time}) io(*x);
   exchange(io, impulses);
+  exchange(io, joint_impulses);
 }
 
 template <class Archive>
@@ -183,10 +184,11 @@ void exchange(Archive& io, StepHistory& history) {
 
 template <class Archive>
 void exchange(Archive& io, Found& found) {
-  auto& [custom_force, custom_moments, reaction_residual, reaction_place, hand_wrenches, tensions, reaction_current] =
-      found;
+  auto& [custom_force, custom_moments, reaction_residual, reaction_place, hand_wrenches, joint_wrenches, tensions,
+         reaction_current] = found;
   io(custom_force), io(custom_moments), io(reaction_residual), io(reaction_place), io(reaction_current);
   exchange(io, hand_wrenches);
+  exchange(io, joint_wrenches);
   exchange(io, tensions);
 }
 

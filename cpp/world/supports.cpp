@@ -1,6 +1,7 @@
 /// Supports of a running scene: added, released, moved, and what they hold.
 
 #include <algorithm>
+#include <span>
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
@@ -145,6 +146,7 @@ std::pair<Matrix3, double> World::support_turn(int support) const {
 /// Reactions are those of the last evaluation.
 void World::Implementation::note_reactions() {
   impulses.clear();
+  joint_impulses.clear();
   tensions.resize(0);
   note_residual();
 }
@@ -153,6 +155,7 @@ void World::Implementation::note_residual() {
   reaction_residual = systems.work.newton.data.full_residual;
   reaction_place = systems.work.newton.data.z;
   hand_wrenches = systems.work.newton.data.hands;
+  joint_wrenches = systems.work.newton.data.joints;
   reaction_current = true;
 }
 
@@ -164,12 +167,18 @@ void World::Implementation::keep_reactions(double dt, bool begins) {
     make_frame_moments(model, prescribed.held.q, acts_in_middle(options.integrator) ? 0.5 : 1.0, *this);
   if (begins) {
     impulses.clear();
+    joint_impulses.clear();
     impulse_time = 0.0;
   }
   const bool only = division.whole() && options.integrator != Integrator::fourth_order;
-  if (only || model.supports.empty()) return;
+  if (only || (model.supports.empty() && joint_wrenches.empty())) return;
   impulses.resize(model.supports.size());
+  joint_impulses.resize(joint_wrenches.size());
   impulse_time += dt;
+  for (std::size_t i = 0; i < joint_wrenches.size(); ++i) {
+    joint_impulses[i].force += dt * joint_wrenches[i].force;
+    joint_impulses[i].moment += dt * joint_wrenches[i].moment;
+  }
   VectorX& held = systems.work.assumed;
   held.setZero(model.dof_count);
   systems.scheme().assembler().set_held_part(reaction_residual, held);
@@ -197,6 +206,32 @@ Reaction World::reaction(int support) const {
   }
   if (self.model.supports[at(support)].is_hand()) found.moment -= self.motions[at(support)].position.cross(found.force);
   return {found.force, found.moment};
+}
+
+Reaction World::joint_reaction(int joint, const std::vector<RodPass>& side) const {
+  Implementation& self = *implementation_;
+  const std::vector<JointDescription>& joints = self.description.joints;
+  require(joint >= 0 && joint < static_cast<int>(joints.size()), "no such joint: ", joint);
+  self.refresh_reactions();
+  std::size_t first = 0;
+  for (int j = 0; j < joint; ++j) first += parts_of(joints[at(j)]).size();
+  const std::span<const Wrench> wrenches = self.joint_impulses.empty() ? self.joint_wrenches : self.joint_impulses;
+  const double share = self.joint_impulses.empty() ? 1.0 : 1.0 / self.impulse_time;
+  const std::vector<JointPart> parts = parts_of(joints[at(joint)]);
+  require(!parts.empty() && first + parts.size() <= wrenches.size(), "the joint has no body");
+  Wrench found = wrench_of_side(self.model, parts, wrenches.subspan(first, parts.size()), side);
+  int number = 0;
+  for (int j = 0; j < joint; ++j) number += static_cast<int>(joints[at(j)].links.size());
+  // The node of a sliding joint moves with the part that a body carries.
+  if (const auto& links = joints[at(joint)].links; !links.empty() && links.front().slides) {
+    const int carrier = carrier_of_slide(self.description, joints[at(joint)]);
+    const bool carries =
+        std::any_of(side.begin(), side.end(), [&](const RodPass& pass) { return pass.rod == -1 - carrier; });
+    if (carries)
+      found.moment += slide_displacement(self.model, self, self.state, number, acts_in_middle(self.options.integrator))
+                          .cross(found.force);
+  }
+  return {share * found.force, share * found.moment};
 }
 
 }  // namespace withe

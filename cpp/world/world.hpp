@@ -208,6 +208,9 @@ class World {
   /// The rotation that a support turns to, and when it is there [s].
   std::pair<Matrix3, double> support_turn(int support) const;
   Reaction reaction(int support) const;      ///< of a hand: about where it is
+  /// Force and moment that a joint with a body transmits to the parts of `side`, about its node. `joint`: row of
+  /// description().joints. `side`: rods and bodies at the joint.
+  Reaction joint_reaction(int joint, const std::vector<RodPass>& side) const;
   Deflection deflection(int support) const;  ///< of a hand
   /// The drive of a ring feeds the rod towards its end from now on, by length at rest [m/s].
   void feed(int support, double rate);

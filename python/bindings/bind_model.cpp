@@ -121,6 +121,7 @@ void register_body(py::module_& module) {
       .def(py::init<>())
       .def_readwrite("name", &BodyDescription::name)
       .def_readwrite("node", &BodyDescription::node)
+      .def_readwrite("center", &BodyDescription::center)
       .def_readwrite("carried", &BodyDescription::carried)
       .def_readwrite("inertia", &BodyDescription::inertia)
       .def_readwrite("carrier", &BodyDescription::carrier);

@@ -393,6 +393,12 @@ void define_supports(WorldClass& world) {
       "reaction", [](const GuardedWorld& self, int support) { return self.reading().reaction(support); },
       py::arg("support"));
   world.def(
+      "joint_reaction",
+      [](const GuardedWorld& self, int joint, const std::vector<RodPass>& side) {
+        return self.reading().joint_reaction(joint, side);
+      },
+      py::arg("joint"), py::arg("side"));
+  world.def(
       "deflection", [](const GuardedWorld& self, int support) { return self.reading().deflection(support); },
       py::arg("support"));
   world.def(

@@ -272,13 +272,13 @@ class Reading:
         """
         return self._lanes.gathered(lambda s: s.momentum())  # type: ignore[no-any-return]
 
-    def reaction(self, support: Support | NodeHandle | Body | str) -> Reaction:
-        """Return the force and moment of a support on its rod.
+    def reaction(self, support: Support | NodeHandle | Body | Joint | str) -> Reaction:
+        """Return the force and moment of a support on its rod or body, or of a joint on its second part.
 
         Parameters
         ----------
-        support : Support, NodeHandle, Body or str
-            The support, or its node.
+        support : Support, NodeHandle, Body, Joint or str
+            The support, its node, or the body that it holds; or a joint at a rigid body.
 
         Returns
         -------
@@ -288,7 +288,7 @@ class Reading:
         Raises
         ------
         ValueError
-            The node has no support.
+            The node has no support, or the reaction of the joint is not known.
 
         See Also
         --------

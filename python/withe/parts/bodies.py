@@ -116,6 +116,7 @@ def describe_bodies(directory: Directory) -> list[_core.BodyDescription]:
         rows = directory.layout.rows(-1 - body.index)
         description = _core.BodyDescription()
         description.name = body.name
+        description.center = directory.row((-1 - body.index, 0))
         description.node, description.carrier = places[body.index]
         description.carried = sorted(
             int(row) for row in rows if row != description.node and row not in slid[body.index]

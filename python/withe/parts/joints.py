@@ -20,6 +20,7 @@ __all__ = [
     "gather",
     "groups",
     "revolute_joints",
+    "side_of",
 ]
 
 FloatArray = npt.NDArray[np.float64]
@@ -105,6 +106,22 @@ def groups(joins: Sequence[JoinPart]) -> list[JointGroup]:
 def revolute_joints(joins: Sequence[JoinPart]) -> list[JoinPart]:
     """Those that turn about an axis, in the order in which the engine numbers them."""
     return [join for group in groups(joins) for _, _, join in group.links]
+
+
+def side_of(join: JoinPart, joins: Sequence[JoinPart]) -> list[Pass] | None:
+    """Nodes that stay with the second node of a join without it; None if they stay with the first node, too.
+
+    `joins`: all joins at the node.
+    """
+    side, pending = {join.nodes[1]}, [join.nodes[1]]
+    while pending:
+        node = pending.pop()
+        for other in joins:
+            if other is not join and node in other.nodes:
+                fresh = [each for each in other.nodes if each not in side]
+                side.update(fresh)
+                pending += fresh
+    return None if join.nodes[0] in side else sorted(side)
 
 
 def describe_joint(group: JointGroup) -> _core.JointDescription:

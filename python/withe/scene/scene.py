@@ -568,6 +568,7 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
             if kind != "rigid":
                 raise ValueError(f"kind of the joint must be given once, got {others[-1]!r} and {kind!r}")
             kind = cast(JoinKind, nodes.pop())
+        Simulation.reaction : Force and moment that a joint with a body transmits.
         numbers = (stiffness, rest_angle, damping, moment)
         stops = (limits, limit_stiffness)
         parts = self._joints.join(nodes, at, kind, axis, form, numbers, stops, name)

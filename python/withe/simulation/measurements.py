@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import overload
+from typing import cast, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -23,7 +23,7 @@ from withe.simulation.hands import (
     ring_passage,
     support_pose,
 )
-from withe.simulation.joints import find_joint
+from withe.simulation.joints import find_joint, is_joint, joint_reaction
 from withe.simulation.readouts import Energy, Momentum, Plan, Reaction, RodEnergy, Statistics
 from withe.simulation.session import Session
 from withe.simulation.springs import spring_tension
@@ -564,30 +564,33 @@ class Measurements:
         momentum = self._session.world.momentum()
         return Momentum(np.array(momentum.linear), np.array(momentum.angular))
 
-    def reaction(self, support: Support | NodeHandle | Body | str) -> Reaction:
-        """Return the force and moment of a support on its rod.
+    def reaction(self, support: Support | NodeHandle | Body | Joint | str) -> Reaction:
+        """Return the force and moment of a support on its rod or body, or of a joint on its second part.
 
         During motion these are means over the last time step, inner steps included: together with all other forces they
-        account for the change of momentum. The moment is about the node.
+        account for the change of momentum. The moment is about the node of the support or joint.
 
         Parameters
         ----------
-        support : Support, NodeHandle, Body or str
-            The support, or its node.
+        support : Support, NodeHandle, Body, Joint or str
+            The support, its node, or the body that it holds; or a joint at a rigid body.
 
         Returns
         -------
         Reaction
-            Force of shape (3,) [N] and moment of shape (3,) [N m].
+            Force of shape (3,) [N] and moment of shape (3,) [N m]. Those of ``join(a, b)`` act on `b`, and their
+            opposites on `a`. The moment contains the torque about the axis, `joint_torque`.
 
         Raises
         ------
         ValueError
-            The node has no support.
+            The node has no support. A joint of rods without a body; a joint with rods on both sides, or with supports
+            on both sides at its node.
 
         See Also
         --------
         wrench : Total force and moment of a hand.
+        joint_torque : Torque about the axis of a joint.
         tensions : Tensions of the edges of a rod.
         contacts : Forces of contacts.
 
@@ -597,7 +600,24 @@ class Measurements:
         ``energy().work``, to second order in the time step. A support that starts or stops at full speed applies an
         impulse, which is part of the force of this step. Its work is the impulse times the mean of both velocities,
         half of the force times the displacement.
+
+        The reaction of a joint follows from the balance of everything beyond the joint. A force that a user puts on a
+        body at the node of a joint acts on this body. A spring, tendon, follower or custom force at this node counts as
+        one on the rods there.
+
+        Examples
+        --------
+        >>> import withe
+        >>> scene = withe.Scene()
+        >>> frame, lamp = scene.add_body(mass=1.0, inertia=0.01), scene.add_body(mass=2.0, inertia=0.01)
+        >>> support = scene.clamp(frame)
+        >>> hook = scene.join(frame, lamp, "pinned", at=(0, 0, 0.1))
+        >>> simulation = scene.build(integrator="static")
+        >>> print(simulation.reaction(hook).force.round(6))
+        [ 0.    0.   19.62]
         """
+        if is_joint(self._session, support):
+            return joint_reaction(self._session, cast(Joint, support))
         index, _ = find_support(self._session, support)
         reaction = self._session.world.reaction(index)
         return Reaction(np.array(reaction.force), np.array(reaction.moment))
