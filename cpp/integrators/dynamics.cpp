@@ -11,6 +11,7 @@
 #include "integrators/step_parts.hpp"
 #include "steps/elastic_forces.hpp"
 #include "steps/inertia.hpp"
+#include "steps/joint_forces.hpp"
 
 namespace withe {
 namespace {
@@ -296,6 +297,7 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
     find_pressure_gains(equations.problem(), work.newton.data, equations.assembler(), work.velocity, work.pressure);
   const double contact_loss = account(equations, parameters, plan, state, q1, work, result);
   equations.find_joint_wrenches(work.newton.data);
+  enter_stops(equations.problem(), q1, state);
   VectorX& acceleration = work.mean;
   acceleration = rate * (work.velocity - state.v);
   if (options.tolerance) result.error = estimated_error(equations, newton, options, plan, predictor, work);

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <numeric>
 #include <set>
@@ -43,6 +44,20 @@ struct LinkPlace {
 
 VectorX to_vector(const std::vector<double>& v) {
   return Eigen::Map<const VectorX>(v.data(), static_cast<Eigen::Index>(v.size()));
+}
+
+/// Solution d of d (1 + r) = log((1 + d) / (1 - r d)) for a restitution r, see forces/joint.hpp.
+double impact_loss(double restitution) {
+  constexpr double kLeast = 0.01;
+  if (restitution == 1.0) return 0.0;
+  const double r = std::max(restitution, kLeast);
+  double low = 0.0, high = 1.0 / r;
+  for (int i = 0; i < 200; ++i) {
+    const double d = 0.5 * (low + high);
+    // The logarithm grows faster from the root on.
+    (d * (1.0 + r) > std::log1p(d) - std::log1p(-r * d) ? low : high) = d;
+  }
+  return 0.5 * (low + high);
 }
 
 class Builder {
@@ -357,6 +372,7 @@ class Builder {
       JointAngle joint;
       joint.sign = sign;
       joint.stops = stops;
+      joint.stops.impact_loss = impact_loss(stops.restitution);
       joint.node = node_of(clusters_[at(clusters_[at(parent)].passes.empty() ? child : parent)]);
       if (slide >= 0) {
         joint.turning = model_.slides[at(slide)].dof;

@@ -68,6 +68,8 @@ struct RodPass {
 struct JointStops {
   double low = -std::numeric_limits<double>::infinity(), high = -low;  ///< [rad]
   double stiffness = 0;                                                ///< [N m/rad]; 0: no stops
+  double restitution = 1;  ///< rate after an impact on a stop over that before it, from 0 to 1 [-]
+  double impact_loss = 0;  ///< d in forces/joint.hpp, which `build_model` finds by the restitution [-]
 };
 
 /// A link inside a joint: the second cluster turns about `axis` relative to the first. If it slides, it moves along the
@@ -79,10 +81,12 @@ struct JointLink {
   Vector3 axis = Vector3::UnitZ();  ///< unit length, in the drawn configuration
   bool slides = false;
   // Between them, see forces/joint.hpp:
-  double stiffness = 0;   ///< k [N m/rad]
-  double rest_angle = 0;  ///< [rad]
-  double damping = 0;     ///< c [N m s/rad]
-  double moment = 0;      ///< moment of a motor on the child [N m]
+  double stiffness = 0;                                         ///< k [N m/rad]
+  double rest_angle = 0;                                        ///< [rad]
+  double damping = 0;                                           ///< c [N m s/rad]
+  double moment = 0;                                            ///< moment of a motor on the child [N m]
+  double max_torque = std::numeric_limits<double>::infinity();  ///< of the spring [N m]
+  double max_speed = std::numeric_limits<double>::infinity();   ///< of the rest angle as it is set [rad/s]
   JointStops stops;
 };
 
@@ -107,10 +111,10 @@ struct JointDescription {
 struct BodyDescription {
   std::string name;
   int node = 0;                       ///< row of SceneDescription::positions; its unknowns are the body's
+  int center = -1;                    ///< row of its centre of mass
   std::vector<int> carried;           ///< rows of further points of the body
   Matrix3 inertia = Matrix3::Zero();  ///< about the centre of mass, axes as drawn [kg m^2]
   int carrier = -1;                   ///< body on whose hinge or slide it is; -1: none
-  int center = -1;                    ///< row of its centre of mass
 };
 
 enum class SupportKind {
@@ -149,6 +153,7 @@ struct HandDescription {
   double friction = 0;   ///< coefficient of a ring that lets the rod slide [-]
   bool feeds = false;    ///< true if a drive holds the rod along itself
   double feed_rate = 0;  ///< initial rate of the drive: rest length towards the end of the rod [m/s]
+  int node = -1;         ///< point of a rigid body that carries the ring; -1: none does
 };
 
 /// Something that holds a node of a rod.
@@ -205,8 +210,10 @@ struct TorsionDescription {
 enum class GuidePlace { start, middle, end };
 
 struct TendonGuide {
-  int rod = 0, edge = 0;
+  int rod = 0, edge = 0;  ///< on a rigid body as in `RodPass`: -1 - body, and the row of its point
   GuidePlace place = GuidePlace::middle;
+
+  bool on_body() const { return rod < 0; }
 
   friend bool operator==(const TendonGuide&, const TendonGuide&) = default;
 };
@@ -363,8 +370,8 @@ bool is_there(const SceneDescription& scene, RodPass pass);
 /// them.
 struct PartNumbers {
   VectorX spring_stiffness, spring_rest_length, spring_damping;  ///< per spring [N/m], [m], [N s/m]
-  /// Per revolute joint [N m/rad], [rad], [N m s/rad], [N m].
-  VectorX joint_stiffness, joint_rest_angle, joint_damping, joint_moment;
+  /// Per revolute joint [N m/rad], [rad], [N m s/rad], [N m], [N m], [rad/s].
+  VectorX joint_stiffness, joint_rest_angle, joint_damping, joint_moment, joint_max_torque, joint_max_speed;
   VectorX tendon_tension;                         ///< per tendon [N]
   VectorX torsion_stiffness, torsion_rest_angle;  ///< per torsion spring [N m/rad], [rad]
 };

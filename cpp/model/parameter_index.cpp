@@ -109,7 +109,11 @@ constexpr ParameterInfo kIndex[]{
     number_of_parts<&PartNumbers::joint_damping, drawn_joint<&JointLink::damping>>(
         joint_damping, "joint_damping", Extent::joint, "N m s/rad", Range::non_negative),
     number_of_parts<&PartNumbers::joint_moment, drawn_joint<&JointLink::moment>>(joint_moment, "joint_moment",
-                                                                                    Extent::joint, "N m", Range::any),
+                                                                                 Extent::joint, "N m", Range::any),
+    number_of_parts<&PartNumbers::joint_max_torque, drawn_joint<&JointLink::max_torque>>(
+        joint_max_torque, "joint_max_torque", Extent::joint, "N m", Range::limit),
+    number_of_parts<&PartNumbers::joint_max_speed, drawn_joint<&JointLink::max_speed>>(
+        joint_max_speed, "joint_max_speed", Extent::joint, "rad/s", Range::limit),
     number_of_parts<&PartNumbers::tendon_tension, drawn<&SceneDescription::tendons, &TendonDescription::tension>>(
         tendon_tension, "tendon_tension", Extent::tendon, "N", Range::non_negative),
     number_of_parts<&PartNumbers::torsion_stiffness,
@@ -177,6 +181,7 @@ Eigen::Index rows_of(const Model& model, const ParameterInfo& info, int rod) {
 /// The first number that is out of range, or nothing.
 const double* out_of_range(const ParameterValues& values, Range range) {
   const auto bad = [range](double x) {
+    if (range == Range::limit) return !(x > 0.0);
     return !std::isfinite(x) || (range == Range::positive && x <= 0.0) ||
            ((range == Range::non_negative || range == Range::share) && x < 0.0) || (range == Range::share && x > 1.0);
   };
@@ -191,6 +196,7 @@ void check_range(const Model& model, const ParameterInfo& info, int rod, const P
                        (info.range == Range::any            ? "finite"
                         : info.range == Range::share        ? "from 0 to 1"
                         : info.range == Range::non_negative ? "finite and not negative"
+                        : info.range == Range::limit        ? "positive"
                                                             : "positive and finite") +
                        ", got " + text(*bad, 6));
 }

@@ -31,6 +31,8 @@ enum class ParameterKind {
   joint_rest_angle,
   joint_damping,
   joint_moment,
+  joint_max_torque,
+  joint_max_speed,
   tendon_tension,
   torsion_stiffness,
   torsion_rest_angle,
@@ -51,7 +53,7 @@ enum class ParameterKind {
 /// a revolute joint, a tendon and a torsion spring own one number each.
 enum class Extent { scene, node, edge, stencil, spring, joint, tendon, torsion, load, obstacle, pair };
 
-enum class Range { any, non_negative, positive, share };  ///< share: from 0 to 1
+enum class Range { any, non_negative, positive, share, limit };  ///< share: from 0 to 1; limit: positive or infinite
 
 /// Quantities that derive from a parameter.
 enum class Derived { nothing, masses, stiffness, viscous_times, natural_strains };

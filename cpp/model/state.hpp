@@ -114,6 +114,7 @@ struct State {
   std::vector<HandState> hands;  ///< per support; empty for supports that are no hands
   VectorX contact_stiffness;     ///< per rod, of contacts that begin [N/m]; where a scene has contact
   Motion motion;
+  VectorX stop_rates;  ///< per revolute joint, rate at which it has met the stop that it is in, or 0 [rad/s]; or empty
 };
 
 State initial_state(const Model& model);

@@ -63,6 +63,9 @@ void check_reversible(const Model& model, const Options& options, const Paramete
           "integrator 'fourth_order' does not support damping of springs" + instead);
   require((p.joint_damping.array() == 0.0).all(),
           "integrator 'fourth_order' does not support damping of joints" + instead);
+  for (const JointAngle& joint : model.joint_angles)
+    require(joint.stops.stiffness == 0.0 || joint.stops.restitution == 1.0,
+            "integrator 'fourth_order' does not support restitution of stops below 1" + instead);
   if (!p.dragged) return;
   for (int i = 0; i < model.node_count; ++i)
     require(p.node_drag(i) * options.time_step <= p.node_mass(i),

@@ -131,6 +131,7 @@ class FrameForces {
     JointTorque torque = joint_torque(model_, parameters_, elastic_, j);
     const double angle = joint.angle(state_.q);
     const double pull = joint.sign * torque_of(torque, angle, 0.0);
+    if (torque.is_saturated(angle)) torque.stiffness = 0.0;
     if (angle < torque.stops.low || angle > torque.stops.high) torque.stiffness += torque.stops.stiffness;
     const int turning = row_of(joint.turning), against = row_of(joint.against);
     if (turning >= 0) gradient(turning) -= pull, hessian(turning, turning) += torque.stiffness;

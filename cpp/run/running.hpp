@@ -152,13 +152,13 @@ struct StepHistory {
 
 /// Results of the last step or solve, for read-outs.
 struct Found {
-  MatrixX3 custom_force;              ///< of the last step [N]
-  MatrixX3 custom_moments;            ///< of the last step, where there are any [N m]
-  VectorX reaction_residual;          ///< full residual of the last solve
-  VectorX reaction_place;             ///< the configuration in which its forces act, in the middle of midpoint steps
-  std::vector<Wrench> hand_wrenches;  ///< of hands that yield, per support, about the origin
+  MatrixX3 custom_force;               ///< of the last step [N]
+  MatrixX3 custom_moments;             ///< of the last step, where there are any [N m]
+  VectorX reaction_residual;           ///< full residual of the last solve
+  VectorX reaction_place;              ///< the configuration in which its forces act, in the middle of midpoint steps
+  std::vector<Wrench> hand_wrenches;   ///< of hands that yield, per support, about the origin
   std::vector<Wrench> joint_wrenches;  ///< on the parts at joints of bodies, see steps/joint_wrenches.hpp
-  VectorX tensions;                   ///< per edge, in the middle of a midpoint step [N]; none: those of the state
+  VectorX tensions;                    ///< per edge, in the middle of a midpoint step [N]; none: those of the state
   bool reaction_current = false;
 };
 

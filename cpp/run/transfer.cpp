@@ -68,6 +68,7 @@ State transferred(const Model& old, const State& from, const Model& model) {
   to.contacts = from.contacts;
   std::copy_n(from.hands.begin(), std::min(from.hands.size(), to.hands.size()), to.hands.begin());
   to.contact_stiffness = from.contact_stiffness;
+  to.stop_rates = from.stop_rates;
   Configuration c;
   compute_configuration(old, from, from.q, c);
   const auto copy = [&](int old_dof, int new_dof, int n) {

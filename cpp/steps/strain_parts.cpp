@@ -4,6 +4,8 @@
 #include <limits>
 #include <span>
 
+#include "steps/joint_forces.hpp"
+
 namespace withe {
 namespace {
 
@@ -41,6 +43,7 @@ StrainParts::StrainParts(const Equations& system, const State& state, const Conf
   for (int j = 0; j < static_cast<int>(model.joint_angles.size()); ++j) {
     const JointAngle& joint = model.joint_angles[at(j)];
     if (!joint.turns() || k.joint_stiffness(j) == 0.0) continue;
+    if (joint_torque(model, *system.problem().parameters, k, j).is_saturated(joint.angle(state.q))) continue;
     const auto row = static_cast<int>(stiffnesses_.size());
     gradients_.emplace_back(row, joint.turning, 1.0);
     if (joint.against >= 0) gradients_.emplace_back(row, joint.against, -1.0);

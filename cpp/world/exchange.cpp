@@ -124,7 +124,7 @@ void exchange(Archive& io, HandState& hand) {
 template <class Archive>
 void exchange(Archive& io, State& state) {
   auto& [time, q, v, acceleration, acceleration_current, load_force, friction_force, tangent, director, frame, bend_tau,
-         half_tau, contacts, obstacles, hands, contact_stiffness, motion] = state;
+         half_tau, contacts, obstacles, hands, contact_stiffness, motion, stop_rates] = state;
   io(time), io(q), io(v), io(acceleration), io(acceleration_current);
   exchange(io, load_force);
   exchange(io, friction_force);
@@ -140,6 +140,7 @@ void exchange(Archive& io, State& state) {
   auto& [known, velocity, times] = motion;
   io(known);
   for (int i : {0, 1}) io(velocity[i]), io(times[i]);
+  exchange(io, stop_rates);
 }
 
 /// Wrenches of supports.

@@ -82,6 +82,7 @@ struct World::Implementation : Built, Running {
   /// Leaves the plane of a planar scene where a parameter of the kind does.
   void leave_plane_for(const ParameterSetting& setting);
   void set(std::span<const ParameterSetting> settings, double over);
+  double shortest_ramp(const ParameterSetting& setting) const;
   void begin_ramp(const ParameterSetting& setting, double over);
   void end_ramp(const ParameterSetting& setting);
   /// Configuration of the present state.

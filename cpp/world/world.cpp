@@ -303,6 +303,13 @@ void World::Implementation::set(std::span<const ParameterSetting> settings, doub
     if (!others.empty()) set(others, over);
     return;
   }
+  if (settings.size() > 1 && std::any_of(settings.begin(), settings.end(), [&](const ParameterSetting& setting) {
+        return shortest_ramp(setting) > over;
+      })) {
+    for (const ParameterSetting& setting : settings) set({&setting, 1}, over);
+    return;
+  }
+  if (settings.size() == 1) over = std::max(over, shortest_ramp(settings.front()));
   for (const ParameterSetting& setting : settings)
     if (over > 0.0)
       begin_ramp(setting, over);
@@ -318,6 +325,14 @@ void World::Implementation::set(std::span<const ParameterSetting> settings, doub
   reaction_current = false;
   state.acceleration_current = false;
   plan_current = false;
+}
+
+/// Shortest time in which the rest angle of a servo gets to its value [s]; 0 of every other parameter. Equilibria have
+/// no time.
+double World::Implementation::shortest_ramp(const ParameterSetting& setting) const {
+  if (setting.kind != ParameterKind::joint_rest_angle || options.integrator == Integrator::statics) return 0.0;
+  const double way = std::abs(setting.values(0, 0) - parameters.joint_rest_angle[setting.owner]);
+  return way / parameters.joint_max_speed[setting.owner];
 }
 
 /// Starts a ramp from the present value.

@@ -207,7 +207,7 @@ class World {
   Matrix3 support_rotation(int support) const;
   /// The rotation that a support turns to, and when it is there [s].
   std::pair<Matrix3, double> support_turn(int support) const;
-  Reaction reaction(int support) const;      ///< of a hand: about where it is
+  Reaction reaction(int support) const;  ///< of a hand: about where it is
   /// Force and moment that a joint with a body transmits to the parts of `side`, about its node. `joint`: row of
   /// description().joints. `side`: rods and bodies at the joint.
   Reaction joint_reaction(int joint, const std::vector<RodPass>& side) const;

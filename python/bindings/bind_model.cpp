@@ -198,10 +198,14 @@ void register_joints_and_supports(py::module_& module) {
       .def_readwrite("rest_angle", &JointLink::rest_angle)
       .def_readwrite("damping", &JointLink::damping)
       .def_readwrite("moment", &JointLink::moment)
+      .def_readwrite("max_torque", &JointLink::max_torque)
+      .def_readwrite("max_speed", &JointLink::max_speed)
       .def(
           "set_stops",
-          [](JointLink& link, double low, double high, double stiffness) { link.stops = {low, high, stiffness}; },
-          py::arg("low"), py::arg("high"), py::arg("stiffness"));
+          [](JointLink& link, double low, double high, double stiffness, double restitution) {
+            link.stops = {low, high, stiffness, restitution};
+          },
+          py::arg("low"), py::arg("high"), py::arg("stiffness"), py::arg("restitution"));
 
   py::class_<JointDescription> joint(module, "JointDescription", "A node that several rods share.");
   joint.def(py::init<>())
@@ -223,7 +227,8 @@ void register_joints_and_supports(py::module_& module) {
       .def_readwrite("slides", &HandDescription::slides)
       .def_readwrite("friction", &HandDescription::friction)
       .def_readwrite("feeds", &HandDescription::feeds)
-      .def_readwrite("feed_rate", &HandDescription::feed_rate);
+      .def_readwrite("feed_rate", &HandDescription::feed_rate)
+      .def_readwrite("node", &HandDescription::node);
 
   py::class_<SupportDescription> support(module, "SupportDescription", "Something that holds a node.");
   support.def(py::init<>())

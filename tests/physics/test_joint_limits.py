@@ -48,6 +48,72 @@ def test_a_bar_rebounds_from_a_stop() -> None:
     assert_order(errors, 2.0, slack=0.7)  # the bar meets the stop at another share of a step each time
 
 
+@pytest.mark.case("bodies", "Bar that meets a stop with restitution", source="rate after over rate before")
+@pytest.mark.parametrize("integrator", ["energy_momentum", "implicit_midpoint"])
+@pytest.mark.parametrize("restitution", [0.0, 0.3, 0.8])
+@pytest.mark.parametrize("rate", [2.0, -7.0])
+def test_a_bar_leaves_a_stop_at_a_share_of_its_rate(restitution: float, rate: float, integrator: str) -> None:
+    """At either stop; the lost energy is dissipated. A restitution of 0 counts as 0.01."""
+    share = max(restitution, 0.01)
+    scene, bar, joint = hammer(limits=(-0.5, 0.5), limit_stiffness=50.0, restitution=restitution)
+    simulation = scene.build(time_step=1e-3, integrator=integrator)  # type: ignore[arg-type]
+    simulation.set_velocity(bar, (0, 0, -0.5 * LENGTH * rate), angular=(0, rate, 0))
+    energy = simulation.energy().total
+    simulation.step(round((0.6 / abs(rate) + np.pi / np.sqrt(50.0 / about_hinge()) * 3.0) / 1e-3))
+    assert simulation.joint_rate(joint) == pytest.approx(-share * rate, abs=6e-3 * abs(rate))
+    now = simulation.energy()
+    assert now.total + now.dissipated == pytest.approx(energy, rel=1e-6)
+    assert now.kinetic == pytest.approx(share**2 * energy, abs=6e-3 * energy)
+
+
+def test_the_rate_after_a_stop_converges_at_second_order() -> None:
+    """Phases of the steps at the impact vary, so that the mean over phases counts."""
+    errors = []
+    for step in (4e-3, 2e-3, 1e-3):
+        found = []
+        for phase in np.linspace(0.0, 1.0, 8, endpoint=False):
+            scene, bar, joint = hammer(limits=(-0.5, 0.5 + phase * step * 2.0), limit_stiffness=50.0, restitution=0.5)
+            simulation = scene.build(time_step=step)
+            simulation.set_velocity(bar, (0, 0, -0.5 * LENGTH * 2.0), angular=(0, 2.0, 0))
+            simulation.step(round(0.5 / step))
+            found.append(abs(simulation.joint_rate(joint) / -1.0 - 1.0))
+        errors.append(float(np.mean(found)))
+    measured(errors[-1])
+    assert_order(errors, 2.0, slack=0.7)
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.4])
+def test_a_falling_bar_comes_to_rest_on_its_stop(restitution: float) -> None:
+    """At the equilibrium angle, without a damper."""
+    scene, _, joint = hammer(9.81, limits=(-0.2, 0.3), limit_stiffness=100.0, restitution=restitution)
+    simulation = scene.build(time_step=2e-3)
+    simulation.run(3.0, progress=False)
+    angle = simulation.joint_angle(joint)
+    weight = 0.5 * MASS * 9.81 * LENGTH * np.cos(angle)
+    assert angle == pytest.approx(0.3 + weight / 100.0, rel=1e-3)
+    assert abs(simulation.joint_rate(joint)) < 1e-3
+
+
+@pytest.mark.parametrize("planar", [True, False])
+def test_rods_lose_energy_at_stops_as_their_books_say(planar: bool) -> None:
+    """A shank on a knee with stops; the total energy and what is dissipated are constant."""
+    scene = withe.Scene(gravity=(0, 0, -9.81))
+    stiff = withe.Material(youngs_modulus=1e9, density=1100.0)
+    thigh = scene.add_rod(start=(0, 0, 0), end=(0, 0, -0.1), nodes=5, radius=5e-3, material=stiff)
+    shank = scene.add_rod(start=(0, 0, -0.1), end=(0.1, 0, -0.1), nodes=5, radius=5e-3, material=stiff)
+    stops = {"limits": (-0.2, 0.4), "limit_stiffness": 5.0, "restitution": 0.5}
+    scene.join(thigh.end, shank.start, "revolute", axis=(0, 1, 0), **stops)  # type: ignore[call-overload]
+    scene.clamp(thigh.start)
+    simulation = scene.build(time_step=5e-4, planar=planar)
+    energy = simulation.energy().total
+    scale = 1100.0 * np.pi * 25e-6 * 0.1 * 9.81 * 0.05
+    for _ in range(40):
+        simulation.step(10)
+        now = simulation.energy()
+        assert now.total + now.dissipated == pytest.approx(energy, abs=1e-6 * scale)
+    assert now.dissipated > 0.05 * scale
+
+
 @pytest.mark.parametrize("integrator", ["static", "backward_euler"])
 def test_a_bar_rests_on_a_stop(integrator: str) -> None:
     """Gravity bends the stop by m g l cos / 2 k; the torque of the joint is that of gravity."""
@@ -117,6 +183,8 @@ def test_rods_rebound_from_a_stop_in_a_plane_as_in_space(planar: bool) -> None:
         ({"limits": (0.0, 0.0), "limit_stiffness": 1.0}, "must contain the drawn angle"),
         ({"limits": (np.nan, 0.2), "limit_stiffness": 1.0}, "must contain the drawn angle"),
         ({"limits": 0.2, "limit_stiffness": 1.0}, "must be two angles"),
+        ({"restitution": 0.5}, "restitution of joint 'joint 1' needs limits="),
+        ({"limits": (-1, 1), "limit_stiffness": 1.0, "restitution": 1.5}, "must be from 0 to 1, got 1.5"),
         ({"limits": (-0.1, 0.1), "limit_stiffness": -1.0}, "limit_stiffness of joint 'joint 1' must be positive"),
     ],
 )

@@ -260,7 +260,7 @@ ALL = """<mujoco model="all"><option gravity="0 0 -1.6" density="1000"/><asset>
 <hfield name="hill" nrow="2" ncol="2" size="1 1 1 1"/></asset><worldbody><geom name="floor" type="plane" size="1 1 1"/>
 <body name="one" pos="0 0 1" gravcomp="1"><joint name="j1" axis="0 1 0" range="-10 10" armature="0.1"
  frictionloss="0.2"/><geom size="0.1" mass="1"/><site name="s1"/>
-<body name="two" pos="0 0 -0.3"><joint name="j2" axis="0 1 0" actuatorfrcrange="-1 1"/>
+<body name="two" pos="0 0 -0.3"><joint name="j2" axis="0 1 0" stiffness="1" actuatorfrcrange="-1 1"/>
 <geom size="0.1" mass="1"/></body>
 </body><body name="three" pos="0.1 0 1"><joint name="j3" type="ball" damping="0.1"/>
 <geom name="g3" size="0.1" mass="1"/>
@@ -306,6 +306,33 @@ def test_a_robot_that_is_supported_gives_no_warning(name, suffix, tmp_path):
     assert [str(each.message) for each in caught] == []
 
 
+def test_limits_of_force_and_velocity_are_those_of_servos(tmp_path):
+    """The least of those of a joint and of its actuators, times their gears; both sides of a range."""
+    path = written(tmp_path, "double_pendulum", ".urdf")
+    limit = '<limit lower="-1" upper="1" effort="3" velocity="2"/></joint></robot>'
+    text = path.read_text().replace('"continuous"><parent link="upper"', '"revolute"><parent link="upper"')
+    path.write_text(text.replace("</joint></robot>", limit))
+    scene = withe.Scene()
+    robot, caught = quietly(lambda: scene.add_robot(path))
+    assert not caught
+    simulation = scene.build()
+    assert simulation.get(robot["elbow"], "max_torque") == 3.0
+    assert simulation.get(robot["elbow"], "max_speed") == 2.0
+    actuators = (
+        '<actuator><position name="a" joint="hinge" gear="4" forcerange="-0.5 0.75"/>'
+        '<motor name="b" joint="hinge" forcerange="-7 7"/></actuator>'
+    )
+    scene = withe.Scene()
+    robot, _ = quietly(lambda: scene.add_robot(mjcf(tmp_path, ARM, actuators)))
+    simulation = scene.build()
+    assert simulation.get(robot["hinge"], "max_torque") == 2.0
+    assert simulation.get(robot["hinge"], "max_speed") == np.inf
+    both = ARM.replace('axis="0 1 0"', 'axis="0 1 0" actuatorfrcrange="-1.5 1.5"')
+    scene = withe.Scene()
+    robot, _ = quietly(lambda: scene.add_robot(mjcf(tmp_path, both, actuators)))
+    assert scene.build().get(robot["hinge"], "max_torque") == 1.5
+
+
 def test_a_loop_that_an_equality_closes_is_a_warning(tmp_path):
     loop = '<equality><connect name="loop" body1="link" anchor="0.2 0 0"/></equality>'
     _, caught = quietly(lambda: withe.Scene().add_robot(mjcf(tmp_path, ARM, loop)))
@@ -321,10 +348,9 @@ def test_elements_of_urdf_that_mujoco_does_not_read_are_named(tmp_path):
     path.write_text(text.replace("</joint></robot>", limit))
     _, caught = quietly(lambda: withe.Scene().add_robot(path))
     (found,) = caught
+    assert "limits of joints" not in str(found.message)
     for line in (
         "elements <transmission> (1)",
-        "velocity limits of joints 'elbow'",
-        "force limits of joints 'elbow'",
         "equality constraints of type joint 'elbow', which the mimic of URDF is too",
     ):
         assert f"- {line}" in str(found.message), line

@@ -230,6 +230,7 @@ def test_a_drive_has_degrees_and_the_angle_at_which_the_file_draws_the_joint(tmp
             Stiffness=2 * np.radians(1.0),
             TargetPosition=50.0 * (1 - 2 * i),
             Damping=0.1 * np.radians(1.0),
+            MaxForce=0.75,
         )
         joint.GetJointEnabledAttr().Set(False)
     for i in range(2):
@@ -242,6 +243,7 @@ def test_a_drive_has_degrees_and_the_angle_at_which_the_file_draws_the_joint(tmp
         np.testing.assert_allclose(joint.axis * joint.rest_angle, (0, 0, np.radians(30.0)), atol=1e-6)
         assert joint.stiffness == pytest.approx(2.0, rel=1e-6)
         assert joint.damping == pytest.approx(0.1, rel=1e-6)
+        assert joint.max_torque == 0.75
         assert robot.unsupported == (f"disabled joints 'joint{1 - i}'",)
     scene = withe.Scene(gravity=(0, 0, 0))
     robot, _ = quietly(lambda: scene.add_robot(tmp_path / "servo.usda"))

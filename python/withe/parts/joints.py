@@ -142,5 +142,5 @@ def _describe_link(parent: int, child: int, join: JoinPart) -> _core.JointLink:
     for word in kind_of(join).words:
         setattr(link, word.name, getattr(join, word.name))
     if join.limits is not None:
-        link.set_stops(*join.limits, join.limit_stiffness)
+        link.set_stops(*join.limits, join.limit_stiffness, join.restitution)
     return link

@@ -56,7 +56,8 @@ FluidModel = Literal["stokeslets", "resistive"]
 LoadKind = Literal["force", "moment", "load", "pressure"]
 SupportKind = Literal["pin", "clamp", "hold_edge", "spinning_clamp", "spinning_edge", "hand"]
 GuidePlace = Literal["start", "middle", "end"]
-Guide = tuple[int, int, GuidePlace]  # of a tendon: rod, edge of the rod, where along it
+# Guide of a tendon: rod, edge of the rod, place along the edge; or -1 - body, point of the body, "middle".
+Guide = tuple[int, int, GuidePlace]
 LOAD_KINDS: tuple[str, ...] = get_args(LoadKind)
 SUPPORT_KINDS: tuple[str, ...] = get_args(SupportKind)
 
@@ -166,8 +167,11 @@ class JoinPart(Part):
     rest_angle: float = 0.0  # [rad]
     damping: float = 0.0  # [N m s/rad]
     moment: float = 0.0  # [N m]
+    max_torque: float = np.inf  # of the spring [N m]
+    max_speed: float = np.inf  # of the rest angle [rad/s]
     limits: tuple[float, float] | None = None  # [rad]
     limit_stiffness: float = 0.0  # [N m/rad]
+    restitution: float = 1.0  # of the stops [-]
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,6 +187,7 @@ class Grasp:
     slides: bool = False  # a ring, which the rod passes through
     friction: float = 0.0  # of a ring [-]
     feed_rate: float | None = None  # at first, where a drive holds the rod along itself [m/s]
+    by: Pass | None = None  # point of a rigid body that carries a ring
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,7 +236,7 @@ class SpringPart(Part):
 
 @dataclass(frozen=True, eq=False)
 class TendonPart(Part):
-    """A tendon through guides on edges and ends of rods."""
+    """A tendon through guides on edges and ends of rods, and on points of rigid bodies."""
 
     guides: tuple[Guide, ...]
     offsets: FloatArray  # of each guide along d1 and d2 of its edge, (guides, 2) [m]

@@ -56,7 +56,7 @@ from withe.parts.kinds import (
 )
 from withe.parts.parameters import NATURAL_WORDS, ROD_WORDS
 from withe.parts.torsion_springs import TORSION_SPRING
-from withe.parts.words import PartKind, RowOf, Word, angle
+from withe.parts.words import PartKind, RowOf, Word, angle, limit
 
 __all__ = [
     "KINDS",
@@ -192,6 +192,8 @@ KINDS: tuple[PartKind, ...] = (
                 is_linear=True,
                 is_ramped=True,
                 is_positive=True,
+            Word("max_torque", "N m", limit, _turns),
+            Word("max_speed", "rad/s", limit, _turns, has_gradient=False),
             ),
             Word("rest_angle", "rad", angle, _turns, is_ramped=True),
             Word("damping", "N m s/rad", validation.non_negative, _turns, is_ramped=True, is_positive=True),

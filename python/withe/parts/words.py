@@ -15,7 +15,7 @@ from withe.parts.handles import Handle
 from withe.parts.kinds import Part, Pass
 from withe.parts.plausibility import check_angle
 
-__all__ = ["DirectorsOf", "Outline", "PartKind", "RowOf", "Word", "angle"]
+__all__ = ["DirectorsOf", "Outline", "PartKind", "RowOf", "Word", "angle", "limit"]
 
 Check = Callable[[Any, str], Any]
 RowOf = Callable[[Pass], int]
@@ -111,3 +111,10 @@ def angle(value: Any, what: str) -> float:
     number = validation.number(value, what)
     check_angle(number, what)
     return number
+
+
+def limit(value: Any, what: str) -> float:
+    """A positive number; infinity is no limit."""
+    if isinstance(value, float | np.floating) and value == np.inf:
+        return np.inf
+    return validation.positive(value, what)

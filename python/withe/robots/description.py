@@ -73,6 +73,8 @@ class RobotJoint:
         Least and greatest angle [rad], or displacement [m].
     limit_stiffness : float or None
         Stiffness of the stops [N m/rad], or [N/m].
+    max_torque, max_speed : float
+        Greatest torque [N m] or force [N] of what drives the joint, and its greatest rate [rad/s] or [m/s].
     """
 
     name: str
@@ -86,6 +88,8 @@ class RobotJoint:
     damping: float = 0.0
     limits: tuple[float, float] | None = None
     limit_stiffness: float | None = None
+    max_torque: float = np.inf
+    max_speed: float = np.inf
 
 
 @dataclass(frozen=True, eq=False)

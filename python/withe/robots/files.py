@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,12 +28,15 @@ class CompiledRobot:
         Content that MuJoCo does not read.
     has_gravity : bool
         True if the format of the file states gravity.
+    velocities : mapping of str to float
+        Greatest rates of joints of URDF [rad/s] or [m/s], which MuJoCo does not read.
     """
 
     name: str
     model: Any
     ignored: tuple[str, ...]
     has_gravity: bool
+    velocities: Mapping[str, float]
 
 
 def compiled(path: Path) -> CompiledRobot:
@@ -77,7 +81,7 @@ def compiled(path: Path) -> CompiledRobot:
             raise FileNotFoundError(f"{path}: a mesh or another file is missing: {message}") from None
         raise ValueError(f"{path}: MuJoCo cannot read the robot: {message}") from None
     name = root.get("name") or root.get("model") or path.stem
-    return CompiledRobot(name, model, ignored, root.tag == "mujoco")
+    return CompiledRobot(name, model, ignored, root.tag == "mujoco", _velocities(root))
 
 
 def _prepare_urdf(root: ElementTree.Element, path: Path) -> None:
@@ -141,15 +145,18 @@ def _ignored(root: ElementTree.Element) -> tuple[str, ...]:
         number = len(list(root.iter(tag)))
         if number:
             found.append(f"elements <{tag}> ({number})")
-    fast = [joint.get("name", "") for joint in root.iter("joint") for limit in joint.iter("limit") if _limits(limit)]
-    if fast:
-        found.append(f"velocity limits of joints {', '.join(map(repr, fast))}")
     return tuple(found)
 
 
-def _limits(limit: ElementTree.Element) -> bool:
-    """Return True if the velocity has a limit."""
-    try:
-        return 0.0 < float(limit.get("velocity", "0")) < 1e3
-    except ValueError:
-        return False
+def _velocities(root: ElementTree.Element) -> dict[str, float]:
+    """Return the greatest rates of the joints of URDF. Zero, and 1000 and more, stand for no limit."""
+    found = {}
+    for joint in root.findall("joint"):
+        limit = joint.find("limit")
+        try:
+            rate = 0.0 if limit is None else float(limit.get("velocity", "0"))
+        except ValueError:
+            continue
+        if 0.0 < rate < 1e3:
+            found[joint.get("name", "")] = rate
+    return found

@@ -14,7 +14,7 @@ from withe.common.extras import require
 from withe.robots.composing import MassProperties, free_place, massless_base, united
 from withe.robots.description import RobotBody, RobotDescription, RobotJoint
 from withe.robots.files import CompiledRobot, compiled
-from withe.robots.mujoco_joints import BALL, FREE, HINGE, SLIDE, stops_of
+from withe.robots.mujoco_joints import BALL, FREE, HINGE, SLIDE, greatest_torque, has_force_limit, stops_of
 from withe.robots.names import name_of
 from withe.robots.shapes import drawn_geoms, solid_of
 from withe.robots.unsupported import listed, unsupported_content
@@ -97,7 +97,7 @@ class _Reader:
         return RobotDescription(self._robot.name, tuple(bodies), joints, points, self._size, gravity, unsupported)
 
     def _needs_base(self, joint: int) -> bool:
-        """Return True if a joint to the world has a spring, a damper, a motor or limits, which supports lack."""
+        """Return True if a joint to the world has a spring, a damper, a motor or a limit, which supports lack."""
         model = self._model
         body, dof = int(model.jnt_bodyid[joint]), int(model.jnt_dofadr[joint])
         is_first = joint == int(model.body_jntadr[body])  # the others connect two bodies
@@ -107,6 +107,7 @@ class _Reader:
         motors = np.asarray(model.actuator_trnid, dtype=int).reshape(-1, 2)[:, 0]
         transmits = np.asarray(model.actuator_trntype, dtype=int) <= 1  # mjTRN_JOINT, mjTRN_JOINTINPARENT
         limited = stops_of(model, joint)[0] is not None
+        limited = limited or has_force_limit(model, joint)
         return bool(limited or model.jnt_stiffness[joint] or model.dof_damping[dof] or joint in motors[transmits])
 
     def _extent(self) -> float:
@@ -178,8 +179,10 @@ class _Reader:
                     at = free_place(at, axis, taken, self._size)
                 for owner in owners:
                     used.setdefault(owner, []).append(at)
-                values = (*self._spring(joint), *stops_of(model, joint))
-                found.append(RobotJoint(name_of(model, "joint", joint), _KINDS[kind], parent, child, at, axis, *values))
+                name = name_of(model, "joint", joint)
+                servo = (greatest_torque(model, joint), self._robot.velocities.get(name, np.inf))
+                values = (*self._spring(joint), *stops_of(model, joint), *servo)
+                found.append(RobotJoint(name, _KINDS[kind], parent, child, at, axis, *values))
                 parent = child
         return tuple(found)
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from withe.robots.mujoco_joints import BALL, stops_of
+from withe.robots.mujoco_joints import BALL, greatest_torque, has_force_limit, stops_of
 from withe.robots.names import name_of
 
 __all__ = ["listed", "unsupported_content"]
@@ -62,7 +62,11 @@ def _of_joints(model: Any) -> Iterator[str]:
         "limits that exclude the drawn place of joints": {
             joint for joint in limited - without_spring if stops_of(model, joint)[0] is None
         },
-        "force limits of joints": of_joints(model.jnt_actfrclimited),
+        "force limits of joints": {
+            joint
+            for joint in range(len(kind))
+            if has_force_limit(model, joint) and not np.isfinite(greatest_torque(model, joint))
+        },
         "armature of joints": of_dofs(model.dof_armature),
         "friction loss of joints": of_dofs(model.dof_frictionloss),
         "damping of ball and free joints": of_dofs(model.dof_damping) & without_spring,

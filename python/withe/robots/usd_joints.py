@@ -45,6 +45,8 @@ class UsdJoint:
         The second body turns or moves positively about or along it.
     stiffness, rest_angle, damping : float
         As in `Scene.join`, for the second body against the first.
+    max_torque : float
+        Greatest torque [N m] or force [N] of the drive.
     """
 
     prim: Any
@@ -55,6 +57,7 @@ class UsdJoint:
     stiffness: float
     rest_angle: float
     damping: float
+    max_torque: float
 
 
 def joint_of(prim: Any, body_at: Callable[[Any], int | None], units: StageUnits, size: float) -> UsdJoint | None:
@@ -101,9 +104,10 @@ def joint_of(prim: Any, body_at: Callable[[Any], int | None], units: StageUnits,
     # A body that is not fixed has the origin of the joint that moves with it.
     at = ends[1].place if bodies[1] is not None else ends[0].place
     spring = (0.0, 0.0, 0.0) if axis is None else _spring(prim, kind, ends, axis, units)
+    most = np.inf if axis is None else _greatest_torque(prim, kind, units)
     if bodies[1] is None:  # the second body is the one that moves
         bodies, axis = (None, bodies[0]), None if axis is None else -axis
-    return UsdJoint(prim, kind, bodies, at, axis, *spring)
+    return UsdJoint(prim, kind, bodies, at, axis, *spring, most)
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +153,7 @@ def _spring(prim: Any, kind: Kind, ends: list[_End], axis: FloatArray, units: St
     Angles of USD are in degrees, also in stiffness and damping.
     """
     word = _drive(prim, kind)
-    if str(prim.GetAttribute(word + "type").Get() or "force") != "force":
+    if _is_by_acceleration(prim, kind):
         return 0.0, 0.0, 0.0
     degrees = kind == "revolute"
     rate = units.mass * units.length**2 * np.degrees(1.0) if degrees else units.mass
@@ -164,6 +168,18 @@ def _spring(prim: Any, kind: Kind, ends: list[_End], axis: FloatArray, units: St
     else:
         now = (ends[1].place - ends[0].place) @ axis
     return stiffness, float(target - now), damping
+
+
+def _greatest_torque(prim: Any, kind: Kind, units: StageUnits) -> float:
+    """Return the greatest torque or force of the drive, or infinity."""
+    limit = _number(prim, _drive(prim, kind) + "maxForce", np.inf)
+    if not limit > 0.0 or _is_by_acceleration(prim, kind):
+        return np.inf
+    return limit * units.mass * (units.length**2 if kind == "revolute" else units.length)
+
+
+def _is_by_acceleration(prim: Any, kind: Kind) -> bool:
+    return str(prim.GetAttribute(_drive(prim, kind) + "type").Get() or "force") != "force"
 
 
 def _across(axis: FloatArray) -> FloatArray:
@@ -184,9 +200,10 @@ def unsupported_of_joint(prim: Any) -> list[str]:
         found.append("limits of joints")
     if kind in ("revolute", "sliding"):
         word = _drive(prim, kind)
-        if str(prim.GetAttribute(word + "type").Get() or "force") != "force":
+        most = _number(prim, word + "maxForce", np.inf)
+        if _is_by_acceleration(prim, kind):
             found.append("drives by acceleration of joints")
-        if np.isfinite(_number(prim, word + "maxForce", np.inf)):
+        if np.isfinite(most) and (_is_by_acceleration(prim, kind) or not most > 0.0):
             found.append("force limits of joints")
         if _number(prim, word + "targetVelocity"):
             found.append("target velocities of joints")

@@ -278,7 +278,8 @@ class _Reader:
                 used.setdefault(owner, []).append(at)
             assert child is not None
             assert joint.kind != "fixed"  # `_tree` leaves these joints out
-            found.append(RobotJoint(name, joint.kind, parent, child, at, axis, joint.stiffness, rest, joint.damping))
+            spring = (joint.stiffness, rest, joint.damping)
+            found.append(RobotJoint(name, joint.kind, parent, child, at, axis, *spring, max_torque=joint.max_torque))
         return tuple(found)
 
     def _frames(self) -> Iterator[tuple[str, Any, int]]:

@@ -19,8 +19,10 @@ __all__ = ["JoinedNodes"]
 
 FloatArray = npt.NDArray[np.float64]
 
-Stops = tuple[tuple[float, float] | None, float | None]
-"""Limits and the stiffness of stops, as given."""
+Stops = tuple[tuple[float, float] | None, float | None, float]
+"""Limits, stiffness and restitution of stops, as given."""
+Numbers = tuple[float, float, float, float, float, float]
+"""Values of the words of a joint, in their order."""
 
 _ORDINALS = ("first", "second", "third", "fourth")
 
@@ -41,7 +43,7 @@ class JoinedNodes:
         kind: JoinKind,
         axis: npt.ArrayLike | None,
         form: JointForm,
-        numbers: tuple[float, float, float, float],
+        numbers: Numbers,
         stops: Stops,
         name: str | None,
     ) -> list[JoinPart]:
@@ -122,7 +124,7 @@ class JoinedNodes:
         kind: JoinKind,
         axis: npt.ArrayLike | None,
         form: JointForm,
-        numbers: tuple[float, float, float, float],
+        numbers: Numbers,
         stops: Stops,
     ) -> JoinPart:
         (node_a, name_a), (node_b, name_b) = a, b
@@ -138,7 +140,7 @@ class JoinedNodes:
             raise ValueError("a sliding joint must slide on a body: a rod slides through a ring of grasp(slides=True)")
         words = [word.name for word in kind_of(JoinPart).words]
         values = {word: checked(JoinPart, word, value, name) for word, value in zip(words, numbers, strict=True)}
-        given = next((word for word in words if values[word] != 0.0), None)
+        given = next((word for word in words if values[word] != getattr(JoinPart, word)), None)
         if given is not None and not has_axis:
             raise ValueError(f"{given} of joint {name!r} needs kind='revolute' or kind='sliding', got kind={kind!r}")
         if form == "pairs" and min(node_a[0], node_b[0]) < 0:
@@ -153,7 +155,7 @@ class JoinedNodes:
                 f"nodes {name_a!r} and {name_b!r} must coincide to be joined, but are {distance:g} m apart"
             )
         direction = None if axis is None else validation.unit_vector(axis, "axis of the joint")
-        limits, stiffness = _stops(stops, name, kind if has_axis else None)
+        limits, stiffness, restitution = _stops(stops, name, kind if has_axis else None)
         return JoinPart(
             name,
             (node_a, node_b),
@@ -164,6 +166,7 @@ class JoinedNodes:
             **values,
             limits=limits,
             limit_stiffness=stiffness,
+            restitution=restitution,
         )
 
     def _extent(self) -> float:
@@ -182,13 +185,15 @@ class JoinedNodes:
         return float(np.linalg.norm(high - low))
 
 
-def _stops(stops: Stops, name: str, kind: str | None) -> tuple[tuple[float, float] | None, float]:
-    """Return checked limits and the stiffness of their stops; `kind` is None for a joint without an axis."""
-    limits, stiffness = stops
+def _stops(stops: Stops, name: str, kind: str | None) -> tuple[tuple[float, float] | None, float, float]:
+    """Return checked limits, stiffness and restitution of stops; `kind` is None for a joint without an axis."""
+    limits, stiffness, given = stops
+    restitution = validation.share(given, f"restitution of joint {name!r}")
     if limits is None:
-        if stiffness is not None:
-            raise ValueError(f"limit_stiffness of joint {name!r} needs limits=")
-        return None, 0.0
+        word = "limit_stiffness" if stiffness is not None else "restitution" if restitution < 1.0 else None
+        if word is not None:
+            raise ValueError(f"{word} of joint {name!r} needs limits=")
+        return None, 0.0, 1.0
     if kind is None:
         raise ValueError(f"limits of joint {name!r} need kind='revolute' or kind='sliding'")
     try:
@@ -202,4 +207,4 @@ def _stops(stops: Stops, name: str, kind: str | None) -> tuple[tuple[float, floa
             f"limits of joint {name!r} need limit_stiffness=: the greatest torque that the stops must bear, over the "
             "angle by which they may yield"
         )
-    return (low, high), validation.positive(stiffness, f"limit_stiffness of joint {name!r}")
+    return (low, high), validation.positive(stiffness, f"limit_stiffness of joint {name!r}"), restitution

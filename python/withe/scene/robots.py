@@ -131,8 +131,8 @@ def _add_joint(
 ) -> Joint | Support:
     child = bodies[joint.child]
     if joint.parent is not None:
-        own = () if axis is None else ("stiffness", "rest_angle", "damping", "limits", "limit_stiffness")
-        words = {word: getattr(joint, word) for word in own}
+        own = ("stiffness", "rest_angle", "damping", "limits", "limit_stiffness", "max_torque", "max_speed")
+        words = {} if axis is None else {word: getattr(joint, word) for word in own}
         found: Joint = scene.join(bodies[joint.parent], child, joint.kind, at=at, axis=axis, name=name, **words)
         return found
     hold: Callable[..., Support] = scene.pin if joint.kind == "pinned" else scene.clamp

@@ -444,8 +444,11 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         rest_angle: float = 0.0,
         damping: float = 0.0,
         moment: float = 0.0,
+        max_torque: float = np.inf,
+        max_speed: float = np.inf,
         limits: tuple[float, float] | None = None,
         limit_stiffness: float | None = None,
+        restitution: float = 1.0,
         name: str | None = None,
     ) -> Joint: ...
 
@@ -465,8 +468,11 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         rest_angle: float = 0.0,
         damping: float = 0.0,
         moment: float = 0.0,
+        max_torque: float = np.inf,
+        max_speed: float = np.inf,
         limits: tuple[float, float] | None = None,
         limit_stiffness: float | None = None,
+        restitution: float = 1.0,
         name: str | None = None,
     ) -> tuple[Joint, ...]: ...
 
@@ -483,8 +489,11 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         rest_angle: float = 0.0,
         damping: float = 0.0,
         moment: float = 0.0,
+        max_torque: float = np.inf,
+        max_speed: float = np.inf,
         limits: tuple[float, float] | None = None,
         limit_stiffness: float | None = None,
+        restitution: float = 1.0,
         name: str | None = None,
     ) -> Joint | tuple[Joint, ...]:
         """Join two or more coincident nodes rigidly, by a pin or by a hinge.
@@ -499,6 +508,7 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
             moment - stiffness (theta - rest_angle) - damping dtheta/dt,
 
         and on `a` with the opposite torque. For a servo, give a stiffness and move `rest_angle` by `Simulation.set`.
+        `max_torque` limits the part with the stiffness: beyond it, the servo has a constant torque.
         For a sliding joint theta is the displacement of `b` along the axis [m], and the torque is a force. Stiffness is
         then in N/m, rest_angle in m, damping in N s/m and moment in N.
         `Simulation.joint_angle` returns theta.
@@ -525,12 +535,20 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
             Damping coefficient of a revolute joint.
         moment : float [N m]
             Torque of the motor of a revolute joint. Its work is part of `energy().loads`.
+        max_torque : float [N m]
+            Greatest torque of the spring. The energy of the spring grows linearly beyond it. The damper has no limit.
+        max_speed : float [rad/s]
+            Greatest rate of the rest angle. `Simulation.set` and `actuate` then ramp `rest_angle` to its value in the
+            time that this rate needs, or in `over` if that is longer. Integrator "static" has no rates.
         limits : tuple of two floats [rad]
             Least and greatest angle; one of them may be infinite. Beyond a limit a stop pushes back with the torque
-            `limit_stiffness` times the angle beyond it. The joint rebounds from a stop without loss, but for its
-            damping.
+            `limit_stiffness` times the angle beyond it.
         limit_stiffness : float [N m/rad]
             Stiffness of the stops. It must be given with `limits`.
+        restitution : float [-]
+            Rate of the joint after it has met a stop, over the rate before, from 0 to 1. With 1 the joint rebounds
+            without loss. Below 1, the stop is damped by the rate at which the joint has met it [Hunt and Crossley 1975,
+            J. Appl. Mech. 42], and 0 counts as 0.01.
         name : str
             Name of the joint. Several joints are named "NAME 1", "NAME 2", ...
 
@@ -543,13 +561,15 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         ------
         ValueError
             Nodes further apart than 1e-9 of the scene, a node given twice, contradicting joints at one node, or an
-            axis, stiffness, rest_angle, damping, moment or limits for a joint without an axis. Limits that exclude the
-            drawn angle, or have no stiffness. Then no node is joined.
+            axis, stiffness, rest_angle, damping, moment, max_torque, max_speed or limits for a joint without an axis.
+            Limits that exclude the drawn angle, or have no stiffness; a restitution without limits. Then no node is
+            joined.
 
         See Also
         --------
         add_torsion_spring : Add a torsion spring without a joint.
         Simulation.joint_angle : Angle of a revolute joint.
+        Simulation.reaction : Force and moment that a joint with a body transmits.
 
         Examples
         --------
@@ -568,9 +588,8 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
             if kind != "rigid":
                 raise ValueError(f"kind of the joint must be given once, got {others[-1]!r} and {kind!r}")
             kind = cast(JoinKind, nodes.pop())
-        Simulation.reaction : Force and moment that a joint with a body transmits.
-        numbers = (stiffness, rest_angle, damping, moment)
-        stops = (limits, limit_stiffness)
+        numbers = (stiffness, rest_angle, damping, moment, max_torque, max_speed)
+        stops = (limits, limit_stiffness, restitution)
         parts = self._joints.join(nodes, at, kind, axis, form, numbers, stops, name)
         joints = tuple(cast(Joint, self._directory.add(part)) for part in parts)
         return joints if len(joints) > 1 else joints[0]

@@ -121,6 +121,8 @@ class JointWords(TypedDict, Generic[N], total=False):
     rest_angle: N
     damping: N
     moment: N
+    max_torque: N
+    max_speed: N
 
 
 class TorsionWords(TypedDict, Generic[N], total=False):
@@ -194,7 +196,7 @@ LoadVector = Literal["force", "moment", "load"]
 MassWord = Literal["mass"]
 SpringWord = Literal["stiffness", "rest_length", "damping"]
 TendonWord = Literal["tension"]
-JointWord = Literal["stiffness", "rest_angle", "damping", "moment"]
+JointWord = Literal["stiffness", "rest_angle", "damping", "moment", "max_torque", "max_speed"]
 TorsionWord = Literal["stiffness", "rest_angle", "angle"]
 DragWord = Literal["drag"]
 FluidNumber = Literal["viscosity"]
