@@ -13,6 +13,9 @@
 /// because the first part of E is minimal with respect to a. Without friction the force is perpendicular to the rod. E
 /// does not depend on the axes of the ring, so the forces have no moment about p.
 ///
+/// A ring on a rigid body is a point p that the body carries. E depends on x_i - p alone, so that the force on p is the
+/// opposite of the sum of those on the nodes, and its derivatives follow from theirs.
+///
 /// T pulls the rod back by P = T s' |c'| / D (by T itself if the rod is not stretched). Friction holds up to
 /// |P| = mu k |r| [Coulomb], and a drive up to its force limit. Beyond the limit the slip grows so that P stays at the
 /// limit (return mapping, as in forces/hand.hpp).

@@ -91,6 +91,12 @@ int half_at(const Model& model, int edge, bool frame_first) {
 
 GuideSeat seat_of(const Model& model, const TendonGuide& guide, const Vector2& offset) {
   GuideSeat seat;
+  if (guide.on_body()) {
+    seat.edge = -1;
+    seat.node = guide.edge;
+    seat.offset.setZero();
+    return seat;
+  }
   seat.edge = model.rod_first_edge[at(guide.rod)] + guide.edge;
   seat.share = guide.place == GuidePlace::start ? 0.0 : guide.place == GuidePlace::end ? 1.0 : 0.5;
   seat.offset = offset;
@@ -105,7 +111,7 @@ GuideSeat seat_of(const Model& model, const TendonGuide& guide, const Vector2& o
 
 /// True if a piece follows a rod; sets the signs of tangents.
 bool follows(const Neighbours& neighbours, const Model& model, GuideSeat (&seat)[2]) {
-  const auto middle = [](const GuideSeat& of) { return of.half < 0 && of.share == 0.5; };
+  const auto middle = [](const GuideSeat& of) { return of.on_edge() && of.share == 0.5; };
   if (middle(seat[0]) && middle(seat[1])) {
     const auto found = neighbours.find({seat[0].edge, seat[1].edge});
     if (found == neighbours.end()) return false;
@@ -132,6 +138,10 @@ SegmentUnknowns unknowns_of(const Model& model, const TendonSegment& segment) {
   for (int k = 0; k < 2; ++k) {
     const GuideSeat& seat = segment.seat[k];
     GuideUnknowns& u = out.guide[k];
+    if (seat.on_body()) {
+      u.node = place_of(model.node_dof[at(seat.node)], model.dimension);
+      continue;
+    }
     if (seat.half < 0) {
       u.tail = place_of(model.tail_dof[at(seat.edge)], model.dimension);
       if (!model.planar()) u.angle = place_of(model.edge_dof[at(seat.edge)], 1);
@@ -205,14 +215,14 @@ void add_local(const Model& model, const TendonSegment& segment, double tension,
     auto rows = work.gradient.template segment<kTurns>(kTurns * k);
     if (seat.half >= 0) {
       rows = turn_of(model, segment, k, now.guide[k], q, c).transpose() * m;
-    } else {
+    } else if (seat.on_edge()) {
       const Vector3 t = to_eigen(e.tangent);
       const double about = m.dot(t);
       rows.template head<3>() = e.inverse_length * m.cross(t) + about * to_eigen(e.spin) + axial * t;
       rows(3) = about;
     }
     if constexpr (width == kStraight) work.gradient.template segment<3>(kSmooth + 3 * k) = direction(k) * pull.g;
-    if (!by) continue;
+    if (!by || seat.on_body()) continue;
     work.own(k) += seat.half < 0 ? edge_curvature(e, by->turn[k], carried, axial)
                                  : frame_curvature(model, seat, by->turn[k], carried, q, c);
   }

@@ -2,8 +2,9 @@
 /// A tendon runs without friction through guides on rods and has one tension T [N] [Rucker and Webster 2011, IEEE
 /// Trans. Robot. 27]. A guide is at p = x + r with r = a d1 + b d2, where x is a place on an edge and (a, b) [m] an
 /// offset along the edge's material directors. At a rod's end that is rigid with a joint or a clamp, the guide is on
-/// that joint or clamp. The tendon's forces are minus the gradient of T L. Its length L is a sum over pieces from one
-/// guide to the next. A straight piece has L = |p' - p|. A piece between neighbours of one rod has
+/// that joint or clamp. A guide on a rigid body is a point that the body carries, with r = 0. The tendon's forces are
+/// minus the gradient of T L. Its length L is a sum over pieces from one guide to the next. A straight piece has L =
+/// |p' - p|. A piece between neighbours of one rod has
 ///   L^2 = (l + A)^2 + r^2 - B^2,   A = 4 B / 3 - p / 6,
 /// with r = r' - r, s = t + t', p = s . r and B = p / |s|. The length l reaches from the middle of an edge to the
 /// middle of the next edge, or to the wall. It is half of each edge, but 5/12 at a frame and 7/12 on the other side of
@@ -33,13 +34,17 @@ namespace withe {
 constexpr int kTendonUnknowns = 14;
 using TendonLocal = LocalOf<kTendonUnknowns>;
 
-/// Seat of a guide: an edge, or a frame.
+/// Seat of a guide: an edge, a frame, or a node that a body carries.
 struct GuideSeat {
-  int edge = 0;
+  int edge = 0;        ///< -1: a node
+  int node = -1;       ///< of a body
   double share = 0.5;  ///< along the edge, 0 at its tail
   int half = -1;       ///< stencil between edge and frame, if the guide is on the attached part; else -1
   double sign = 1.0;   ///< sign of the tangent along the tendon
   Vector2 offset;      ///< along d1, d2; in a plane (normal x tangent, unused) [m]
+
+  bool on_body() const { return node >= 0; }
+  bool on_edge() const { return node < 0 && half < 0; }
 };
 
 /// Indices of the unknowns of the seat of a guide among the unknowns of its segment; -1: none.

@@ -48,6 +48,10 @@ struct Links {
       const GuideUnknowns& u = segment.unknowns.guide[k];
       const double share = segment.seat[k].share;
       const int turn = kTurns * k, angle = turn + 3, place = kSmooth + 3 * k;
+      if (segment.seat[k].on_body()) {
+        add({u.node, place, n, 1.0});
+        continue;
+      }
       if (u.frame < 0) {
         add({u.head, turn, n, 1.0});
         add({u.tail, turn, n, -1.0});
@@ -113,6 +117,12 @@ inline int node_dof_at(const Model& model, const GuideSeat& seat) {
   return model.half[at(seat.half)].frame_first ? model.tail_dof[at(seat.edge)] : model.head_dof[at(seat.edge)];
 }
 
+/// Frame of a seat; of a node that of space, which no force depends on.
+inline EdgeFrame<double> frame_at(const Model& model, const GuideSeat& seat, const Configuration& c) {
+  if (seat.on_body()) return {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}, 0.0, {}, {}};
+  return in_space(model, seat.half < 0 ? c.edge[at(seat.edge)] : c.attached[at(seat.half)]);
+}
+
 /// A guide somewhere.
 struct Guide {
   EdgeFrame<double> frame;
@@ -122,12 +132,14 @@ struct Guide {
   /// `node(dof)`: where a node is.
   template <class NodeAt>
   Guide(const Model& model, const GuideSeat& seat, const NodeAt& node, const Configuration& c)
-      : frame(in_space(model, seat.half < 0 ? c.edge[at(seat.edge)] : c.attached[at(seat.half)])),
+      : frame(frame_at(model, seat, c)),
         arm(to_eigen(frame.d1) * seat.offset.x() + to_eigen(frame.d2) * seat.offset.y()),
         tangent(seat.sign * to_eigen(frame.tangent)),
         point(arm),
-        length(seat.half < 0 ? c.length[seat.edge] : 0.0) {
-    if (seat.half >= 0)
+        length(seat.on_edge() ? c.length[seat.edge] : 0.0) {
+    if (seat.on_body())
+      point += node(model.node_dof[at(seat.node)]);
+    else if (seat.half >= 0)
       point += node(node_dof_at(model, seat));
     else
       point +=
@@ -181,6 +193,7 @@ inline Turn turn_of(const Model& model, const TendonSegment& of, int k, const Gu
                     const Configuration& c) {
   Turn out = Turn::Zero();
   const GuideSeat& seat = of.seat[k];
+  if (seat.on_body()) return out;
   if (seat.half < 0) {
     out << edge_turn(guide.frame), to_eigen(guide.frame.tangent);
   } else if (model.planar()) {
@@ -212,7 +225,7 @@ struct Changes {
       } else {
         tangent[k] = -cross_matrix(guide.tangent) * turn[k];
         sum.template middleCols<kTurns>(kTurns * k) = tangent[k];
-        if (of.seat[k].half < 0)
+        if (of.seat[k].on_edge())
           span.template segment<3>(kTurns * k) = of.span[k] * to_eigen(guide.frame.tangent).transpose();
       }
     }

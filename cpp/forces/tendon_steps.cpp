@@ -23,6 +23,7 @@ struct WorkingTurn {
 
   WorkingTurn(const Model& model, const GuideSeat& seat, const Guide& start, const Guide& end, const DiscreteStep& step,
               const Vector3& m, bool with_matrix) {
+    if (seat.on_body()) return;
     if (seat.half < 0)
       follow_edge(model, seat, start.frame, end.frame, step, m, with_matrix);
     else if (model.planar())
@@ -87,7 +88,7 @@ void add_discrete(const Model& model, const TendonSegment& segment, double tensi
     const WorkingTurn working(model, seat, start, end, step, m, with_matrix);
     auto rows = work.gradient.template segment<kTurns>(kTurns * k);
     rows = working.columns.transpose() * m;
-    const bool axial = width == kSmooth && seat.half < 0;
+    const bool axial = width == kSmooth && seat.on_edge();
     const Vector3 t1 = to_eigen(end.frame.tangent);
     const double lengths = start.length + end.length;
     Vector3 along = Vector3::Zero();  // (e0 + e1) / (l0 + l1)

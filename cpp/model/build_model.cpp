@@ -627,10 +627,14 @@ class Builder {
     for (const TorsionDescription& torsion : scene_.torsions)
       connect(scene_.rods[static_cast<std::size_t>(torsion.rods[0])].nodes[0],
               scene_.rods[static_cast<std::size_t>(torsion.rods[1])].nodes[0]);
+    const auto node_of_guide = [&](const TendonGuide& guide) {
+      return guide.on_body() ? guide.edge : scene_.rods[static_cast<std::size_t>(guide.rod)].nodes[0];
+    };
     for (const TendonDescription& tendon : scene_.tendons)
       for (const TendonGuide& guide : tendon.guides)
-        connect(scene_.rods[static_cast<std::size_t>(tendon.guides.front().rod)].nodes[0],
-                scene_.rods[static_cast<std::size_t>(guide.rod)].nodes[0]);
+        connect(node_of_guide(tendon.guides.front()), node_of_guide(guide));
+    for (const SupportDescription& support : scene_.supports)
+      if (support.hand.node >= 0) connect(support.hand.node, global_node(support.pass));
     for (const Cluster& cluster : clusters_)
       for (const RodPass& pass : cluster.passes) connect(global_node(cluster.passes.front()), global_node(pass));
     for (const CarriedPart& carried : model_.carried)
@@ -726,9 +730,12 @@ void check_tendon(const SceneDescription& scene, const TendonDescription& tendon
           "tension of a tendon must be finite and not negative, got " + std::to_string(tendon.tension));
   const TendonGuide* before = nullptr;
   for (const TendonGuide& guide : tendon.guides) {
-    require(guide.rod >= 0 && guide.rod < static_cast<int>(scene.rods.size()) && guide.edge >= 0 &&
-                guide.edge < scene.rods[static_cast<std::size_t>(guide.rod)].rest_lengths.size(),
-            "guide of a tendon must lie on an edge of the scene");
+    if (guide.on_body())
+      require(is_there(scene, {guide.rod, guide.edge}), "guide of a tendon must be a point of a body of the scene");
+    else
+      require(guide.rod < static_cast<int>(scene.rods.size()) && guide.edge >= 0 &&
+                  guide.edge < scene.rods[static_cast<std::size_t>(guide.rod)].rest_lengths.size(),
+              "guide of a tendon must lie on an edge of the scene");
     require(!before || *before != guide, "a tendon must run from each guide to another");
     before = &guide;
   }

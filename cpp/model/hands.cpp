@@ -36,6 +36,7 @@ void find_touched(const Model& model, Support& hand) {
   require(own.length >= 0.0 && std::isfinite(own.at) && own.length <= whole + slack,
           "a hand must be no longer than its rod");
   const double from = own.at - 0.5 * own.length, to = own.at + 0.5 * own.length;
+  require(own.node < 0 || (own.slides && own.node < model.node_count), "only a ring may be on a body");
   require(description.closed || (from >= -slack && to <= whole + slack), "a hand must be on its rod");
   hand.touched.clear();
   hand.at_edge = -1;

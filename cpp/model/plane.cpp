@@ -20,6 +20,7 @@ bool isotropic(const RodDescription& rod) {
 /// From the centreline to a guide of a tendon, as drawn [m].
 Vector3 guide_arm(const SceneDescription& scene, const TendonDescription& tendon, std::size_t guide) {
   const auto& [rod, edge, place] = tendon.guides[guide];
+  if (tendon.guides[guide].on_body()) return Vector3::Zero();
   const RodDescription& of = scene.rods[static_cast<std::size_t>(rod)];
   const auto e = static_cast<std::size_t>(edge);
   const Vector3 d1 = of.directors.row(edge),

@@ -49,6 +49,7 @@ void grasp(const Model& model, const Configuration& c, int hand, State& state, s
   const Vector3 taken =
       s.slides() ? curve_point(model, state.q, s.curve, ring.place) : point_on(model, state.q, s.at_edge, s.at_place);
   m.position = own.posed ? own.position : taken;
+  if (own.node >= 0) m.position = node_position(model, state.q, own.node);
   m.feed_rate = own.feed_rate;
   m.feeds_since = state.time;
   m.rotation = own.posed ? own.rotation : edge_directors(model, c, s.at_edge);
@@ -64,7 +65,7 @@ void grasp(const Model& model, const Configuration& c, int hand, State& state, s
     return;
   }
   if (s.slides()) {
-    held.points = {into * (taken - m.position)};
+    held.points = {own.node >= 0 ? Vector3(Vector3::Zero()) : Vector3(into * (taken - m.position))};
     return;
   }
   for (const TouchedEdge& touched : s.touched)

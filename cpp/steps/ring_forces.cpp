@@ -17,18 +17,33 @@ Ring ring_of(const Support& support, double reach) {
           kRounding * (reach + support.curve.whole)};
 }
 
+/// Position of a ring. On a body it is that of the hand, with `points` at zero.
 Vector3 centre_of(const HandState& hand) { return hand.position + hand.rotation * hand.points.front(); }
 
-RingStep step_of(const Model& model, const StepProblem& problem, int support) {
+/// Node of the body that carries a ring, or -1.
+int carrier_of(const Support& support) { return support.description.hand.node; }
+
+/// `last`: nodes at the end of the step.
+RingStep step_of(const Model& model, const StepProblem& problem, int support, const NodePlaces& last) {
   const Support& s = model.supports[at(support)];
   const HandState& start = problem.start->hands[at(support)];
   const Vector3 from = centre_of(start);
   const double fed = start.ring.fed;
   const std::vector<SupportPose>& end = problem.prescribed->supports;
+  if (const int node = carrier_of(s); node >= 0) {
+    const Vector3 to = last(node);
+    return {ring_of(s, to.norm()), s.curve, start.ring, from, to, fed, end.empty() ? fed : end[at(support)].fed};
+  }
   if (end.empty()) return {ring_of(s, from.norm()), s.curve, start.ring, from, from, fed, fed};
   const SupportPose& to = end[at(support)];
   const Vector3 centre = to.position + to.rotation * start.points.front();
   return {ring_of(s, centre.norm()), s.curve, start.ring, from, centre, fed, to.fed};
+}
+
+/// Nodes at the end of a step whose forces act at z.
+NodePlaces end_of(const StepProblem& problem, const VectorX& z) {
+  if (!problem.in_middle()) return {problem.model, z};
+  return {problem.model, z, 2.0, &problem.start->q};
 }
 
 /// Place where forces act in a step that ends at q1.
@@ -68,11 +83,16 @@ auto with_found(const StepProblem& problem, const RingStep& step, const NodePlac
   return use(ring_found<9>(axes, problem, step, z), axes);
 }
 
-/// Converts the forces on three nodes in space into derivatives by their unknowns.
+/// Three nodes, and that of a body that carries the ring.
+constexpr int kMostUnknowns = 12;
+using RingLocal = LocalOf<kMostUnknowns>;
+
+/// Converts the forces on three nodes in space into derivatives by their unknowns, and by those of the ring if a body
+/// carries it.
 template <int Size>
-Local local_of(const RingFound<Size>& found, const typename RingFound<Size>::Axes& axes) {
+RingLocal local_of(const RingFound<Size>& found, const typename RingFound<Size>::Axes& axes, bool is_carried) {
   constexpr int n = RingFound<Size>::kAxes;
-  Local out{};
+  RingLocal out{};
   for (int i = 0; i < 3; ++i)
     for (int k = 0; k < n; ++k) {
       const auto& [x, y, z] = found.by[i];
@@ -83,6 +103,17 @@ Local local_of(const RingFound<Size>& found, const typename RingFound<Size>::Axe
       out.gradient[i * n + k] = passes ? along(x.value, y.value, z.value) : NAN;
       for (int j = 0; j < Size; ++j) out.hessian[i * n + k][j] = along(x.slope[j], y.slope[j], z.slope[j]);
     }
+  for (int k = 0; is_carried && k < n; ++k) {
+    for (int i = 0; i < 3; ++i) out.gradient[Size + k] -= out.gradient[i * n + k];
+    for (int j = 0; j < Size; ++j)
+      for (int i = 0; i < 3; ++i) {
+        out.hessian[Size + k][j] -= out.hessian[i * n + k][j];
+        out.hessian[j][Size + k] -= out.hessian[j][i * n + k];
+      }
+  }
+  for (int k = 0; is_carried && k < n; ++k)
+    for (int j = 0; j < n; ++j)
+      for (int i = 0; i < 3; ++i) out.hessian[Size + k][Size + j] -= out.hessian[Size + k][i * n + j];
   return out;
 }
 
@@ -94,22 +125,27 @@ RingForces::RingForces(const Model& model) : model_(model) {
   for (std::size_t s = 0; s < model.supports.size(); ++s) {
     const Support& support = model.supports[s];
     if (!support.active || !support.slides()) continue;
-    rings_.push_back({static_cast<int>(s), static_cast<int>(dofs.size()) / (3 * n)});
+    rings_.push_back({static_cast<int>(s), static_cast<int>(dofs.size()) / (4 * n)});
     slips_ = slips_ || ring_of(support, 0.0).slips();
-    for (int i = 0; i < support.curve.pieces(); ++i)
-      for (int node : support.curve.piece(i).node)
-        for (int k = 0; k < n; ++k) dofs.push_back(node < 0 ? -1 : model.node_dof[at(node)] + k);
+    const auto add = [&](int node) {
+      for (int k = 0; k < n; ++k) dofs.push_back(node < 0 ? -1 : model.node_dof[at(node)] + k);
+    };
+    for (int i = 0; i < support.curve.pieces(); ++i) {
+      for (int node : support.curve.piece(i).node) add(node);
+      add(carrier_of(support));
+    }
   }
-  table_ = ElementTable(3 * n, std::move(dofs));
+  table_ = ElementTable(4 * n, std::move(dofs));
 }
 
 void RingForces::add(const StepProblem& problem, StepData& data, std::span<double> values) const {
   for (const Held& held : rings_) {
     if (problem.start->hands[at(held.support)].ring.left) continue;
-    const RingStep step = step_of(model_, problem, held.support);
+    const RingStep step = step_of(model_, problem, held.support, end_of(problem, data.z));
+    const bool is_carried = carrier_of(model_.supports[at(held.support)]) >= 0;
     with_found(problem, step, {model_, data.z}, [&](const auto& found, const auto& axes) {
-      add_element(table_, held.first_element + own_piece(step.curve, found.place.piece), local_of(found, axes), data,
-                  values);
+      add_element(table_, held.first_element + own_piece(step.curve, found.place.piece),
+                  local_of(found, axes, is_carried), data, values);
       data.potential += found.energy;
       const Vector3 force = -found.force();
       Wrench& wrench = data.hands[at(held.support)];
@@ -136,10 +172,10 @@ void RingForces::add_rounding(const StepProblem& problem, StepData& data) const 
 
 double RingForces::dissipated(const StepProblem& problem, const VectorX& z) const {
   const NodePlaces acting{model_, z};
-  const NodePlaces last = problem.in_middle() ? NodePlaces{model_, z, 2.0, &problem.start->q} : acting;
+  const NodePlaces last = end_of(problem, z);
   double lost = 0.0;
   for (const Held& held : rings_) {
-    const RingStep step = step_of(model_, problem, held.support);
+    const RingStep step = step_of(model_, problem, held.support, last);
     if (step.start.left || !step.ring.holds) continue;
     const SplinePlace place = nearest_place(step.curve, step.start.place, last, step.to);
     const double k = step.ring.stiffness, u0 = step.origin(step.fed_from) - step.curve.arc_at(step.start.place),
@@ -158,10 +194,12 @@ double RingForces::dissipated(const StepProblem& problem, const VectorX& z) cons
 double RingForces::work(const StepProblem& problem, const VectorX& q1) const {
   double done = 0.0;
   for (const Held& held : rings_) {
-    const RingStep step = step_of(model_, problem, held.support);
+    const RingStep step = step_of(model_, problem, held.support, {model_, q1});
     if (step.start.left) continue;
+    const bool is_carried = carrier_of(model_.supports[at(held.support)]) >= 0;
     done -= with_found(problem, step, middle_of(problem, q1), [&](const auto& found, const auto& /*axes*/) {
-      return found.force().dot(step.to - step.from) + found.tension * (step.fed_to - step.fed_from);
+      const double by_drive = found.tension * (step.fed_to - step.fed_from);
+      return is_carried ? by_drive : found.force().dot(step.to - step.from) + by_drive;
     });
   }
   return done;
@@ -170,7 +208,10 @@ double RingForces::work(const StepProblem& problem, const VectorX& q1) const {
 double RingForces::accept(State& state) const {
   double left_there = 0.0;
   for (const Held& held : rings_) {
-    RingState& ring = state.hands[at(held.support)].ring;
+    HandState& hand = state.hands[at(held.support)];
+    RingState& ring = hand.ring;
+    if (const int node = carrier_of(model_.supports[at(held.support)]); node >= 0)
+      hand.position = node_position(model_, state.q, node);
     if (ring.left) continue;
     const Passage now = passage_of(model_, state, held.support);
     ring.place = now.place;

@@ -190,7 +190,7 @@ void TendonForces::add_rounding(const StepProblem& problem, StepData& data) cons
       const GuideSeat& seat = segment.seat[k];
       const GuideUnknowns& u = unknowns.guide[k];
       const double moment = force * seat.offset.norm();
-      const double couple = moment / data.configuration.length[seat.edge];
+      const double couple = seat.on_body() ? 0.0 : moment / data.configuration.length[seat.edge];
       add(u.tail, model.dimension, force + couple);
       add(u.head, model.dimension, force + couple);
       add(u.angle, 1, moment);

@@ -64,13 +64,13 @@ std::vector<LoadDescription> read_added_loads(Reader& r, const SceneDescription&
 void write_hand(Writer& w, const HandDescription& hand) {
   w(hand.at), w(hand.length), w(hand.posed), w(hand.position), w(hand.rotation), w(hand.yields);
   for (double k : hand.stiffness) w(k);
-  w(hand.force_limit), w(hand.slides), w(hand.friction), w(hand.feeds), w(hand.feed_rate);
+  w(hand.force_limit), w(hand.slides), w(hand.friction), w(hand.feeds), w(hand.feed_rate), w(hand.node);
 }
 
 void read_hand(Reader& r, HandDescription& hand) {
   r(hand.at), r(hand.length), r(hand.posed), r(hand.position), r(hand.rotation), r(hand.yields);
   for (double& k : hand.stiffness) r(k);
-  r(hand.force_limit), r(hand.slides), r(hand.friction), r(hand.feeds), r(hand.feed_rate);
+  r(hand.force_limit), r(hand.slides), r(hand.friction), r(hand.feeds), r(hand.feed_rate), r(hand.node);
 }
 
 bool same_hand(const HandDescription& a, const HandDescription& b) {

@@ -136,7 +136,11 @@ void World::prescribe_support(int support, const std::optional<Vector3>& positio
   }
 }
 
-Vector3 World::support_position(int support) const { return implementation_->motions.at(at(support)).position; }
+Vector3 World::support_position(int support) const {
+  const Implementation& self = *implementation_;
+  const int node = self.model.supports.at(at(support)).description.hand.node;
+  return node >= 0 ? node_position(self.model, self.state.q, node) : self.motions[at(support)].position;
+}
 Matrix3 World::support_rotation(int support) const { return implementation_->motions.at(at(support)).rotation; }
 std::pair<Matrix3, double> World::support_turn(int support) const {
   const SupportMotion& m = implementation_->motions.at(at(support));
@@ -204,7 +208,7 @@ Reaction World::reaction(int support) const {
     found.force /= self.impulse_time;
     found.moment /= self.impulse_time;
   }
-  if (self.model.supports[at(support)].is_hand()) found.moment -= self.motions[at(support)].position.cross(found.force);
+  if (self.model.supports[at(support)].is_hand()) found.moment -= support_position(support).cross(found.force);
   return {found.force, found.moment};
 }
 

@@ -110,6 +110,7 @@ class TendonOutline(ShortRepr):
     name : str
     guides : tuple of (int, int, float [-])
         Position of each guide: index of the rod in the scene, edge of the rod, and place along the edge, from 0 to 1.
+        The rod -1 stands for a point of a rigid body; then its row among the nodes of the scene, and 0.
     offsets : ndarray of shape (guides, 2) [m]
         Offsets along the directors of the edge.
     """
@@ -124,7 +125,7 @@ class TendonOutline(ShortRepr):
         Parameters
         ----------
         positions : mapping of int to ndarray of shape (..., nodes, 3) [m]
-            Positions of the nodes of each rod with a guide.
+            Positions of the nodes of each rod with a guide; of all nodes of the scene under -1.
         directors : mapping of int to ndarray of shape (..., edges, 3, 3)
 
         Returns
@@ -133,6 +134,9 @@ class TendonOutline(ShortRepr):
         """
         points = []
         for (rod, edge, share), offset in zip(self.guides, self.offsets, strict=True):
+            if rod < 0:
+                points.append(positions[-1][..., edge, :])
+                continue
             tail, head = (positions[rod][..., node % positions[rod].shape[-2], :] for node in (edge, edge + 1))
             points.append((1.0 - share) * tail + share * head + offset @ directors[rod][..., edge, :2, :])
         return np.stack(points, axis=-2)

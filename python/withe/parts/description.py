@@ -26,6 +26,7 @@ from withe.parts.kinds import (
     Pass,
     RodPart,
     SupportPart,
+    TendonPart,
 )
 from withe.parts.options import Bending
 from withe.parts.parameters import RodParameters
@@ -68,6 +69,7 @@ def describe(directory: Directory, gravity: FloatArray, bending: Bending = "angl
     scene.supports = _describe_supports(directory)
     scene.loads = [describe_load(directory, load) for load in directory.all(LoadPart)]
     scene.springs = describe_springs(directory)
+    scene.tendons = [_describe_tendon(directory, part) for part in directory.all(TendonPart)]
     for kind in KINDS:
         if kind.described is not None:
             word, describe_part = kind.described
@@ -120,6 +122,8 @@ def describe_support(directory: Directory, part: SupportPart) -> _core.SupportDe
     support.free = part.free
     if part.grasp is not None:
         support.hand = _describe_hand(part.grasp)
+        if part.grasp.by is not None:
+            support.hand.node = directory.row(part.grasp.by)
     return support
 
 
@@ -195,6 +199,11 @@ def _held_twice(directory: Directory, first: SupportPart, second: SupportPart) -
         f"{first.name!r} at {first.node_name!r} and {second.name!r} at {second.node_name!r} hold the same node, "
         "because rods were joined (hold='edge' holds both nodes of an edge): remove one of the supports"
     )
+
+
+def _describe_tendon(directory: Directory, part: TendonPart) -> _core.TendonDescription:
+    guides = [(rod, edge if rod >= 0 else directory.row((rod, edge)), place) for rod, edge, place in part.guides]
+    return _core.TendonDescription(guides, part.offsets, part.tension)
 
 
 def describe_load(directory: Directory, part: LoadPart) -> _core.LoadDescription:

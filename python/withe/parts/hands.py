@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,8 +11,8 @@ import numpy.typing as npt
 
 from withe.common import validation
 from withe.parts.directory import Directory
-from withe.parts.handles import Rod
-from withe.parts.kinds import Grasp, RodPart, SupportPart
+from withe.parts.handles import Body, Rod
+from withe.parts.kinds import Grasp, Pass, RodPart, SupportPart
 
 __all__ = ["Sliding", "check_free", "held_edges", "make_hand", "pose_of", "touched_edges"]
 
@@ -38,8 +39,9 @@ def make_hand(
     force_limit: float | None,
     sliding: Sliding,
     name: str | None,
+    by: Body | str | None = None,
 ) -> SupportPart:
-    """A hand, checked; not yet in the directory."""
+    """A hand, checked; not yet in the directory. `by`: a body that carries it."""
     name = directory.new_name(name, "hand")
     part = directory.rod(rod, "rod to grasp")
     at = validation.number(at, f"at of {name!r}")
@@ -60,8 +62,15 @@ def make_hand(
     place = None if pose is None else pose_of(pose, f"pose of {name!r}")
     if validation.truth(sliding.slides, f"slides of {name!r}"):
         grasp = _make_ring(part, at, length, place, stiffness, force_limit, sliding, name)
+        if by is not None:
+            grasp = replace(grasp, by=_place_on_body(directory, part, at, place, by, name))
         edge = touched_edges(part, at, 0.0)[0]
         return SupportPart(name, "hand", (part.index, edge), f"{part.name}.node({edge})", np.zeros((3, 3)), grasp)
+    if by is not None:
+        raise ValueError(
+            f"by of {name!r} needs a ring: use slides=True, or hold the rod by a joint, "
+            f"scene.join({part.name}.node(i), body)"
+        )
     for word, value in (("friction", sliding.friction or None), ("feed_rate", sliding.feed_rate)):
         if value is not None:
             raise ValueError(f"{word} of {name!r} needs a ring: use slides=True, which lets the rod slide")
@@ -112,6 +121,47 @@ def _make_ring(
         if rate is None:
             raise ValueError(f"force_limit of {name!r} needs a drive: give feed_rate= too, or use friction= instead")
     return Grasp(at, 0.0, pose, np.full(6, k), limit, (), True, friction, rate)
+
+
+def _place_on_body(
+    directory: Directory,
+    rod: RodPart,
+    at: float,
+    pose: tuple[FloatArray, FloatArray] | None,
+    body: Body | str,
+    name: str,
+) -> Pass:
+    """Return the point of a body where a rod passes its ring as drawn."""
+    if pose is not None:
+        raise ValueError(f"pose of {name!r} must not be given with by=: the ring is where the rod is drawn")
+    if not directory.is_body(body):
+        raise ValueError(f"by of {name!r} must be a rigid body of the scene, got {body!r:.80}")
+    return directory.place(body, _spline_point(rod, at), f"by of {name!r}")[0]
+
+
+def _spline_point(rod: RodPart, at: float) -> FloatArray:
+    """Return the drawn point of the smooth curve of a rod at an arc length (3,); see geometry/rod_spline.hpp."""
+    arcs, count = rod.arcs, len(rod.points)
+    begins = np.concatenate([[0.0], np.cumsum(arcs)])
+    middles = 0.5 * (begins[:-1] + begins[1:])
+    if rod.closed:
+        whole = float(begins[-1])
+        node = int(np.searchsorted(middles, at % whole)) % count
+        arc = (at - begins[node] + 0.5 * whole) % whole - 0.5 * whole
+    else:
+        node = int(np.clip(np.searchsorted(middles, at), 0, count - 1))
+        arc = at - float(begins[node])
+    before, after = node - 1, (node + 1) % count
+    if not rod.closed and node in (0, count - 1):
+        edge = 0 if node == 0 else len(arcs) - 1
+        way = (at - float(begins[edge])) / float(arcs[edge])
+        return np.asarray((1.0 - way) * rod.points[edge] + way * rod.points[edge + 1])
+    first, second = float(arcs[before]), float(arcs[node])
+    s = arc + 0.5 * first
+    a = 2.0 * s / (first + np.sqrt(first**2 + 2.0 * (second - first) * s))
+    b = 1.0 - a
+    weights = np.array([0.5 * b * b, 0.5 + a * b, 0.5 * a * a])
+    return np.asarray(weights @ rod.points[[before, node, after]])
 
 
 def pose_of(pose: Any, what: str) -> tuple[FloatArray, FloatArray]:

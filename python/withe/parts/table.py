@@ -17,7 +17,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from withe import _core
 from withe.common import validation
 from withe.common.outlines import SpringOutline, TendonOutline
 from withe.parts.handles import (
@@ -74,20 +73,18 @@ def _zigzag(part: SpringPart, row_of: RowOf) -> SpringOutline:
 
 
 def _line(part: TendonPart, row_of: RowOf) -> TendonOutline:
-    return tendon_outline(part)
-
-
-def _describe_tendon(part: TendonPart) -> _core.TendonDescription:
-    return _core.TendonDescription(list(part.guides), part.offsets, part.tension)
+    return tendon_outline(part, row_of)
 
 
 _SHARES: dict[GuidePlace, float] = {"start": 0.0, "middle": 0.5, "end": 1.0}
 """Place of a guide along its edge, from 0 to 1."""
 
 
-def tendon_outline(part: TendonPart) -> TendonOutline:
-    """Return the outline of a tendon for pictures and files."""
-    guides = tuple((rod, edge, _SHARES[place]) for rod, edge, place in part.guides)
+def tendon_outline(part: TendonPart, row_of: RowOf) -> TendonOutline:
+    """Return the outline of a tendon for pictures and files. `row_of`: row of a point of a body."""
+    guides = tuple(
+        (rod, edge, _SHARES[place]) if rod >= 0 else (-1, row_of((rod, edge)), 0.0) for rod, edge, place in part.guides
+    )
     return TendonOutline(part.name, guides, part.offsets)
 
 
@@ -176,7 +173,6 @@ KINDS: tuple[PartKind, ...] = (
         (Word("tension", "N", validation.non_negative, is_linear=True, is_ramped=True),),
         numbers="tendon",
         outline=_line,
-        described=("tendons", _describe_tendon),
     ),
     PartKind(
         JoinPart,
@@ -192,12 +188,12 @@ KINDS: tuple[PartKind, ...] = (
                 is_linear=True,
                 is_ramped=True,
                 is_positive=True,
-            Word("max_torque", "N m", limit, _turns),
-            Word("max_speed", "rad/s", limit, _turns, has_gradient=False),
             ),
             Word("rest_angle", "rad", angle, _turns, is_ramped=True),
             Word("damping", "N m s/rad", validation.non_negative, _turns, is_ramped=True, is_positive=True),
             Word("moment", "N m", validation.number, _turns, is_linear=True, is_ramped=True),
+            Word("max_torque", "N m", limit, _turns),
+            Word("max_speed", "rad/s", limit, _turns, has_gradient=False),
         ),
         numbers="joint",
     ),

@@ -213,7 +213,8 @@ class Record:
                 raise ValueError(f"rows of spring {spring.name!r} must be two in 0..{nodes - 1}")
         for tendon in self._tendons:
             on_rods = all(
-                0 <= rod < len(self._rods) and 0 <= edge < self._rods[rod].edges and 0.0 <= share <= 1.0
+                (rod == -1 and 0 <= edge < nodes)
+                or (0 <= rod < len(self._rods) and 0 <= edge < self._rods[rod].edges and 0.0 <= share <= 1.0)
                 for rod, edge, share in tendon.guides
             )
             if len(tendon.guides) < 2 or not on_rods or tendon.offsets.shape != (len(tendon.guides), 2):

@@ -194,11 +194,11 @@ class Loads:
         self,
         guides: Guides,
         *,
-        offset: npt.ArrayLike,
+        offset: npt.ArrayLike | None = None,
         tension: float = 0.0,
         name: str | None = None,
     ) -> Tendon:
-        """Add a tendon that runs through guides on rods, without friction and mass.
+        """Add a tendon that runs through guides on rods and rigid bodies, without friction and mass.
 
         Each guide sits at an offset from the centreline, along the material directors of an edge, and turns with the
         edge. At the end of a rod that is clamped or rigidly joined, a guide turns with the support or joint. The tendon
@@ -211,9 +211,10 @@ class Loads:
         ----------
         guides : Rod, str, or iterable of EdgeHandle, NodeHandle or str
             A rod, for guides at its start, in the middle of every edge, and at its end. Or edges (guides in their
-            middle) and ends of rods, in the order of the tendon.
+            middle), ends of rods and points of rigid bodies, such as ``hand.at((0, 0, 0.1))``, in the order of the
+            tendon.
         offset : array_like of shape (2,) or (guides, 2) [m]
-            Offset of all guides, or of each guide, along d1 and d2.
+            Offset of all guides on rods, or of each guide, along d1 and d2. A guide on a body has none.
         tension : float [N]
             Tension, not negative.
         name : str
@@ -228,8 +229,9 @@ class Loads:
         Raises
         ------
         ValueError
-            Fewer than two guides, two consecutive guides at one point, an inner node, a number that is not finite, or a
-            negative tension.
+            Fewer than two guides, two consecutive guides at one point, an inner node, or a body without a point. An
+            offset of a guide on a body, or none for a guide on a rod. A number that is not finite, or a negative
+            tension.
 
         See Also
         --------

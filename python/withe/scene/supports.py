@@ -120,6 +120,7 @@ class Supports:
         slides: bool = False,
         friction: float = 0.0,
         feed_rate: float | None = None,
+        by: Body | str | None = None,
         name: str | None = None,
     ) -> Hand:
         """Grasp a rod anywhere along its length by a hand.
@@ -156,6 +157,9 @@ class Supports:
         feed_rate : float [m/s]
             Undeformed length per time that a drive in the ring feeds towards the end of the rod. 0 holds the rod;
             ``hand.feed`` changes the rate.
+        by : Body or str
+            Rigid body that carries a ring, at the point where the rod is drawn at `at`. The ring pulls the body as it
+            pulls the rod. By default the ring is in the world.
         name : str
             Name of the hand. By default "hand 1", ...
 
@@ -168,7 +172,8 @@ class Supports:
         ValueError
             A place off the rod, an edge that is already held, or a node that a clamp or pin holds. A stiffness or
             force limit that is not positive, negative friction, friction of a driven ring, or a ring option without
-            ``slides=True``. Two hands may hold neighbouring edges; the first hand holds their common node.
+            ``slides=True``. A body for a hand that is no ring, or a pose with a body. Two hands may hold neighbouring
+            edges; the first hand holds their common node.
 
         See Also
         --------
@@ -186,7 +191,7 @@ class Supports:
         Hand(name='hand 1')
         """
         sliding = Sliding(slides, friction, feed_rate)
-        part = make_hand(self._directory, rod, at, length, pose, stiffness, force_limit, sliding, name)
+        part = make_hand(self._directory, rod, at, length, pose, stiffness, force_limit, sliding, name, by)
         return cast(Hand, _hold(self._directory, part))
 
 

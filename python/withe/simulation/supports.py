@@ -98,6 +98,8 @@ def move_support(
 ) -> None:
     """Move a support; see `Simulation.move`."""
     index, part = find_support(session, support)
+    if part.grasp is not None and part.grasp.by is not None:
+        raise ValueError(f"ring {part.name!r} is on a body and moves with the body: move the support of the body")
     turns = part.kind != "pin"
     owner = _owner(part)
     if path is not None:

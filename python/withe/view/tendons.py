@@ -18,8 +18,10 @@ TENDON_COLOR = "#c2255c"  # of no rod
 
 def tendon_points(record: Frames, tendon: TendonOutline) -> FloatArray:
     """Return the positions of the guides in each frame, shape (frames, guides, 3) [m]."""
-    rods = {rod: record.rods[rod] for rod, _, _ in tendon.guides}
+    rods = {rod: record.rods[rod] for rod, _, _ in tendon.guides if rod >= 0}
     positions = {index: record.positions(rod) for index, rod in rods.items()}
+    if len(rods) < len({rod for rod, _, _ in tendon.guides}):
+        positions[-1] = record.positions()
     return tendon.points(positions, {index: record.directors(rod) for index, rod in rods.items()})
 
 
