@@ -392,8 +392,8 @@ double taken(std::span<double> values, std::ptrdiff_t place) {
 
 }  // namespace
 
-/// With d its unknowns, u those of its body, dd = G du, and rows r_u += H r_d: K_uj += H K_dj, K_ju += K_jd G.
-/// Most parts of a surface touch nothing: their rows and columns are zero.
+/// A part has the unknowns d, and its body u. With dd = G du, and rows r_u += H r_d: K_uj += H K_dj, K_ju += K_jd G.
+/// Most parts of a surface touch nothing, and their rows and columns are zero.
 void Assembler::fold_carried(const CarryingOf& carrying_of) {
   const std::span<double> values = solver_->values();
   const bool symmetric = symmetry_ == Symmetry::symmetric;
