@@ -40,12 +40,12 @@ class StrandClasses {
   StrandClasses(const ColorImage& image, const SkeletonGraph& graph, const BitImage& mask);
 
   int count() const { return static_cast<int>(colors_.size()); }
-  /// Class of a pixel; -1 outside the mask.
+  /// Class of a pixel; -1 outside the mask, and everywhere if there are fewer than two classes.
   int at(int x, int y) const {
-    if (x < 0 || y < 0 || x >= width_ || y >= height_) return -1;
+    if (classes_.empty() || x < 0 || y < 0 || x >= width_ || y >= height_) return -1;
     return classes_[static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x)];
   }
-  /// Pixels of the class of a pixel; empty outside the mask.
+  /// Pixels of the class of a pixel; empty where `at` is -1.
   BitImage region_of(const Vector2& point) const;
   /// Removes pixels between classes, so that pixels of two classes do not touch. Returns true if it removed any.
   bool cut(BitImage& mask) const;

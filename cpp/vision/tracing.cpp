@@ -343,7 +343,7 @@ Tracing trace_lines(const BitImage& mask, const TraceOptions& given, const Color
   const double shortest = std::max(widths * 2 * typical_half_width(graph), options.shortest_line);
   auto ends = grow_tips(smoothed, graph, links, shortest);
   bridge_gaps(links, ends, options.gaps);
-  if (classes) {
+  if (classes && classes->count() > 1) {
     for (std::size_t h = 0; h < ends.size(); ++h) {
       if (links.zone_of[h] < 0 && links.partner[h] < 0) {
         extend_beneath(smooth_mask, *classes, links.branches[h].half_width, ends[h]);

@@ -91,6 +91,18 @@ TEST(StrandClasses, CutsBetweenStrandsOfDifferentColors) {
   EXPECT_EQ(regions, 3);
 }
 
+TEST(StrandClasses, HaveNoRegionsIfAllStrandsHaveOneColor) {
+  Picture picture;
+  picture.draw([](int i) { return Vector2(40 + 0.5 * i, 100); }, 400, [](int) { return kBlue; });
+  const SkeletonGraph graph = build_graph(thin(picture.mask), picture.mask, 200);
+  const StrandClasses classes(picture.image(), graph, picture.mask);
+  ASSERT_EQ(classes.count(), 1);
+  EXPECT_EQ(classes.at(60, 100), -1);
+  EXPECT_EQ(classes.region_of(Vector2(60, 100)).count(), 0U);
+  BitImage parts = picture.mask;
+  EXPECT_FALSE(classes.cut(parts));
+}
+
 TEST(TraceLines, ColorsDecideWhetherTwoBendsTouchOrCross) {
   for (const bool crosses : {false, true}) {
     Picture picture;
