@@ -1,4 +1,4 @@
-"""The command line: ``withe run``, ``withe perceive``, ``withe track``, ``withe deploy``, ``withe fold``."""
+"""The command line: ``withe run``, ``perceive``, ``track``, ``train-mask``, ``deploy``, ``fold``."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from withe.deployment import command as deploy
 from withe.folding import command as fold
 from withe.perception import command as perceive
 from withe.perception import track_command as track
+from withe.perception import train_command as train_mask
 from withe.scene import command as scene
 
 __all__ = ["main"]
@@ -24,6 +25,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     scene.add_parser(commands)
     perceive.add_parser(commands)
     track.add_parser(commands)
+    train_mask.add_parser(commands)
     deploy.add_parser(commands)
     fold.add_parser(commands)
     parsed = parser.parse_args(arguments)
