@@ -448,7 +448,7 @@ def _drawn(image: Any, scale: float | None) -> FloatArray:
     if scale is None:
         raise ValueError("a pattern from an image needs scale, the size of a pixel in m")
     size = validation.positive(scale, "scale")
-    tracing = trace(image)
+    tracing = trace(image, mask="ground")  # drawn lines are no cables to the learned mask
     curves = [line for line in tracing.centrelines if len(line) >= 3]
     if not curves:
         raise ValueError("image must show a curve, but no curve was found")

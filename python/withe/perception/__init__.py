@@ -9,7 +9,9 @@ from withe.perception.boards import CharucoBoard, Chessboard
 from withe.perception.camera import Camera
 from withe.perception.drawing import draw, draw_tracked
 from withe.perception.film import FilmFrame, read_film
+from withe.perception.learned_mask import learned_filter
 from withe.perception.mask_quality import MaskQuality
+from withe.perception.mask_training import MaskTraining, train_mask
 from withe.perception.masks import border_filter, color_filter, ground_filter, network_mask
 from withe.perception.results import Ambiguity, Crossing, Joint, Tracing
 from withe.perception.rod_prior import RodPrior
@@ -28,6 +30,7 @@ __all__ = [
     "FilmFrame",
     "Joint",
     "MaskQuality",
+    "MaskTraining",
     "RodPrior",
     "TagDetection",
     "Tracing",
@@ -39,9 +42,11 @@ __all__ = [
     "draw",
     "draw_tracked",
     "ground_filter",
+    "learned_filter",
     "network_mask",
     "read_film",
     "trace",
     "trace_mask",
+    "train_mask",
     "triangulate",
 ]

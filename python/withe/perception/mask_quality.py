@@ -9,7 +9,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["MaskQuality", "compare_with_picture", "measure_quality"]
+__all__ = [
+    "CLEAR_CONTRAST",
+    "MaskQuality",
+    "compare_with_network",
+    "compare_with_picture",
+    "has_plain_border",
+    "measure_quality",
+]
 
 Array = NDArray[np.float64]
 
@@ -27,6 +34,13 @@ _FEW_WIDTHS = 6  # widths of so many cables may differ
 # ground 5 and 0.54. Noise of 40 grey levels gives a contrast of 0.8 to 1.2, a blur of 5 px a sharpness of 0.25.
 _LEAST_CONTRAST = 1.1
 _LEAST_SHARPNESS = 0.35
+_BLOCK = 3  # width and height of the blocks whose means are compared along the border [px]
+_BORDER_REACH = 3  # distance over which steps along the border are measured [blocks]
+_PLAIN_ROUGHNESS = 6.0  # [grey levels]
+_LEAST_CERTAINTY = 0.7  # 98 % of 42 masks with an intersection over union below 0.5 are below it, or have another fault
+_FEW_PIXELS = 100.0  # expected number of pixels of cables in a picture without any
+_NOISE_SHARE = 0.9  # steps between neighbouring pixels over those of the ground, above which these are noise
+CLEAR_CONTRAST = 2.0  # above it the ground filter is reliable on a plain ground
 _SEAM_CONTRAST = 3.0  # below it, seams and grain of the ground may be in the mask
 _SEAM_BEND = 0.05  # seams and fibres deviate from their chord by less than this share of it
 _SEAM_ALIGNMENT = 0.98  # length of the mean of their directions, with doubled angles
@@ -53,6 +67,9 @@ class MaskQuality:
         mask was not made by the default filter.
     sharpness : float [-]
         Share of that step within 2 px. Infinite if the mask was not made by the default filter.
+    certainty : float [-]
+        Intersection over union that the network expects between its mask and the cables, from 0 to 1. Infinite if the
+        mask is not the learned one.
     """
 
     cover: float
@@ -62,6 +79,7 @@ class MaskQuality:
     reasons: tuple[str, ...] = ()
     contrast: float = math.inf
     sharpness: float = math.inf
+    certainty: float = math.inf
 
     @property
     def is_good(self) -> bool:
@@ -135,6 +153,79 @@ def compare_with_picture(
     if sharpness < _LEAST_SHARPNESS:
         reasons.append("the picture is blurred at its borders")
     return replace(quality, contrast=contrast, sharpness=sharpness, reasons=tuple(reasons))
+
+
+def compare_with_network(
+    quality: MaskQuality,
+    image: NDArray[np.uint8],
+    probability: NDArray[np.float32],
+    mask: NDArray[np.uint8],
+    centrelines: Sequence[Array],
+    widths: Sequence[Array],
+) -> MaskQuality:
+    """Return the quality of a learned mask: the certainty of the network, and the blur and noise of the picture.
+
+    The ground of a cluttered picture may differ more than the cables do, which says nothing about a learned mask. Noise
+    is told from clutter by the steps between neighbouring pixels, which are as large as those over a longer distance.
+
+    Parameters
+    ----------
+    quality : MaskQuality
+        Quality of the mask alone.
+    image : ndarray of uint8, shape (height, width, 3)
+    probability : ndarray of shape (height, width)
+        Probability of a cable at each pixel.
+    mask : ndarray of uint8, shape (height, width)
+    centrelines : sequence of ndarray of shape (n, 2) [px]
+    widths : sequence of ndarray of shape (n,) [px]
+    """
+    inside = mask > 0
+    expected = float(probability.sum())
+    reasons = list(quality.reasons)
+    if inside.any():
+        certainty = float(probability[inside].sum() / (inside.sum() + probability[~inside].sum()))
+        if certainty < _LEAST_CERTAINTY:
+            reasons.append(f"the network expects it to agree with the cables by {100 * certainty:.0f} % only")
+    else:
+        certainty = 1.0 if expected < _FEW_PIXELS else 0.0
+        if certainty < _LEAST_CERTAINTY:
+            reasons.append("it is empty, and the network expects cables")
+    quality = replace(quality, certainty=certainty)
+    if len(centrelines):
+        distance = int(np.clip(np.median(np.concatenate(list(widths))), 4, 16))
+        border, ground, near = _steps(image, inside, distance)
+        if len(border) and len(ground) and len(near):
+            step, level = float(np.median(border)), max(float(np.percentile(ground, 95)), 1.0)
+            quality = replace(quality, contrast=step / level, sharpness=float(np.median(near)) / max(step, 1.0))
+            neighbours = np.abs(np.diff(image[::3].astype(np.int16), axis=1)).max(axis=-1)
+            is_noise = float(np.percentile(neighbours, 95)) > _NOISE_SHARE * level
+            if quality.contrast < _LEAST_CONTRAST and is_noise:
+                reasons.append(f"its borders differ only {quality.contrast:.1f} times as much as the ground itself")
+            if quality.sharpness < _LEAST_SHARPNESS:
+                reasons.append("the picture is blurred at its borders")
+    return replace(quality, reasons=tuple(reasons))
+
+
+def has_plain_border(image: NDArray[np.uint8]) -> bool:
+    """Return True if a frame along the border of a picture is nearly free of edges, except those of a few cables."""
+    return border_roughness(image) < _PLAIN_ROUGHNESS
+
+
+def border_roughness(image: NDArray[np.uint8]) -> float:
+    """Return the 80 % quantile of the steps of the grey levels along a frame at the border of a picture.
+
+    The steps are those of means over 3 x 3 px, which noise changes little.
+    """
+    height, width = image.shape[:2]
+    depth = max(_BLOCK, min(height, width) // 20)
+    steps = []
+    for frame in (image[:depth], image[-depth:], image[:, :depth].swapaxes(0, 1), image[:, -depth:].swapaxes(0, 1)):
+        rows, columns = frame.shape[0] // _BLOCK, frame.shape[1] // _BLOCK
+        blocks = frame[: rows * _BLOCK, : columns * _BLOCK].reshape(rows, _BLOCK, columns, _BLOCK, 3)
+        lines = blocks.mean(axis=(1, 3), dtype=np.float32)
+        if rows > 0 and columns > _BORDER_REACH:
+            steps.append(np.abs(lines[:, _BORDER_REACH:] - lines[:, :-_BORDER_REACH]).max(axis=-1).ravel())
+    return float(np.percentile(np.concatenate(steps), 80)) if steps else 0.0
 
 
 def _are_seams(lines: Sequence[Array]) -> bool:

@@ -146,7 +146,7 @@ def network_mask(model: Any, threshold: float = 0.5, size: tuple[int, int] | Non
     Raises
     ------
     ValueError
-        A file that cannot be read, or (on use) a result of another shape.
+        A file that cannot be read, or (on use) a result of another shape, or a network of a fixed size without `size`.
     ImportError
         OpenCV or torch is not installed.
     """
@@ -191,7 +191,14 @@ def _onnx_runner(path: Path) -> Callable[[NDArray[np.float32]], Any]:
 
     def run(blob: NDArray[np.float32]) -> Any:
         network.setInput(blob)
-        return network.forward()
+        try:
+            return network.forward()
+        except cv2.error as error:
+            size = blob.shape[2:]
+            raise ValueError(
+                f"model must take a picture of {size[0]} x {size[1]} px, and OpenCV cannot run it at this size. If the "
+                f"network has a fixed size, give size=(height, width): {error}"
+            ) from error
 
     return run
 

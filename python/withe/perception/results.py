@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +12,10 @@ from withe.perception.camera import Camera
 from withe.perception.mask_quality import MaskQuality
 from withe.perception.triangulation import CableInSpace, triangulate
 
-__all__ = ["Ambiguity", "Crossing", "Joint", "Tracing"]
+__all__ = ["Ambiguity", "Crossing", "Joint", "MaskMethod", "Tracing"]
 
 Array = NDArray[np.float64]
+MaskMethod = Literal["ground", "learned", "given"]
 
 FORMAT_VERSION = 1
 
@@ -93,6 +94,9 @@ class Tracing:
     mask_quality : MaskQuality or None
         Measures of the mask. ``mask_quality.is_good`` is False where the mask does not look like cables; then `trace`
         warns with `PoorMaskWarning`. None for a tracing from `from_dict`.
+    mask_method : {"ground", "learned", "given"}
+        Origin of the mask: "ground" from the difference from a plain ground, "learned" from the shipped network,
+        "given" from the argument `mask`.
     timings : dict of str to float [s]
         Time by step.
     """
@@ -105,6 +109,7 @@ class Tracing:
     joints: list[Joint] = field(default_factory=list)
     ambiguous: list[Ambiguity] = field(default_factory=list)
     mask_quality: MaskQuality | None = None
+    mask_method: MaskMethod = "given"
     timings: dict[str, float] = field(default_factory=dict)
 
     def points(self, cable: int, camera: Camera, height: float = 0.0, radius: float | None = None) -> Array:
@@ -214,6 +219,7 @@ class Tracing:
                 {"point": j.point.tolist(), "end": list(j.end), "through": list(j.through)} for j in self.joints
             ],
             "ambiguous": [{"point": a.point.tolist(), "reason": a.reason} for a in self.ambiguous],
+            "mask_method": self.mask_method,
             "timings": dict(self.timings),
             "label_runs": [[int(flat[s]), int(n)] for s, n in zip(starts, lengths, strict=True)],
         }
@@ -253,6 +259,7 @@ class Tracing:
             ],
             joints=[Joint(np.array(j["point"]), tuple(j["end"]), tuple(j["through"])) for j in fields["joints"]],
             ambiguous=[Ambiguity(np.array(a["point"]), a["reason"]) for a in fields["ambiguous"]],
+            mask_method=fields.get("mask_method", "given"),
             timings=fields["timings"],
         )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import time
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -13,13 +14,25 @@ from withe import _core
 from withe.common.user_warnings import warn
 from withe.errors import PoorMaskWarning
 from withe.perception.images import as_array, check_image, read_image
-from withe.perception.mask_quality import compare_with_picture, measure_quality
+from withe.perception.learned_mask import LIKELY, cable_probability, can_run
+from withe.perception.mask_quality import (
+    CLEAR_CONTRAST,
+    MaskQuality,
+    compare_with_network,
+    compare_with_picture,
+    has_plain_border,
+    measure_quality,
+)
 from withe.perception.masks import MaskFunction, ground_filter
-from withe.perception.results import Ambiguity, Crossing, Joint, Tracing
+from withe.perception.results import Ambiguity, Crossing, Joint, MaskMethod, Tracing
 
 __all__ = ["check_mask", "trace", "trace_mask"]
 
+Image = NDArray[np.uint8]
 Method = Literal["withe", "mbest"]
+
+_CONFIRMED = 0.35  # least intersection over union of both masks, with which the learned one confirms the other
+_CERTAIN = 0.8  # certainty of the learned mask, above which it is preferred
 
 
 def check_mask(mask: ArrayLike, name: str = "mask") -> NDArray[np.uint8]:
@@ -38,22 +51,22 @@ def check_mask(mask: ArrayLike, name: str = "mask") -> NDArray[np.uint8]:
     return np.ascontiguousarray(array != 0).view(np.uint8)
 
 
-def _tracing(
-    found: dict[str, Any], image: NDArray[np.uint8] | None = None, mask: NDArray[np.uint8] | None = None
-) -> Tracing:
-    """Return the tracing with the quality of its mask. With the picture that the mask was made of, compare both."""
-    lines = found["centrelines"], found["widths"]
-    quality = measure_quality(found["cover"], found["labelled"], *lines)
-    if image is not None and mask is not None:
-        quality = compare_with_picture(quality, image, mask, *lines)
+def _quality(found: dict[str, Any]) -> MaskQuality:
+    return measure_quality(found["cover"], found["labelled"], found["centrelines"], found["widths"])
+
+
+def _tracing(found: dict[str, Any], quality: MaskQuality, mask_method: MaskMethod) -> Tracing:
+    """Return the tracing, and warn if its mask is poor."""
     if not quality.is_good:
+        advice = "mask='learned', a color_filter" if mask_method == "ground" else "a color_filter"
         warn(
-            f"the mask does not look like cables: {', '.join(quality.reasons)}. Give mask= to trace, such as a "
-            "color_filter, a network_mask or an array, or take a sharp picture on a plain ground",
+            f"the mask does not look like cables: {', '.join(quality.reasons)}. Give mask= to trace, such as {advice}, "
+            "a network_mask or an array, or take a sharp picture on a plain ground",
             PoorMaskWarning,
         )
     return Tracing(
         mask_quality=quality,
+        mask_method=mask_method,
         centrelines=found["centrelines"],
         widths=found["widths"],
         closed=found["closed"],
@@ -72,9 +85,61 @@ def _check_method(method: str) -> None:
         raise ValueError(f"method must be 'withe' or 'mbest', got {method!r}")
 
 
+@dataclass
+class _Attempt:
+    """A mask of a picture that withe made, what was traced in it, its quality, and the time of making it [s]."""
+
+    method: Literal["ground", "learned"]
+    pixels: NDArray[np.uint8]
+    found: dict[str, Any]
+    quality: MaskQuality
+    seconds: float
+
+
+def _mask_word(mask: str) -> Literal["ground", "learned"]:
+    if mask == "ground":
+        return "ground"
+    if mask == "learned":
+        return "learned"
+    raise ValueError(f"mask must be 'ground', 'learned', an array or a function, got {mask!r}")
+
+
+def _attempt(picture: Image, mask_method: Literal["ground", "learned"], method: Method) -> _Attempt:
+    started = time.perf_counter()
+    probability = cable_probability(picture) if mask_method == "learned" else None
+    pixels = check_mask(ground_filter(picture) if probability is None else probability > LIKELY)
+    seconds = time.perf_counter() - started
+    found = _core.trace_lines(pixels, picture, method)
+    quality, lines = _quality(found), (found["centrelines"], found["widths"])
+    if probability is None:
+        quality = compare_with_picture(quality, picture, pixels, *lines)
+    else:
+        quality = compare_with_network(quality, picture, probability, pixels, *lines)
+    return _Attempt(mask_method, pixels, found, quality, seconds)
+
+
+def _best_attempt(picture: Image, method: Method) -> _Attempt:
+    """Return the tracing by the ground filter where the ground is plain, and else by the network.
+
+    Where the ground is not plain, a mask of the ground filter that looks like cables is kept if the network confirms
+    it and is not certain of its own. Cables on weak textures, such as wood, have sharper borders in it.
+    """
+    ground = _attempt(picture, "ground", method)
+    is_clear = ground.quality.is_good and len(ground.found["centrelines"]) > 0
+    if is_clear and ground.quality.contrast > CLEAR_CONTRAST and has_plain_border(picture):
+        return ground
+    if not can_run():
+        return ground
+    learned = _attempt(picture, "learned", method)
+    both, either = (f(ground.pixels > 0, learned.pixels > 0).sum() for f in (np.logical_and, np.logical_or))
+    if is_clear and both > _CONFIRMED * either and learned.quality.certainty < _CERTAIN:
+        return ground
+    return learned
+
+
 def trace(
     image: ArrayLike | str | os.PathLike[str],
-    mask: ArrayLike | MaskFunction | None = None,
+    mask: ArrayLike | MaskFunction | Literal["ground", "learned"] | None = None,
     method: Method = "withe",
 ) -> Tracing:
     """Find every cable in a picture, and which one lies on top where they cross.
@@ -83,15 +148,18 @@ def trace(
     ----------
     image : str, Path or array_like of shape (height, width, 3)
         A file, or red, green and blue as uint8. One channel (grey) and a fourth (alpha, ignored) are accepted.
-    mask : array_like of shape (height, width), or callable, optional
+    mask : array_like of shape (height, width), callable, or {"ground", "learned"}, optional
         Pixels of cables: booleans or numbers, or a function from the picture to such an array, as `color_filter` and
-        `network_mask` return. By default the pixels that differ from the ground (`ground_filter`).
+        `network_mask` return. The word "ground" takes the pixels that differ from a plain ground (`ground_filter`). The
+        word "learned" takes those that the shipped network finds on any ground (`learned_filter`). By default "ground"
+        where the border of the picture is plain and the mask looks like cables, and else mostly "learned".
     method : {"withe", "mbest"}
         Method of this package, or the published one for comparison.
 
     Returns
     -------
     Tracing
+        Its `mask_method` is the mask that was used: "ground", "learned" or "given".
 
     Warns
     -----
@@ -103,8 +171,11 @@ def trace(
     ------
     ValueError
         A picture that cannot be read or has another shape or type, or a mask of another size.
+    FileNotFoundError
+        The network of "learned" is missing.
     ImportError
-        A file was given and OpenCV is not installed: ``pip install ".[vision]"`` in a clone of withe.
+        A file or "learned" was given and OpenCV is not installed: ``pip install ".[vision]"`` in a clone of withe.
+        Without OpenCV the default mask is "ground".
 
     Examples
     --------
@@ -116,16 +187,18 @@ def trace(
     """
     _check_method(method)
     picture = read_image(image) if isinstance(image, str | os.PathLike) else check_image(image)
-    started = time.perf_counter()
-    by_default = mask is None
-    if mask is None:
-        mask = ground_filter
-    pixels = check_mask(mask(picture) if callable(mask) else mask)
-    masked = time.perf_counter() - started
-    if pixels.shape != picture.shape[:2]:
-        raise ValueError(f"mask must be as large as the image, {picture.shape[:2]}, got {pixels.shape}")
-    found = _core.trace_lines(pixels, picture, method)
-    tracing = _tracing(found, picture, pixels) if by_default else _tracing(found)
+    if mask is None or isinstance(mask, str):
+        chosen = _best_attempt(picture, method) if mask is None else _attempt(picture, _mask_word(mask), method)
+        tracing = _tracing(chosen.found, chosen.quality, chosen.method)
+        masked = chosen.seconds
+    else:
+        started = time.perf_counter()
+        pixels = check_mask(mask(picture) if callable(mask) else mask)
+        masked = time.perf_counter() - started
+        if pixels.shape != picture.shape[:2]:
+            raise ValueError(f"mask must be as large as the image, {picture.shape[:2]}, got {pixels.shape}")
+        found = _core.trace_lines(pixels, picture, method)
+        tracing = _tracing(found, _quality(found), "given")
     tracing.timings = {"mask": masked, **tracing.timings}
     return tracing
 
@@ -161,5 +234,6 @@ def trace_mask(mask: ArrayLike, method: Method = "withe") -> Tracing:
     _check_method(method)
     pixels = check_mask(mask)
     if 0 in pixels.shape:
-        return Tracing(labels=np.zeros(pixels.shape, np.int32))
-    return _tracing(_core.trace_lines(pixels, None, method))
+        return Tracing(labels=np.zeros(pixels.shape, np.int32), mask_method="given")
+    found = _core.trace_lines(pixels, None, method)
+    return _tracing(found, _quality(found), "given")
