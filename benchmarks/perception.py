@@ -25,6 +25,8 @@ from withe.perception import Camera, Tracker, color_filter, trace, trace_mask
 from withe.perception.synthetic import CASES, SyntheticScene, make_case, render, render_mask
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests" / "python"))
+import cluttered_masks
+
 from cable_films import NODES, RATE, SHAPE, TRUE_NODES, camera, crossing_film, hanging_film
 from labelled import RANGES, dice, orders, pictures
 from scoring import score
@@ -312,6 +314,40 @@ def thinning_is_exact(folder):
     line("thinning, bit-equal to scikit-image", f"{sum(equal)} of {len(equal)}", sum(equal), len(equal))
 
 
+def learned_masks(count, first_seed, folder):
+    """Overlaps of the learned mask with the truth, its warnings, its speed, and tracings on wood."""
+    grounds, photos = cluttered_masks.unseen(count, first_seed), cluttered_masks.on_photographs(count, first_seed)
+    print(f"Learned mask, {count} pictures of each kind that no training saw, 640 x 360")
+    for kind, rows in {**grounds, **{f"photograph, {name}": rows for name, rows in photos.items()}}.items():
+        learned, ground = (statistics.mean(getattr(row, word) for row in rows) for word in ("learned", "ground"))
+        beside(f"{kind}: IoU", f"{learned:.2f} (ground filter {ground:.2f})")
+    drawn = [row for rows in grounds.values() for row in rows]
+    everything = drawn + [row for rows in photos.values() for row in rows]
+    overlaps = [row.learned for row in drawn]
+    line("unseen kinds: IoU, mean", f"{np.mean(overlaps):.3f}", float(np.mean(overlaps)), 0.75)
+    low = float(np.quantile(overlaps, 0.05))
+    line("unseen kinds: IoU, 5 % quantile", f"{low:.3f}", low, 0.40)
+    poor = [row.warned for row in everything if row.default < 0.5]
+    share = 100 * np.mean(poor) if poor else 100.0
+    line("default mask with IoU below 0.5: warns [%]", f"{share:.0f} of {len(poor)}", float(share), 95)
+    good = [row.warned for row in everything if row.default >= 0.75]
+    beside("default mask with IoU of 0.75 or more: warns", f"{sum(good)} of {len(good)}")
+    if folder is not None:
+        rows = cluttered_masks.labelled_photographs(folder)
+        overlaps, exact, warned = zip(*rows, strict=True)
+        line("photographs, learned: exact counts", f"{sum(exact)} of {len(rows)}", sum(exact), 90)
+        line("photographs, learned: IoU", f"{np.mean(overlaps):.3f}", float(np.mean(overlaps)), 0.88)
+        line("photographs, default: warnings", f"{sum(warned)} of {len(rows)}", sum(warned), 0, at_least=False)
+    fastest, middle = cluttered_masks.milliseconds(5 if count < 10 else 20)
+    line("learned mask [ms]", f"{fastest:.0f} (median {middle:.0f})", fastest, 40, at_least=False)
+    before, after = (cluttered_masks.on_wood(min(count, 12), first_seed, mask) for mask in ("ground", None))
+    for cables in before:
+        shown = f"{after[cables][0]} of {min(count, 12)} (ground filter {before[cables][0]})"
+        beside(f"{cables} colours on wood: right", shown)
+        swapped, earlier = after[cables][1], before[cables][1]
+        line(f"{cables} colours on wood: exchanged", f"{swapped} (ground filter {earlier})", swapped, 0, at_least=False)
+
+
 def main():
     """Run all."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -327,6 +363,7 @@ def main():
         photographs(folder)
     else:
         print("No labelled images: WITHE_DATA does not name a folder with mbest in it")
+    learned_masks(2 if quick else 20, first_seed, folder if present else None)
     metres()
     hidden_cables(2 if quick else 10, first_seed)
     crossing_cables(3 if quick else 100, first_seed)
