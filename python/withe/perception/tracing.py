@@ -121,8 +121,8 @@ def _attempt(picture: Image, mask_method: Literal["ground", "learned"], method: 
 def _best_attempt(picture: Image, method: Method) -> _Attempt:
     """Return the tracing by the ground filter where the ground is plain, and else by the network.
 
-    Where the ground is not plain, a mask of the ground filter that looks like cables is kept if the network confirms
-    it and is not certain of its own. Cables on weak textures, such as wood, have sharper borders in it.
+    Where the ground is not plain, the mask of the ground filter is kept if the network confirms it and is not certain
+    of its own. Cables on weak textures, such as wood, have sharper borders in it.
     """
     ground = _attempt(picture, "ground", method)
     is_clear = ground.quality.is_good and len(ground.found["centrelines"]) > 0
@@ -132,9 +132,8 @@ def _best_attempt(picture: Image, method: Method) -> _Attempt:
         return ground
     learned = _attempt(picture, "learned", method)
     both, either = (f(ground.pixels > 0, learned.pixels > 0).sum() for f in (np.logical_and, np.logical_or))
-    if is_clear and both > _CONFIRMED * either and learned.quality.certainty < _CERTAIN:
-        return ground
-    return learned
+    is_certain = learned.quality.is_good and learned.quality.certainty > _CERTAIN
+    return ground if both > _CONFIRMED * either and not is_certain else learned
 
 
 def trace(
