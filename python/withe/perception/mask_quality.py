@@ -33,7 +33,7 @@ _FEW_WIDTHS = 6  # widths of so many cables may differ
 # Bounds for pictures. The labelled photographs reach a contrast of 14 and a sharpness of 0.48, drawn cables on plain
 # ground 5 and 0.54. Noise of 40 grey levels gives a contrast of 0.8 to 1.2, a blur of 5 px a sharpness of 0.25.
 _LEAST_CONTRAST = 1.1
-_LEAST_SHARPNESS = 0.35
+LEAST_SHARPNESS = 0.35
 _BLOCK = 3  # width and height of the blocks whose means are compared along the border [px]
 _BORDER_REACH = 3  # distance over which steps along the border are measured [blocks]
 _PLAIN_ROUGHNESS = 6.0  # [grey levels]
@@ -150,7 +150,7 @@ def compare_with_picture(
         reasons.append(f"its borders differ only {contrast:.1f} times as much as the ground itself")
     elif contrast < _SEAM_CONTRAST and _are_seams(centrelines):
         reasons.append("all of its lines are straight and parallel, as seams of the ground are")
-    if sharpness < _LEAST_SHARPNESS:
+    if sharpness < LEAST_SHARPNESS:
         reasons.append("the picture is blurred at its borders")
     return replace(quality, contrast=contrast, sharpness=sharpness, reasons=tuple(reasons))
 
@@ -201,7 +201,7 @@ def compare_with_network(
             is_noise = float(np.percentile(neighbours, 95)) > _NOISE_SHARE * level
             if quality.contrast < _LEAST_CONTRAST and is_noise:
                 reasons.append(f"its borders differ only {quality.contrast:.1f} times as much as the ground itself")
-            if quality.sharpness < _LEAST_SHARPNESS:
+            if quality.sharpness < LEAST_SHARPNESS:
                 reasons.append("the picture is blurred at its borders")
     return replace(quality, reasons=tuple(reasons))
 

@@ -17,6 +17,7 @@ from withe.perception.images import as_array, check_image, read_image
 from withe.perception.learned_mask import LIKELY, cable_probability, can_run
 from withe.perception.mask_quality import (
     CLEAR_CONTRAST,
+    LEAST_SHARPNESS,
     MaskQuality,
     compare_with_network,
     compare_with_picture,
@@ -32,6 +33,7 @@ Image = NDArray[np.uint8]
 Method = Literal["withe", "mbest"]
 
 _CONFIRMED = 0.35  # least intersection over union of both masks, with which the learned one confirms the other
+_SAME = 0.65  # overlap above which both masks show the same cables
 _CERTAIN = 0.8  # certainty of the learned mask, above which it is preferred
 
 
@@ -126,14 +128,18 @@ def _best_attempt(picture: Image, method: Method) -> _Attempt:
     """
     ground = _attempt(picture, "ground", method)
     is_clear = ground.quality.is_good and len(ground.found["centrelines"]) > 0
-    if is_clear and ground.quality.contrast > CLEAR_CONTRAST and has_plain_border(picture):
+    is_plain = has_plain_border(picture)
+    if is_plain and is_clear and ground.quality.contrast > CLEAR_CONTRAST:
         return ground
-    if not can_run():
+    # A blurred picture is no better for the network, and its blur is the reason to report.
+    if not can_run() or (is_plain and ground.quality.sharpness < LEAST_SHARPNESS):
         return ground
     learned = _attempt(picture, "learned", method)
     both, either = (f(ground.pixels > 0, learned.pixels > 0).sum() for f in (np.logical_and, np.logical_or))
+    overlap = both / max(either, 1)
     is_certain = learned.quality.is_good and learned.quality.certainty > _CERTAIN
-    return ground if both > _CONFIRMED * either and not is_certain else learned
+    is_same = ground.quality.is_good and overlap > _SAME
+    return ground if is_same or (overlap > _CONFIRMED and not is_certain) else learned
 
 
 def trace(
