@@ -135,6 +135,8 @@ def _best_attempt(picture: Image, method: Method) -> _Attempt:
     if not can_run() or (is_plain and ground.quality.sharpness < LEAST_SHARPNESS):
         return ground
     learned = _attempt(picture, "learned", method)
+    if is_clear and len(learned.found["centrelines"]) == 0:  # cables too thin for the network
+        return ground
     both, either = (f(ground.pixels > 0, learned.pixels > 0).sum() for f in (np.logical_and, np.logical_or))
     overlap = both / max(either, 1)
     is_certain = learned.quality.is_good and learned.quality.certainty > _CERTAIN
