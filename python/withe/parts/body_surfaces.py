@@ -14,9 +14,17 @@ from withe.common.polyhedra import Core, inside, polyhedron_core, trails
 from withe.common.union_find import UnionFind
 from withe.parts.directory import Directory
 from withe.parts.kinds import BodyFace, BodyPart, BodySurface, JoinPart, ObstaclePart, RodPart
-from withe.solids import Box, Capsule, Hull, Mesh, Sphere, Tube
+from withe.solids import Box, Capsule, Hull, Mesh, Sphere
 
-__all__ = ["check_surfaces", "core_of", "describe_surfaces", "make_surface", "place_surfaces", "surfaces_of"]
+__all__ = [
+    "check_surfaces",
+    "core_of",
+    "describe_surfaces",
+    "ignored",
+    "make_surface",
+    "place_surfaces",
+    "surfaces_of",
+]
 
 FloatArray = npt.NDArray[np.float64]
 # Length of the core of a ball over its radius: the ball turns with it, and it must not show.
@@ -142,14 +150,13 @@ def check_surfaces(directory: Directory) -> None:
     Raises
     ------
     ValueError
-        Obstacles other than planes beside a body with faces, a rod or body inside of such a body, or a rod that is
-        drawn inside of a tube that is no wider.
+        An obstacle other than a plane beside a body with faces, or a rod or body inside of such a body.
     """
     surfaces = [(body, body.surface) for body in surfaces_of(directory) if body.surface is not None]
     with_faces = [(body, surface.core) for body, surface in surfaces if surface.faces]
     for body, _ in with_faces:
         for obstacle in directory.all(ObstaclePart):
-            if obstacle.kind != "plane" and not _ignored(directory, body.name, obstacle.name):
+            if obstacle.kind != "plane" and not ignored(directory, body.name, obstacle.name):
                 instead = (
                     "Add it as a body, by add_body and a sphere or capsule of withe.solids, and hold it with clamp; or"
                     if obstacle.kind == "capsule"
@@ -159,7 +166,6 @@ def check_surfaces(directory: Directory) -> None:
                     f"obstacle {obstacle.name!r} does not touch the faces of body {body.name!r}. {instead} leave the "
                     "pair out with ignore_contact"
                 )
-    _check_channels(directory)
     if not directory.contact.rods:
         return
     lines = [(rod.name, rod.index, "rod", rod.points[None]) for rod in directory.all(RodPart)]
@@ -170,33 +176,13 @@ def check_surfaces(directory: Directory) -> None:
         step = 0.5 * float(np.ptp(core.points, axis=0).min())
         rows = directory.layout.rows(-1 - body.index)
         for name, owner, what, polylines in lines:
-            if np.intersect1d(directory.layout.rows(owner), rows).size or _ignored(directory, body.name, name):
+            if np.intersect1d(directory.layout.rows(owner), rows).size or ignored(directory, body.name, name):
                 continue
             points = np.concatenate([_along(polyline, step) for polyline in polylines])
             if inside(core.points, core.triangles, (points - body.position) @ body.rotation).any():
                 raise ValueError(
                     f"{what} {name!r} is drawn inside of body {body.name!r}: draw them apart, join them, or leave the "
                     "pair out with ignore_contact"
-                )
-
-
-def _check_channels(directory: Directory) -> None:
-    """Refuse rods in tubes that they do not fit."""
-    for obstacle in directory.all(ObstaclePart):
-        tube = obstacle.solid
-        if not isinstance(tube, Tube):
-            continue
-        axis = obstacle.point + tube.axis()
-        for rod in directory.all(RodPart):
-            radius = float(rod.contact_radius.max())
-            if radius < tube.radius or _ignored(directory, rod.name, obstacle.name):
-                continue
-            gaps = np.linalg.norm(rod.points[:, None] - axis[None], axis=2).min(axis=1)
-            if (gaps < 0.9 * tube.radius).any():
-                raise ValueError(
-                    f"rod {rod.name!r} with a contact radius of {radius:g} m is drawn inside of {obstacle.name!r}, "
-                    f"whose inner radius is {tube.radius:g} m: give a thinner rod or a wider tube, or leave the pair "
-                    "out with ignore_contact"
                 )
 
 
@@ -210,7 +196,7 @@ def _along(points: FloatArray, step: float) -> FloatArray:
     return np.concatenate([*found, points[-1:]])
 
 
-def _ignored(directory: Directory, first: str, second: str) -> bool:
+def ignored(directory: Directory, first: str, second: str) -> bool:
     """Return True if two parts may not touch each other."""
     contact = directory.contact
     pair = contact.pairs.get((first, second)) or contact.pairs.get((second, first))

@@ -28,6 +28,7 @@ from withe.parts.kinds import (
     SupportPart,
     TendonPart,
 )
+from withe.parts.obstacle_shapes import check_channels
 from withe.parts.options import Bending
 from withe.parts.parameters import RodParameters
 from withe.parts.springs import describe_springs
@@ -63,6 +64,7 @@ def describe(directory: Directory, gravity: FloatArray, bending: Bending = "angl
     coefficients = {part.name: part.coefficient for part in directory.all(DragPart)}
     scene.rods = [_describe_rod(directory, rod, drag(directory, coefficients, rod)) for rod in rods]
     check_surfaces(directory)
+    check_channels(directory)
     scene.rods += describe_surfaces(directory)
     scene.bodies = describe_bodies(directory)
     scene.joints = [describe_joint(group) for group in groups(directory.all(JoinPart))]

@@ -8,9 +8,12 @@ import numpy as np
 import numpy.typing as npt
 
 from withe import _core
+from withe.parts.body_surfaces import ignored
+from withe.parts.directory import Directory
+from withe.parts.kinds import ObstaclePart, RodPart
 from withe.solids import Field, Tube
 
-__all__ = ["shape_of"]
+__all__ = ["check_channels", "shape_of"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -26,6 +29,32 @@ def shape_of(solid: Tube | Field) -> _core.Shape:
     for axis in range(3):
         values = _spline(values, axis)
     return _core.DistanceField(values.ravel(), list(np.array(values.shape) - 2), low, spacing)
+
+
+def check_channels(directory: Directory) -> None:
+    """Refuse rods that do not fit the tubes in which they are drawn.
+
+    Raises
+    ------
+    ValueError
+        A rod inside of a tube that is no wider.
+    """
+    for obstacle in directory.all(ObstaclePart):
+        tube = obstacle.solid
+        if not isinstance(tube, Tube):
+            continue
+        axis = obstacle.point + tube.axis()
+        for rod in directory.all(RodPart):
+            radius = float(rod.contact_radius.max())
+            if radius < tube.radius or ignored(directory, rod.name, obstacle.name):
+                continue
+            gaps = np.linalg.norm(rod.points[:, None] - axis[None], axis=2).min(axis=1)
+            if (gaps < 0.9 * tube.radius).any():
+                raise ValueError(
+                    f"rod {rod.name!r} with a contact radius of {radius:g} m is drawn inside of {obstacle.name!r}, "
+                    f"whose inner radius is {tube.radius:g} m: give a thinner rod or a wider tube, or leave the pair "
+                    "out with ignore_contact"
+                )
 
 
 def _spline(values: FloatArray, axis: int) -> FloatArray:
