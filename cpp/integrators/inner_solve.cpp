@@ -30,7 +30,8 @@ constexpr int kMaxTrialIterations = 12;
 // Slip tolerance of friction, over that of the scene, in the steps of the continuation.
 constexpr std::array<double, 7> kRegularisation{8192.0, 4096.0, 512.0, 64.0, 16.0, 4.0, 1.0};
 
-// Steps in which supports get to their places, and what may be left of the way, over the size of the scene.
+// Steps in which supports get to their places, and what may be left of the way, over the size of the scene and the
+// greatest displacement.
 constexpr int kMaxSupportSteps = 8;
 constexpr double kReached = 1e-14;
 
@@ -179,7 +180,8 @@ class InnerSolve {
     for (int k = 0; k <= kMaxSupportSteps; ++k) {
       const double way = way_of_supports(equations_, part, state_, work_.move, left);
       work_.z = state_.q + work_.move;
-      if (way <= kReached * equations_.model().length_scale) return true;
+      if (way <= kReached * std::max(equations_.model().length_scale, work_.move.lpNorm<Eigen::Infinity>()))
+        return true;
       before = work_.move;
       step_with_supports(equations_, newton_, state_, left, work_);
       work_.z = state_.q + before;
