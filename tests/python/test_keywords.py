@@ -127,7 +127,7 @@ def broken(simulation):
 MISSING = [
     (lambda s, m: m.run(), "run() is missing duration="),
     (lambda s, m: s.build_batch(time_step=0.01), "build_batch() is missing count="),
-    (lambda s, m: s.add_tendon("arm"), "add_tendon() is missing offset="),
+    (lambda s, m: s.add_capsule((0, 0, 0)), "add_capsule() is missing end= and radius="),
     (lambda s, m: s.add_tendon(offset=(0.1, 0.0)), "add_tendon() is missing guides="),
     (lambda s, m: s.add_spring("arm.start"), "add_spring() is missing b= and stiffness="),
 ]

@@ -897,9 +897,10 @@ class Record:
 def _check_surface(part: BodyOutline | ObstacleOutline) -> None:
     """Refuse a surface whose arrays do not fit together."""
     vertices, triangles = part.vertices, part.triangles
+    owner = f"{'body' if isinstance(part, BodyOutline) else 'obstacle'} {part.name!r}"
     if vertices.ndim != 2 or vertices.shape[1] != 3 or vertices.dtype != np.float64 or not len(vertices):
-        raise ValueError(f"vertices of {part.name!r} must be floats of shape (n, 3)")
+        raise ValueError(f"vertices of {owner} must be floats of shape (n, 3)")
     if triangles.ndim != 2 or triangles.shape[1] != 3 or triangles.dtype.kind != "i" or not len(triangles):
-        raise ValueError(f"triangles of {part.name!r} must be integers of shape (n, 3)")
+        raise ValueError(f"triangles of {owner} must be integers of shape (n, 3)")
     if triangles.min() < 0 or triangles.max() >= len(vertices):
-        raise ValueError(f"triangles of {part.name!r} must lie in 0..{len(vertices) - 1}")
+        raise ValueError(f"triangles of {owner} must lie in 0..{len(vertices) - 1}")

@@ -61,7 +61,7 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
     * hold: `clamp`, `pin`, `grasp`
     * load: `add_force`, `add_moment`, `add_load`, `add_pressure`, `add_drag`, `add_fluid`, `add_custom_force`,
       `actuate` at given times
-    * touch: `enable_contact`, `add_floor`, `add_plane`, `add_sphere`, `add_capsule`, `set_friction`,
+    * touch: `enable_contact`, `add_floor`, `add_plane`, `add_sphere`, `add_capsule`, `add_obstacle`, `set_friction`,
       `set_restitution`, `set_contact_stiffness`, `ignore_contact`, `set_contact_group`
     * run: `build`, `build_batch`, `build_options`
     * read: `rods`, and ``scene["arm"]`` for the handle of a name; `save`, `load` of TOML files
