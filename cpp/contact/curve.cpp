@@ -45,8 +45,9 @@ void add_curve_hessian(const CurvePiece& piece, const Obstacle& o, const CurveDi
   sample_weights(*piece.weights, d, w);
   for (int p = 0; p < 3; ++p) {
     const double place = piece.weights->sample(p);
+    const NormalChange change(o, d.sample[p]);
     for (int k = 0; k < 3; ++k) {
-      const Vec3d turned = (factor * w[p]) * normal_change(o, d.sample[p], kUnitVectors[k]);
+      const Vec3d turned = (factor * w[p]) * change.of_normal(kUnitVectors[k]);
       for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j) {
           const double share = piece.weights->at(i, place) * piece.weights->at(j, place);

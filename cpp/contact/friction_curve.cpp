@@ -50,11 +50,12 @@ void add_contact_slopes(const FrictionSetting& f, const SlippingSurfaces<double>
   const CurveDistance<double> distance = distance_of(f, nodes);
   const CurveSlopes slopes = curve_slopes(f.pair->piece, distance);
   const PointDistance<double> point = distance_to(*f.obstacle, curve_point(curve.w, x, c.s));
+  const NormalChange change(*f.obstacle, point);
   const Vec3d tangent = curve_direction(curve.w, x, c.s);
   curve.each_way(false, [&](int j) {
     d.s[j] = slopes.s[j];
     d.pressing[j] = -c.law.by_end * slopes.distance[j];
-    d.normal[j] = direction_change(*f.obstacle, point, curve.weight[j / 3] * kUnitVectors[j % 3] + d.s[j] * tangent);
+    d.normal[j] = change.of_direction(curve.weight[j / 3] * kUnitVectors[j % 3] + d.s[j] * tangent);
   });
 }
 
@@ -85,10 +86,9 @@ void add_turn_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& c
 }
 
 /// Derivatives of `obstacle_arm`: of a - (delta - r) n with a = c(s), da - (n . da) n - (delta - r) dn.
-Vec3d obstacle_arm_slope(const FrictionSetting& f, const Curve& curve, const Vec3d (&x)[3], const CurvedSlopes& d,
-                         int j) {
+Vec3d obstacle_arm_slope(const FrictionSetting& f, const Curve& curve, const Vec3d (&x)[3],
+                         const PointDistance<double>& point, const CurvedSlopes& d, int j) {
   if (f.rolling) return -f.pair->radius_a * d.normal[j];
-  const PointDistance<double> point = distance_to(*f.obstacle, curve_point(curve.w, x, curve.s));
   Vec3d moved = d.s[j] * curve_direction(curve.w, x, curve.s);
   if (j < kCurveAngle) moved += curve.weight[j / 3] * kUnitVectors[j % 3];
   return moved - dot(point.normal, moved) * direction_of(*f.obstacle, point) -
@@ -103,6 +103,8 @@ void add_force_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& 
   const ForceLaw g = force_law(f, c.pressing, dot(slip, slip), c.friction.sticking);
   const Vec3d dual = g.dual_slip(slip, f.predicted, f.friction * c.pressing);
   const bool turns = dot(f.turn, f.turn) > 0.0;
+  const PointDistance<double> point =
+      turns ? distance_to(*f.obstacle, curve_point(curve.w, x, curve.s)) : PointDistance<double>{};
   Vec3d turn{}, moved_on{};
   for (int b = 0; b < c.bodies; ++b) turn += curve.lever[b] * c.sides[b].turn;
   for (int i = 0; i < curve.w.nodes; ++i)
@@ -112,7 +114,7 @@ void add_force_slopes(const FrictionSetting& f, const SlippingSurfaces<double>& 
     Vec3d moved = cross(n, d.turn[j]) - cross(turn, across);
     if (!f.rolling) moved += d.s[j] * moved_on;
     if (!f.rolling && j < kCurveAngle) moved += curve.weight[j / 3] * kUnitVectors[j % 3];
-    if (turns) moved -= cross(f.turn, obstacle_arm_slope(f, curve, x, d, j));
+    if (turns) moved -= cross(f.turn, obstacle_arm_slope(f, curve, x, point, d, j));
     d.force[j] = g.factor * (moved - off * across) - (g.factor * (dot(n, moved) + dot(slip, across))) * n +
                  (2.0 * g.by_square * dot(slip, moved - off * across)) * dual + (g.by_pressing * d.pressing[j]) * slip;
   });

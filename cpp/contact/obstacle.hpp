@@ -24,7 +24,7 @@ struct Obstacle {
 /// A point beside an obstacle.
 template <class Scalar>
 struct PointDistance {
-  Scalar distance;      ///< from a plane, from the middle of a sphere, the axis of a capsule or that of `Shape` [m]
+  Scalar distance;      ///< from a plane, the middle of a sphere or the axis of a capsule; or that of `Shape` [m]
   Vec3<Scalar> normal;  ///< its gradient
   bool beside = false;  ///< a capsule's axis, between its ends
   Vec3d place{};        ///< the point, in the axes of a shape [m]
@@ -76,22 +76,7 @@ PointDistance<Scalar> distance_to(const Obstacle& o, const Vec3<Scalar>& x, cons
   return out;
 }
 
-/// Change of the normal as the point moves by `change`: the second derivative of the distance, times it.
-inline Vec3d normal_change(const Obstacle& o, const PointDistance<double>& p, const Vec3d& change) {
-  if (o.kind == ObstacleKind::plane) return {};
-  if (o.kind == ObstacleKind::shape) {
-    const Mat3<double> by = o.shape->distance(p.place).change;
-    return {dot(by.row[0], change), dot(by.row[1], change), dot(by.row[2], change)};
-  }
-  Vec3d across = change - dot(p.normal, change) * p.normal;
-  if (p.beside) {
-    const Vec3d axis = o.other - o.point;
-    across -= (dot(axis, across) / dot(axis, axis)) * axis;
-  }
-  return (1.0 / std::max(p.distance, 1e-300)) * across;
-}
-
-/// Unit vector of the normal: the gradient of a field's spline is of length 1 about.
+/// Unit vector of the normal. The gradient of a field's spline has a length of about 1 only.
 template <class Scalar>
 Vec3<Scalar> direction_of(const Obstacle& o, const PointDistance<Scalar>& p) {
   using std::sqrt;
@@ -99,13 +84,40 @@ Vec3<Scalar> direction_of(const Obstacle& o, const PointDistance<Scalar>& p) {
   return (1.0 / sqrt(dot(p.normal, p.normal))) * p.normal;
 }
 
-/// Its change as the point moves by `change`.
-inline Vec3d direction_change(const Obstacle& o, const PointDistance<double>& p, const Vec3d& change) {
-  const Vec3d turned = normal_change(o, p, change);
-  if (o.kind != ObstacleKind::shape) return turned;
-  const double inverse = 1.0 / std::sqrt(dot(p.normal, p.normal));
-  const Vec3d direction = inverse * p.normal;
-  return inverse * (turned - dot(direction, turned) * direction);
-}
+/// Turning of the normal as the point moves. A shape is evaluated once for all directions.
+class NormalChange {
+ public:
+  NormalChange(const Obstacle& obstacle, const PointDistance<double>& point) : obstacle_(obstacle), point_(point) {
+    if (of_shape()) by_ = obstacle.shape->distance(point.place).change;
+  }
+
+  /// The second derivative of the distance, times a change of the point.
+  Vec3d of_normal(const Vec3d& change) const {
+    if (obstacle_.kind == ObstacleKind::plane) return {};
+    if (of_shape()) return {dot(by_.row[0], change), dot(by_.row[1], change), dot(by_.row[2], change)};
+    Vec3d across = change - dot(point_.normal, change) * point_.normal;
+    if (point_.beside) {
+      const Vec3d axis = obstacle_.other - obstacle_.point;
+      across -= (dot(axis, across) / dot(axis, axis)) * axis;
+    }
+    return (1.0 / std::max(point_.distance, 1e-300)) * across;
+  }
+
+  /// Change of `direction_of`.
+  Vec3d of_direction(const Vec3d& change) const {
+    const Vec3d turned = of_normal(change);
+    if (!of_shape()) return turned;
+    const double inverse = 1.0 / std::sqrt(dot(point_.normal, point_.normal));
+    const Vec3d direction = inverse * point_.normal;
+    return inverse * (turned - dot(direction, turned) * direction);
+  }
+
+ private:
+  bool of_shape() const { return obstacle_.kind == ObstacleKind::shape; }
+
+  const Obstacle& obstacle_;
+  const PointDistance<double>& point_;
+  Mat3<double> by_{};
+};
 
 }  // namespace withe

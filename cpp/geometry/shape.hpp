@@ -1,6 +1,6 @@
 #pragma once
-/// Solids of any shape. A new one is a class with one function, a kind of obstacle in `bindings/bind_model.cpp` and a
-/// class of `withe.solids`.
+/// Solids of any shape. A new one is a class with a distance, its constructor in `bindings/bind_model.cpp`, a class of
+/// `withe.solids`, and a line of `parts/obstacle_shapes.py`.
 
 #include "geometry/vec3.hpp"
 

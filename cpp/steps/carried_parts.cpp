@@ -339,32 +339,35 @@ void place_carried(const StepProblem& problem, VectorX& z) {
 
 namespace {
 
-/// Calls find(kind, part, its body, the force on it, rows of the body) for each part, parts of parts first.
+/// Calls use(kind, number, part) for each part, parts of parts first.
+template <class Use>
+void each_backwards(const StepProblem& problem, const Use& use) {
+  const std::vector<CarriedPart>& carried = problem.model.carried;
+  for (std::size_t i = carried.size(); i-- > 0;)
+    with_kind(problem, carried[i], [&](const auto& kind) { use(kind, i, carried[i]); });
+}
+
+/// Calls find(kind, part, its body, the force on it, whether there is any, rows of the body) for each part.
 template <class Find>
 void fold(const StepProblem& problem, const VectorX& z, VectorX& rows, VectorX& magnitude, const Find& find) {
-  const std::vector<CarriedPart>& carried = problem.model.carried;
-  for (std::size_t i = carried.size(); i-- > 0;) {
-    const CarriedPart& part = carried[i];
-    with_kind(problem, part, [&]<class Kind>(const Kind& kind) {
-      double body[Kind::kBody], force[Kind::kOwn], acting[Kind::kBody], size[Kind::kOwn], bound[Kind::kBody];
-      gather(part, z, body);
-      for (int k = 0; k < Kind::kOwn; ++k) {
-        force[k] = rows[part.own_dof + k];
-        size[k] = magnitude[part.own_dof + k];
-      }
-      const bool pressed = std::any_of(force, force + Kind::kOwn, [](double f) { return f != 0.0; });
-      std::fill(acting, acting + Kind::kBody, 0.0);
-      find(kind, i, body, force, pressed, acting);
-      kind.bound(size, bound);
-      for (int b = 0; b < Kind::kBody; ++b) {
-        const int dof = part.body_dofs[at(b)];
-        rows[dof] += acting[b];
-        magnitude[dof] += bound[b];
-      }
-      rows.segment(part.own_dof, Kind::kOwn).setZero();
-      magnitude.segment(part.own_dof, Kind::kOwn).setZero();
-    });
-  }
+  each_backwards(problem, [&]<class Kind>(const Kind& kind, std::size_t i, const CarriedPart& part) {
+    double body[Kind::kBody], force[Kind::kOwn], acting[Kind::kBody] = {}, size[Kind::kOwn], bound[Kind::kBody];
+    gather(part, z, body);
+    for (int k = 0; k < Kind::kOwn; ++k) {
+      force[k] = rows[part.own_dof + k];
+      size[k] = magnitude[part.own_dof + k];
+    }
+    const bool pressed = std::any_of(force, force + Kind::kOwn, [](double f) { return f != 0.0; });
+    find(kind, i, body, force, pressed, acting);
+    kind.bound(size, bound);
+    for (int b = 0; b < Kind::kBody; ++b) {
+      const int dof = part.body_dofs[at(b)];
+      rows[dof] += acting[b];
+      magnitude[dof] += bound[b];
+    }
+    rows.segment(part.own_dof, Kind::kOwn).setZero();
+    magnitude.segment(part.own_dof, Kind::kOwn).setZero();
+  });
 }
 
 }  // namespace
@@ -403,28 +406,22 @@ void find_carrying(const StepProblem& problem, const VectorX& z, std::size_t i, 
 constexpr double kCarriedShare = 1.0 / 32.0;
 
 void fold_bounds(const StepProblem& problem, VectorX& bounds) {
-  const std::vector<CarriedPart>& carried = problem.model.carried;
-  for (std::size_t i = carried.size(); i-- > 0;) {
-    const CarriedPart& part = carried[i];
-    with_kind(problem, part, [&]<class Kind>(const Kind& kind) {
-      double size[Kind::kOwn], bound[Kind::kBody];
-      for (int k = 0; k < Kind::kOwn; ++k) size[k] = bounds[part.own_dof + k];
-      kind.bound(size, bound);
-      for (int b = 0; b < Kind::kBody; ++b) bounds[part.body_dofs[at(b)]] += kCarriedShare * bound[b];
-    });
-  }
+  each_backwards(problem, [&]<class Kind>(const Kind& kind, std::size_t, const CarriedPart& part) {
+    double size[Kind::kOwn], bound[Kind::kBody];
+    for (int k = 0; k < Kind::kOwn; ++k) size[k] = bounds[part.own_dof + k];
+    kind.bound(size, bound);
+    for (int b = 0; b < Kind::kBody; ++b) bounds[part.body_dofs[at(b)]] += kCarriedShare * bound[b];
+  });
 }
 
 void sum_rows(const StepProblem& problem, const VectorX& z, VectorX& rows) {
-  const std::vector<CarriedPart>& carried = problem.model.carried;
-  for (std::size_t i = carried.size(); i-- > 0;)
-    with_kind(problem, carried[i], [&]<class Kind>(const Kind& kind) {
-      double body[Kind::kBody], force[Kind::kOwn], acting[Kind::kBody];
-      gather(carried[i], z, body);
-      for (int k = 0; k < Kind::kOwn; ++k) force[k] = rows[carried[i].own_dof + k];
-      kind.act(body, force, acting);
-      for (int b = 0; b < Kind::kBody; ++b) rows[carried[i].body_dofs[at(b)]] += acting[b];
-    });
+  each_backwards(problem, [&]<class Kind>(const Kind& kind, std::size_t, const CarriedPart& part) {
+    double body[Kind::kBody], force[Kind::kOwn], acting[Kind::kBody];
+    gather(part, z, body);
+    for (int k = 0; k < Kind::kOwn; ++k) force[k] = rows[part.own_dof + k];
+    kind.act(body, force, acting);
+    for (int b = 0; b < Kind::kBody; ++b) rows[part.body_dofs[at(b)]] += acting[b];
+  });
 }
 
 void expand_step(const StepProblem& problem, const VectorX& z, VectorX& step) {
