@@ -34,6 +34,7 @@ _FEW_WIDTHS = 6  # widths of so many cables may differ
 # ground 5 and 0.54. Noise of 40 grey levels gives a contrast of 0.8 to 1.2, a blur of 5 px a sharpness of 0.25.
 _LEAST_CONTRAST = 1.1
 LEAST_SHARPNESS = 0.35
+_BLURRED = "the picture is blurred at its borders"
 _BLOCK = 3  # width and height of the blocks whose means are compared along the border [px]
 _BORDER_REACH = 3  # distance over which steps along the border are measured [blocks]
 _PLAIN_ROUGHNESS = 6.0  # [grey levels]
@@ -137,22 +138,18 @@ def compare_with_picture(
     centrelines : sequence of ndarray of shape (n, 2) [px]
     widths : sequence of ndarray of shape (n,) [px]
     """
-    if len(centrelines) == 0:
+    found = _with_borders(quality, image, mask > 0, centrelines, widths)
+    if found is None:
         return quality
-    border, ground, near = _steps(image, mask > 0, int(np.clip(np.median(np.concatenate(list(widths))), 4, 16)))
-    if len(border) == 0 or len(ground) == 0 or len(near) == 0:
-        return quality
-    step = float(np.median(border))
-    contrast = step / max(float(np.percentile(ground, 95)), 1.0)
-    sharpness = float(np.median(near)) / max(step, 1.0)
+    quality, _ = found
     reasons = list(quality.reasons)
-    if contrast < _LEAST_CONTRAST:
-        reasons.append(f"its borders differ only {contrast:.1f} times as much as the ground itself")
-    elif contrast < _SEAM_CONTRAST and _are_seams(centrelines):
+    if quality.contrast < _LEAST_CONTRAST:
+        reasons.append(_faint(quality))
+    elif quality.contrast < _SEAM_CONTRAST and _are_seams(centrelines):
         reasons.append("all of its lines are straight and parallel, as seams of the ground are")
-    if sharpness < LEAST_SHARPNESS:
-        reasons.append("the picture is blurred at its borders")
-    return replace(quality, contrast=contrast, sharpness=sharpness, reasons=tuple(reasons))
+    if quality.sharpness < LEAST_SHARPNESS:
+        reasons.append(_BLURRED)
+    return replace(quality, reasons=tuple(reasons))
 
 
 def compare_with_network(
@@ -191,19 +188,37 @@ def compare_with_network(
         if certainty < _LEAST_CERTAINTY:
             reasons.append("it is empty, and the network expects cables")
     quality = replace(quality, certainty=certainty)
-    if len(centrelines):
-        distance = int(np.clip(np.median(np.concatenate(list(widths))), 4, 16))
-        border, ground, near = _steps(image, inside, distance)
-        if len(border) and len(ground) and len(near):
-            step, level = float(np.median(border)), max(float(np.percentile(ground, 95)), 1.0)
-            quality = replace(quality, contrast=step / level, sharpness=float(np.median(near)) / max(step, 1.0))
-            neighbours = np.abs(np.diff(image[::3].astype(np.int16), axis=1)).max(axis=-1)
-            is_noise = float(np.percentile(neighbours, 95)) > _NOISE_SHARE * level
-            if quality.contrast < _LEAST_CONTRAST and is_noise:
-                reasons.append(f"its borders differ only {quality.contrast:.1f} times as much as the ground itself")
-            if quality.sharpness < LEAST_SHARPNESS:
-                reasons.append("the picture is blurred at its borders")
+    found = _with_borders(quality, image, inside, centrelines, widths)
+    if found is not None:
+        quality, level = found
+        neighbours = np.abs(np.diff(image[::3].astype(np.int16), axis=1)).max(axis=-1)
+        is_noise = float(np.percentile(neighbours, 95)) > _NOISE_SHARE * level
+        if quality.contrast < _LEAST_CONTRAST and is_noise:
+            reasons.append(_faint(quality))
+        if quality.sharpness < LEAST_SHARPNESS:
+            reasons.append(_BLURRED)
     return replace(quality, reasons=tuple(reasons))
+
+
+def _with_borders(
+    quality: MaskQuality,
+    image: NDArray[np.uint8],
+    inside: NDArray[np.bool_],
+    centrelines: Sequence[Array],
+    widths: Sequence[Array],
+) -> tuple[MaskQuality, float] | None:
+    """Return the quality with contrast and sharpness, and the steps of the ground [grey levels]; None without lines."""
+    if len(centrelines) == 0:
+        return None
+    border, ground, near = _steps(image, inside, int(np.clip(np.median(np.concatenate(list(widths))), 4, 16)))
+    if len(border) == 0 or len(ground) == 0 or len(near) == 0:
+        return None
+    step, level = float(np.median(border)), max(float(np.percentile(ground, 95)), 1.0)
+    return replace(quality, contrast=step / level, sharpness=float(np.median(near)) / max(step, 1.0)), level
+
+
+def _faint(quality: MaskQuality) -> str:
+    return f"its borders differ only {quality.contrast:.1f} times as much as the ground itself"
 
 
 def has_plain_border(image: NDArray[np.uint8]) -> bool:
