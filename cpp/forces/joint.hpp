@@ -12,8 +12,8 @@
 /// Nonlinear Sci. 6]. In a plane, frames that turn by x and y are measured by their Cayley vectors 2 tan(x / 2). T is
 /// then scaled by s to keep this work:
 ///   T (x - y) = T s (2 tan(x / 2) - 2 tan(y / 2)).
-/// Where the spring reaches L within a step, its torque is the mean over the change of the angle, which keeps the work
-/// as well.
+/// In a step in which the spring reaches L, its torque is its mean over the change of the angle. This mean keeps the
+/// work too.
 ///
 /// Stops at the angles a < b push back with the energy V = k (theta - b)^2 / 2 above b and k (a - theta)^2 / 2 below a.
 /// Their torque over a step is the discrete gradient -(V(theta1) - V(theta0)) / (theta1 - theta0), so that a joint

@@ -24,8 +24,8 @@ struct Supernodes {
   double operations() const;
 };
 
-/// By approximate minimum degree, or by nested dissection where this is costly and dissection is not. Children come
-/// right before their parent.
+/// Finds supernodes in the order of approximate minimum degree. If this order is costly and nested dissection costs
+/// less, the order is that of dissection. Children come right before their parent.
 Supernodes find_supernodes(const SparsityPattern& pattern);
 
 }  // namespace withe

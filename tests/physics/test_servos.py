@@ -167,7 +167,7 @@ def test_a_weak_servo_gives_way_in_equilibrium() -> None:
 
 @pytest.mark.parametrize("most", [0.004, 0.012, 10.0])
 def test_gradients_of_servos(most: float) -> None:
-    """By stiffness, rest angle and greatest torque against central differences, saturated and not."""
+    """Central differences give the same by stiffness, rest angle and greatest torque, below the limit and at it."""
 
     def run(**words: float) -> tuple[withe.Joint, withe.Record, float]:
         scene = withe.Scene(gravity=(0, 0, 0))

@@ -46,7 +46,7 @@ def test_distances_from_a_bent_tube_are_those_of_its_arc() -> None:
 
 @pytest.mark.parametrize("solid", [Tube(quarter(), radius=0.004), RING], ids=["tube", "field"])
 def test_normals_are_gradients(solid: Tube | Field) -> None:
-    """By differences, beside the surface."""
+    """Central differences of distances give the normals beside the surface."""
     draw = np.random.default_rng(1)
     vertices, _ = solid.surface()
     points = vertices[draw.integers(0, len(vertices), 300)] + draw.normal(0.0, 1e-3, (300, 3))

@@ -274,7 +274,7 @@ def _resume(path: Path, record: MaskTraining, module: Any, optimizer: Any) -> No
     if found[2] != record.steps and done > latest:
         raise ValueError(
             f"steps must be {found[2]}, as in {path}, whose {done} steps exceed {latest}, got {record.steps}. Delete "
-            "the file to begin anew"
+            "the file to start from the first step"
         )
     module.load_state_dict(kept["module"])
     optimizer.load_state_dict(kept["optimizer"])
