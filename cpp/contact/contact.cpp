@@ -23,6 +23,7 @@ void set_start(const State& state, double duration, ContactProblem& problem) {
   problem.renewed.clear();
   problem.unrecorded.clear();
   problem.leaving.clear();
+  problem.striking.clear();
   problem.lagged.clear();
   problem.lagged_friction.clear();
   problem.find_offsets();
@@ -198,6 +199,15 @@ void Contact::update(const VectorX& q1) {
 
 void Contact::find(const VectorX& q) {
   set_.find(problem_, q, [&](const auto& add) { candidates_.find(q, problem_.bodies, add); });
+  if (problem_.starting) return;
+  std::vector<Touching>& striking = problem_.striking;
+  for (const Touching& t : set_) {
+    if (!(t.strike.apart > 0.0)) continue;
+    const auto place = std::lower_bound(
+        striking.begin(), striking.end(), t.pair.key,
+        [](const Touching& other, const ContactKey& key) { return comes_before(other.pair.key, key); });
+    if (place == striking.end() || !(place->pair.key == t.pair.key)) striking.insert(place, t);
+  }
 }
 
 void Contact::local(int i, bool with_hessian, ContactLocal& out, const ContactLinearisation& linearisation) const {
@@ -341,6 +351,7 @@ void Contact::forget() {
   set_.clear();
   problem_.lagged.clear();
   problem_.leaving.clear();
+  problem_.striking.clear();
 }
 
 void Contact::hold_sticking(const State& state, VectorX& change) const {

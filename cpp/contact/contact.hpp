@@ -109,7 +109,7 @@ class Contact {
   /// True if surfaces are deeper in each other than a step may end with.
   bool too_deep() const { return set_.depth() > deepest_; }
   void allow_depth(double deepest) { deepest_ = deepest; }
-  /// True if a step of dt is too long for the loss of an impact by restitution.
+  /// True if a step of dt is too long to resolve where surfaces meet.
   bool unresolved(double dt) const;
   /// True if the step from q0, now at its end, is too long to see that surfaces met.
   bool missed(const VectorX& q0) { return candidates_.missed(q0, set_.q(), problem_.bodies, problem_.shift); }

@@ -19,6 +19,12 @@ void set_body_masses(const Model& model, const Parameters& parameters, VectorX& 
     if (surface.edge >= 0) edge_mass(surface.edge) = surface.is_held ? INFINITY : of_frame(surface.frame);
 }
 
+/// A vector in space, in the axes of the unknowns.
+Vec3d in_axes(const Model& model, const Vector3& v) {
+  if (model.planar()) return {v.dot(model.plane->first), v.dot(model.plane->second), 0.0};
+  return {v.x(), v.y(), v.z()};
+}
+
 bool by_bodies(const BodyOffset& a, const BodyOffset& b) { return a.rod != b.rod ? a.rod < b.rod : a.other < b.other; }
 
 }  // namespace
@@ -26,6 +32,7 @@ bool by_bodies(const BodyOffset& a, const BodyOffset& b) { return a.rod != b.rod
 ContactParameters::ContactParameters(const Surfaces& surfaces, const Parameters& parameters)
     : version(parameters.version),
       gravity(parameters.gravity.norm()),
+      pull(in_axes(surfaces.model(), parameters.gravity)),
       slip_tolerance(parameters.surfaces.slip_tolerance) {
   const Model& model = surfaces.model();
   const double given = parameters.surfaces.contact_stiffness, light = model.description.contact.least_tolerance();

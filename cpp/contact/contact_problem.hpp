@@ -26,6 +26,13 @@ struct PlaneLocal {
   double hessian[kPlaneUnknowns][kPlaneUnknowns];
 };
 
+/// Impact with a restitution below 1, which happens within one step; see rebound.hpp.
+struct Strike {
+  bool happens = false;
+  double apart = 0;  ///< distance of the surfaces at the end of the step; below 0: their depth [m]
+  double speed = 0;  ///< at which the surfaces part then [m/s]
+};
+
 /// One contact at a configuration.
 struct Touching {
   ContactPair pair;
@@ -36,6 +43,7 @@ struct Touching {
   double approach = 0, age = 0;  ///< see ContactRecord
   double before = 0;             ///< distance at the start of the step, where `law` needs it [m]
   double turn = 0;               ///< for a new impact: angle between its directions at both ends of the step [rad]
+  Strike strike;
   PressingLaw law;
   PressingForce pressing;
   Vec3d stick{}, roll{};  ///< elastic slips, see ContactRecord
@@ -49,6 +57,8 @@ struct Touching {
   double depth() const { return (pair.radii() - (proximity.distance + yielded)) / pair.scale; }
   /// True if no more than the tail of the contact law presses the surfaces.
   bool apart() const { return proximity.distance + yielded >= pair.radii(); }
+  /// True of an impact with a restitution below 1 that a force at the end of the step has turned round.
+  bool struck() const { return strike.happens && pressing.first < 0.0; }
 };
 
 /// Friction with J and N of the start of the step; semi-explicit: along the slip velocity there, where it has one.
@@ -76,6 +86,7 @@ struct ContactParameters {
 
   long version = -1;
   double gravity = 0;         ///< [m/s^2]
+  Vec3d pull{};               ///< gravity, in the axes of the unknowns [m/s^2]
   double slip_tolerance = 0;  ///< nu [m/s]
   VectorX edge_mass;          ///< [kg]
   VectorX least_stiffness;    ///< lower bound of the stiffness of contacts, per rod [N/m]
@@ -98,6 +109,7 @@ struct ContactProblem {
                                        ///< again in the step; sorted
   std::vector<ContactKey> unrecorded;  ///< contacts at the start without a record
   std::vector<Touching> leaving;       ///< contacts that return their energy in the step, for any end of it
+  std::vector<Touching> striking;      ///< impacts that end with surfaces apart, for any end of the step; sorted
   std::vector<Touching> lagged;        ///< contacts of the start, for their friction alone
   std::vector<LaggedFriction> lagged_friction;
   double start_energy = 0, start_pressing = 0;  ///< energy of contact and anchors, and of pressing alone [J]

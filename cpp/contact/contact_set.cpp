@@ -63,14 +63,14 @@ void ContactSet::renew(const ContactProblem& problem, int i, const ContactRecord
   set_from(problem, &record, touching_[static_cast<std::size_t>(i)]);
 }
 
-/// Adds contacts that touch at the start of the step only, and return their energy there. `first` is the index after
-/// the contacts that exist for friction alone.
-void ContactSet::add_leaving(const ContactProblem& problem, std::size_t first) {
-  const std::size_t count = touching_.size();
+/// Adds contacts of a list that act for any end of the step, if they are not among those from `first` to `last`, which
+/// are sorted.
+void ContactSet::add_all(const ContactProblem& problem, const std::vector<Touching>& acting, std::size_t first,
+                         std::size_t last) {
   OrderedLookup records;
-  for (const Touching& start : problem.leaving) {
+  for (const Touching& start : acting) {
     const auto from = touching_.begin() + static_cast<std::ptrdiff_t>(first);  // adding to them moves them
-    const auto end = touching_.begin() + static_cast<std::ptrdiff_t>(count);
+    const auto end = touching_.begin() + static_cast<std::ptrdiff_t>(last);
     const auto found = std::lower_bound(from, end, start.pair.key, [](const Touching& t, const ContactKey& key) {
       return comes_before(t.pair.key, key);
     });

@@ -23,7 +23,9 @@ class ContactSet {
       set_forces(problem, records, t);
       if (!problem.touch(pair, proximity.distance, t.yielded) || leaves_face(problem, t)) touching_.pop_back();
     });
-    add_leaving(problem, first);
+    const std::size_t last = touching_.size();
+    add_all(problem, problem.leaving, first, last);
+    add_all(problem, problem.striking, first, last);
   }
   void clear();
 
@@ -48,7 +50,7 @@ class ContactSet {
   Touching& add(const ContactProblem& problem, const ContactPair& pair, const Proximity& proximity);
   static void set_forces(const ContactProblem& problem, OrderedLookup& records, Touching& t);
   static bool leaves_face(const ContactProblem& problem, const Touching& t);
-  void add_leaving(const ContactProblem& problem, std::size_t first);
+  void add_all(const ContactProblem& problem, const std::vector<Touching>& acting, std::size_t first, std::size_t last);
 
   VectorX q_;
   std::vector<Touching> touching_;

@@ -23,6 +23,9 @@ constexpr double kMaxForceMargin = 32.0;
 constexpr double kFadingPerStep = 0.1;
 // Speed of resting surfaces that part, over `rest_speed`.
 constexpr double kMaxFadingSpeed = 0.1;
+// Force for which a contact is stiff in the step of an impact with a restitution below 1, over the force that stops its
+// mass within the step. The depth at the end of this step is lost.
+constexpr double kStrikeMargin = 10.0;
 // Force of surfaces that a scene draws near each other, besides the weight of their edges, over the force for which the
 // contact is stiff.
 constexpr double kMaxDrawnForce = 1e-6;
@@ -73,7 +76,7 @@ class SharedWeight {
                                 [&](const Touching& t) { return t.lagged < 0 && bodies_of(t.pair) == bodies; });
     }
     const std::vector<int>& first = problem_.model().rod_first_edge;
-    const int edges = first[at(pair.rod_a + 1)] - first[at(pair.rod_a)];
+    const int edges = problem_.model().is_surface(pair.key.a) ? 1 : first[at(pair.rod_a + 1)] - first[at(pair.rod_a)];
     const double share = std::min(1.0, static_cast<double>(edges) / static_cast<double>(contacts_));
     return share * pair.share * problem_.mass_of(pair) * problem_.parameters->gravity;
   }
@@ -145,6 +148,11 @@ double impact_stiffness(const ContactProblem& problem, const ContactPair& pair) 
       fastest = std::max(fastest, speed_of(v - local_position(model, velocities, end_node(pair.key.b, l))));
   }
   const double mass = problem.mass_of(pair);
+  if (pair.restitution < 1.0) {
+    // In shorter steps surfaces hardly enter each other before the impulses of the impact act.
+    const double shortest = fastest > 0.0 ? kDepth * pair.scale / (kStrikeMargin * fastest) : 0.0;
+    return problem.stiffness_to_bear(pair, kStrikeMargin * mass * fastest / std::max(problem.duration, shortest));
+  }
   const auto stores = [&](double speed) { return problem.stiffness_to_store(pair, 0.5 * mass * speed * speed); };
   const double stops = std::min(problem.stiffness_to_bear(pair, mass * fastest / problem.duration), stores(fastest));
   if (problem.pressing < Pressing::mean) return stops;
@@ -198,6 +206,16 @@ double ContactStiffness::change_stiffness(const Touching& t, double ratio, doubl
   return put_in;
 }
 
+/// Leaves no more than a weight on a contact after an impact. Returns the energy put in.
+double ContactStiffness::settle(const Touching& t, double weight, ContactRecord& record) const {
+  const double wanted = start_stiffness(problem_, t.pair, problem_.start->contact_stiffness),
+               ratio = problem_.fixed(t.pair) ? 1.0 : wanted / record.stiffness;
+  const double distance = distance_at(problem_, t, ratio, true, weight / (ratio * t.stiffness));
+  record.stick = record.roll = Vec3d{};
+  return change_stiffness(t, ratio, std::max(0.0, distance - t.proximity.distance), record) -
+         anchor_energy(problem_, t);
+}
+
 double ContactStiffness::wanted_ratio(const Touching& t, const ContactRecord& record) const {
   if (problem_.fixed(t.pair)) return 1.0;
   const double wanted = wanted_stiffness(problem_, t);
@@ -224,12 +242,12 @@ double ContactStiffness::source_stiffness(const ContactSet& set, VectorX& force)
 ContactRecord ContactStiffness::record(const Touching& t) const {
   ContactRecord record;
   record.key = t.pair.key;
-  record.force = -t.energy.first;
+  record.force = t.struck() ? -t.pressing.first : -t.energy.first;
   record.stiffness = t.stiffness / t.pair.share;
   record.yielded = t.yielded;
   if (problem_.pressing != Pressing::still) {
     const bool coming = comes_near(problem_, t);
-    if (coming || impact_lasts(problem_, t)) {
+    if (!t.struck() && (coming || impact_lasts(problem_, t))) {
       record.approach = t.approach;
       record.age = coming ? 0.0 : t.age + problem_.duration;
     }
@@ -273,10 +291,16 @@ double ContactStiffness::accept(const ContactSet& set, double spare, StiffnessSc
   const bool source = common > 0.0;
   greatest = problem_.parameters->least_stiffness;
   double put_in = 0.0, wanted = 0.0;
+  SharedWeight weight(problem_, set);
   for (const Touching& t : set) {
     const ContactPair& pair = t.pair;
     if (!presses(t)) continue;
     ContactRecord record = this->record(t);
+    if (t.strike.happens) {
+      if (record.approach == 0.0) put_in += settle(t, t.struck() ? weight.on(pair) : 0.0, record);
+      records.push_back(record);
+      continue;
+    }
     if (t.proximity.beyond && (record.approach == 0.0 || t.proximity.outside > pair.radius_a)) {
       // The next step begins without it.
       put_in -= t.energy.value + anchor_energy(problem_, t);
@@ -414,7 +438,8 @@ void ContactStiffness::renew(ContactSet& start, std::vector<ContactRecord>& reco
     }
     const bool anew = !still && begins_anew(t, struck, record);
     if (!drawn && !anew) continue;
-    if (anew) start.renew(problem_, i, record);
+    // The energy that the start of such an impact leaves out is lost.
+    if (anew && t.pair.restitution == 1.0) start.renew(problem_, i, record);
     records.push_back(record);
   }
   std::sort(records.begin(), records.end(), by_key);
@@ -452,6 +477,10 @@ bool ContactStiffness::begins_anew(const Touching& t, bool struck, ContactRecord
   record.approach = speed;
   record.age = 0.0;
   const double ratio = impact_stiffness(problem_, pair) / record.stiffness;
+  if (pair.restitution < 1.0) {
+    record.stiffness *= std::max(ratio, 1.0);
+    return true;
+  }
   if (!t.apart() || !(ratio > 1.0)) return true;
   Touching renewed = t;
   renewed.approach = speed;

@@ -67,6 +67,7 @@ class ContactStiffness {
   void finish(const ContactSet& set, std::vector<ContactRecord>& records) const;
   double yielded_at(const Touching& t, double ratio) const;
   double change_stiffness(const Touching& t, double ratio, double yielded, ContactRecord& record) const;
+  double settle(const Touching& t, double weight, ContactRecord& record) const;
   /// By how much a contact's stiffness is to change, by the force that it carries.
   double wanted_ratio(const Touching& t, const ContactRecord& record) const;
   double source_stiffness(const ContactSet& set, VectorX& force) const;

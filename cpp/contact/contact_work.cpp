@@ -41,6 +41,10 @@ double pressing_gain(const ContactProblem& problem, const ContactSet& set, const
   double gain = set.pressing_energy() - problem.start_pressing;
   for (const Touching& t : set) {
     if (t.lagged >= 0) continue;
+    if (t.struck()) {  // impulses balance its work
+      gain -= t.energy.value;
+      continue;
+    }
     ContactLocal local{};
     add_pressing(problem, t, false, true, local);
     gain -= work_against(problem, t.pair, local, change);

@@ -10,20 +10,8 @@ namespace {
 // Time after which an impact presses less elastically, in swings of its contact and in steps; after twice as long it
 // does so no more.
 constexpr double kImpactSwings = 12.0, kImpactSteps = 4.0;
-// Surfaces that part faster than kPartingShare of their final parting speed give back no more than their restitution.
-// Slower surfaces have a four-hundredth, kPartingShare^2, of the energy that is to be left. The final parting speed
-// counts as at least kMinPartingSpeed of the speed of approach.
-constexpr double kPartingShare = 0.05, kMinPartingSpeed = 0.3;
-// kImpactSwings for restitution. Surfaces without restitution separate at kPartingShare kMinPartingSpeed of the
-// approach speed, within some 90 oscillations of a contact at its stiffest. The energy stored until then is lost too.
-constexpr double kRestitutionSwings = 128.0;
 // Speed of approach of surfaces at rest, if they do not fall on, over `rest_speed`: above 0, which means no impact.
 constexpr double kMinApproach = 1e-9;
-// Swings within which an impact's rebound is known.
-constexpr double kResolvedSwings = 4.0;
-// Rebound of backward Euler, over the speed of approach, up to which an impact without restitution needs no steps of
-// its own.
-constexpr double kMaxRebound = 0.01;
 // Turn in a step of the direction in which surfaces lie to each other [rad]. Surfaces that meet within a step press
 // along a mean of the directions at both ends of the step, which is off the true one by half of that at most.
 constexpr double kMaxImpactTurn = 0.05;
@@ -31,6 +19,11 @@ constexpr double kMaxImpactTurn = 0.05;
 // again. Within one rod it does not count: knots that are pulled by some radii a step come out right without, in a
 // tenth of the steps.
 constexpr double kSlidingTurnShare = 0.125;
+// Way by which surfaces that are in each other separate in the step of an impact, over the way of their approach.
+constexpr double kRecovery = 0.1;
+// Distance tolerance in the step of an impact with a restitution below 1, over that of the contact. Surfaces do not
+// press before they meet.
+constexpr double kStrikeTolerance = 1e-3;
 // Speed at which one end of a touching piece goes up against its middle, over `rest_speed`, from which on the rod
 // rolls. The end is where the curve is nearer by the depth of contact, and at most kMaxPiecesToEnd pieces away.
 constexpr double kMinRollingSpeed = 0.03, kMaxPiecesToEnd = 16.0;
@@ -44,10 +37,6 @@ double smooth_step(double x) {
 }
 
 double smooth_slope(double x) { return x > 0.0 && x < 1.0 ? 6.0 * x * (1.0 - x) : 0.0; }
-
-/// Number of steps per oscillation of a contact at which the restitution e of an impact is accurate to 1 %. The step in
-/// which the motion reverses loses no speed. Its share of the impact matters more for a smaller e.
-double steps_in_swing(double restitution) { return std::clamp(10.0 / std::max(restitution, 1e-3), 12.0, 40.0); }
 
 /// Elastic share of an impact that lasts `swings` oscillations: 1 for surfaces that have just met at a speed, 0 for
 /// surfaces that rest on each other.
@@ -103,8 +92,42 @@ bool rolls(const ContactProblem& problem, const Touching& t) {
 /// Elastic share of pressing in a step: 1 for surfaces that have just met, and for a rolling rod; 0 for surfaces that
 /// rest on each other.
 double elastic_share(const ContactProblem& problem, const Touching& t) {
+  if (t.pair.restitution < 1.0) return 0.0;
   const double share = share_within(problem, t, speed_of_impact(problem, t), kImpactSwings);
   return share < 1.0 && problem.pressing >= Pressing::mean && rolls(problem, t) ? 1.0 : share;
+}
+
+/// Acceleration by gravity at which surfaces approach each other as the step begins [m/s^2].
+double pull_of(const ContactProblem& problem, const Touching& t) {
+  const VectorX& mass = problem.parameters->edge_mass;
+  const auto falls = [&](int edge) { return edge >= 0 && std::isfinite(mass(edge)) ? 1.0 : 0.0; };
+  return (falls(t.pair.key.b) - falls(t.pair.key.a)) * dot(problem.parameters->pull, t.proximity.normal);
+}
+
+/// True if surfaces with a restitution below 1 are on their way to an impact.
+bool comes_to_strike(const Touching& t) { return t.pair.restitution < 1.0 && t.approach > 0.0 && t.age == 0.0; }
+
+/// The impact of a contact that begins in the step, at a constant acceleration before and after it.
+Strike strike_of(const ContactProblem& problem, const Touching& t) {
+  const ContactPair& pair = t.pair;
+  Strike strike;
+  if (problem.pressing == Pressing::still || !comes_to_strike(t)) return strike;
+  strike.happens = true;
+  const double duration = problem.duration, rate = nearing(problem, pair), pull = pull_of(problem, t),
+               start = start_distance(problem, pair) - pair.radii(), gap = std::max(0.0, start),
+               square = rate * rate + 2.0 * pull * gap;
+  double time = duration;  // until they meet
+  if (square >= 0.0 && (rate > 0.0 || pull > 0.0))
+    time = rate > 0.0 ? 2.0 * gap / (rate + std::sqrt(square)) : (std::sqrt(square) - rate) / pull;
+  time = std::clamp(time, 0.0, duration);
+  const double speed = std::max(0.0, rate + pull * time), left = duration - time;
+  strike.apart = std::min(0.0, start + kRecovery * speed * duration);
+  // Surfaces rest that would come back within a step.
+  const double parting = pair.restitution * speed;
+  if (speed <= rest_speed(problem, pair) || 2.0 * parting <= pull * duration) return strike;
+  strike.speed = parting - pull * left;
+  strike.apart += std::max(0.0, left * (parting - 0.5 * pull * left));
+  return strike;
 }
 
 /// By how much the direction from one surface to the other turns in the step [rad].
@@ -142,10 +165,7 @@ double swing_time(const ContactProblem& problem, const Touching& t) {
   return std::numbers::pi * std::sqrt(0.5 * problem.mass_of(t.pair) * t.pair.share / t.stiffness);
 }
 
-bool impact_lasts(const ContactProblem& problem, const Touching& t) {
-  return elastic_share(problem, t) > 0.0 ||
-         (t.pair.restitution < 1.0 && share_within(problem, t, t.approach, kRestitutionSwings) > 0.0);
-}
+bool impact_lasts(const ContactProblem& problem, const Touching& t) { return elastic_share(problem, t) > 0.0; }
 
 ElasticShareSlopes elastic_share_slopes(const ContactProblem& problem, const Touching& t) {
   ElasticShareSlopes out;
@@ -246,44 +266,35 @@ void add_approach_slopes(const ContactProblem& problem, const Touching& touching
 
 void set_pressing(const ContactProblem& problem, Touching& t) {
   const ContactPair& pair = t.pair;
-  const double tolerance = problem.tolerance(pair, t.stiffness / pair.share);
+  const double whole = problem.tolerance(pair, t.stiffness / pair.share),
+               tolerance = comes_to_strike(t) ? kStrikeTolerance * whole : whole;
   t.law = {problem.description().law, pair.radii(), tolerance, t.stiffness, t.yielded};
   t.energy = t.law.energy(t.proximity.distance);
   t.energy.value *= t.stiffness;
   t.energy.first *= t.stiffness;
   t.energy.second *= t.stiffness;
   t.pressing = {t.energy.first, t.energy.second, 0.0};
+  t.strike = strike_of(problem, t);
   if (problem.pressing == Pressing::still) return;
   const double share = elastic_share(problem, t);
-  const double lost = pair.restitution < 1.0 ? (1.0 - pair.restitution * pair.restitution) *
-                                                   share_within(problem, t, t.approach, kRestitutionSwings)
-                                             : 0.0;
-  if (share == 0.0 && lost == 0.0) return;
+  if (share == 0.0 && !t.strike.happens) return;
   // Friction that is proportional to k E'(D0) requires the same force at the end of the previous step.
   const bool lags = problem.lags() && pair.friction > 0.0;
   if (problem.pressing >= Pressing::mean && !lags) {
     t.law.elastic = share;
     if (share < 1.0) t.law.elastic_by_way = elastic_share_slopes(problem, t).way;
   }
-  t.law.restitution = std::sqrt(1.0 - lost);
-  t.law.parting = kPartingShare * std::max(t.law.restitution, kMinPartingSpeed) * t.approach * problem.duration;
-  if (t.law.elastic == 0.0 && !(t.law.restitution < 1.0)) return;
+  if (t.law.elastic == 0.0 && !t.strike.happens) return;
+  if (t.strike.happens) t.law.yielded = -t.strike.apart;
   t.before = start_distance(problem, pair);
-  const bool begins = t.law.elastic > 0.0 && t.age == 0.0 && pair.rod_a != pair.rod_b;
+  const bool begins = t.age == 0.0 && pair.rod_a != pair.rod_b;
   t.turn = begins ? turned(problem, t) : 0.0;
   if (t.turn > kMaxImpactTurn && touches_already(problem, pair)) t.turn *= kSlidingTurnShare;
   t.pressing = t.law.at(t.before, t.proximity.distance);
 }
 
 bool unresolved(const ContactProblem& problem, const Touching& t, double dt) {
-  if (t.lagged >= 0) return false;
-  if (t.turn * dt > kMaxImpactTurn * problem.duration) return true;
-  if (!(t.law.restitution < 1.0)) return false;
-  const double swing = swing_time(problem, t);
-  const bool keeps_nothing = problem.pressing == Pressing::end && t.pair.restitution <= kMaxRebound;
-  // A long step of backward Euler leaves 1 / (w dt)^2 of the speed, w = pi / swing.
-  if (keeps_nothing && std::numbers::pi * std::sqrt(kMaxRebound) * dt > swing) return false;
-  return t.age < kResolvedSwings * swing && steps_in_swing(t.pair.restitution) * dt > swing;
+  return t.lagged < 0 && t.turn * dt > kMaxImpactTurn * problem.duration;
 }
 
 }  // namespace withe

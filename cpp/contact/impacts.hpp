@@ -28,7 +28,7 @@ bool meets(const ContactProblem& problem, const ContactPair& pair);
 double first_approach(const ContactProblem& problem, const ContactPair& pair);
 /// Half a period of an edge on its contact: as long as an impact lasts at least [s].
 double swing_time(const ContactProblem& problem, const Touching& t);
-/// True if an impact still affects surfaces: in restitution for longer than in the elastic share.
+/// True if an elastic impact still affects surfaces.
 bool impact_lasts(const ContactProblem& problem, const Touching& t);
 /// Derivatives of how much presses elastically in a step, `PressingLaw::elastic`.
 struct ElasticShareSlopes {
@@ -43,8 +43,7 @@ ElasticShareSlopes elastic_share_slopes(const ContactProblem& problem, const Tou
 /// unknowns there and by their rates.
 void add_approach_slopes(const ContactProblem& problem, const Touching& touching, double by,
                          double (&start)[kContactUnknowns], double (&velocity)[kContactUnknowns]);
-/// True if a step of dt would be too long to resolve where meeting surfaces push each other, or the loss of an impact
-/// by its restitution.
+/// True if a step of dt would be too long to resolve where meeting surfaces push each other.
 bool unresolved(const ContactProblem& problem, const Touching& t, double dt);
 /// Sets the law by which surfaces press in a step, and the force at its end, of a contact with its stiffness and speed
 /// of approach.

@@ -6,8 +6,7 @@
 /// The elastic share a is 1 for surfaces that have just met, and 0 for surfaces that rest on each other. The work of Q
 /// over the step equals the change of the stored energy. An impact therefore returns its energy, even if it is shorter
 /// than a step [Gonzalez 1996; Laursen and Chawla 1997]. E'(D1) does more work, as E is convex, and lets surfaces rest.
-/// For a coefficient of restitution e below 1, the force is multiplied by e^2 while surfaces part faster than a small
-/// speed, and by a factor nearer to 1 below that speed. A contact then returns the share e^2 of its energy.
+/// Impacts with a coefficient of restitution below 1 have an elastic share of 0, see rebound.hpp.
 
 #include <algorithm>
 #include <cmath>
@@ -27,8 +26,6 @@ struct PressingLaw {
   double stiffness = 0;             ///< [N/m]
   double yielded = 0;               ///< [m]
   double elastic = 0;               ///< a [-]
-  double restitution = 1;           ///< e [-]
-  double parting = 0;               ///< way by which surfaces part in a step from which on e counts whole [m]
   double elastic_by_way = 0;        ///< derivative of a by D0 - D1 [1/m]
 
   /// E at a distance, for unit stiffness.
@@ -42,11 +39,6 @@ struct PressingLaw {
       const double rest = 1.0 - elastic, by_way = elastic_by_way * (mean.first - f.first);
       f = {rest * f.first + elastic * mean.first, rest * f.by_end + elastic * mean.by_end - by_way,
            elastic * mean.by_start + by_way};
-    }
-    if (restitution < 1.0 && parting > 0.0) {
-      const double u = std::clamp((end - start) / parting, 0.0, 1.0), lost = 1.0 - restitution * restitution;
-      const double kept = 1.0 - lost * u * u * (3.0 - 2.0 * u), slope = -6.0 * lost * u * (1.0 - u) / parting;
-      f = {kept * f.first, kept * f.by_end + slope * f.first, kept * f.by_start - slope * f.first};
     }
     return {stiffness * f.first, stiffness * f.by_end, stiffness * f.by_start};
   }

@@ -259,6 +259,22 @@ void advance(const Equations& equations, const StepPlan& plan, const VectorX& q1
   state.time += plan.dt;
 }
 
+/// Replaces the velocities at the end of a step by those after the impacts of the step. `lost`: energy that contact has
+/// removed. In backward Euler steps the work of contact forces is no change of the kinetic energy: (v1 - v0) . M (v1 -
+/// v0) / 2 is lost too.
+void add_rebounds(const Equations& equations, const Parameters& parameters, const StepPlan& plan, double lost,
+                  State& state, StepWorkspace& work, StepResult& result) {
+  const Model& model = equations.model();
+  const double dt = plan.dt, unbooked = plan.rule == StepRule::backward_euler
+                                            ? dt * dt * kinetic_energy(model, equations.mass(), state.acceleration)
+                                            : 0.0;
+  const ReboundWork done = work.rebounds.apply(model, parameters, lost + unbooked, state);
+  result.dissipated += unbooked + done.dissipated;
+  result.support_work += done.support_work;
+  result.rebound_gain = done.gain;
+  state.acceleration += (1.0 / dt) * (state.v - work.velocity);
+}
+
 }  // namespace
 
 StepResult implicit_step(Equations& equations, const Newton& newton, const Options& options,
@@ -304,8 +320,10 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   work.difference = rate * work.change;
   predictor.record({state.time + 0.5 * dt, h, dt, plan.slot}, state.v, work.difference, acceleration,
                    equations.mass().rows);
+  const bool rebounds = work.rebounds.find(equations);
   if (Contact* contact = equations.contact()) result.dissipated -= contact->accept(state, std::max(contact_loss, 0.0));
   advance(equations, plan, q1, work, state);
+  if (rebounds) add_rebounds(equations, parameters, plan, contact_loss, state, work, result);
   if (const HandForces* hands = equations.hands())
     result.support_work -= hands->accept(prescribed.supports, work.after, state);
   result.accepted = true;

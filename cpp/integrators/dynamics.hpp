@@ -4,6 +4,7 @@
 #include "integrators/fourth_order.hpp"
 #include "integrators/newton.hpp"
 #include "integrators/predictor.hpp"
+#include "integrators/rebounds.hpp"
 #include "integrators/squeezed.hpp"
 #include "steps/pressure_gains.hpp"
 
@@ -26,6 +27,7 @@ struct StepResult {
   double load_work = 0;      ///< work of loads and custom forces [J]
   double dissipated = 0;     ///< energy removed by drag, viscosity and contact [J]
   double support_work = 0;   ///< [J]
+  double rebound_gain = 0;   ///< see ReboundWork
   double pressing_gain = 0;  ///< put in by surfaces that press, `Contact::pressing_gain` [J]
 };
 
@@ -35,6 +37,7 @@ struct StepWorkspace {
   double follow_gain = 0;  ///< kinetic energy that nodes of held bodies get from the velocities of supports [J]
   VectorX z, move, change, working, mean, velocity, held_velocity, held_acceleration, assumed, difference,
       whole_acceleration;
+  Rebounds rebounds;
   PressureGains pressure;  ///< energy gains of a backward Euler step under `adaptive`
   Configuration after;
   State from, next;  ///< explicit steps

@@ -118,9 +118,10 @@ struct World::Implementation : Built, Running {
   [[noreturn]] void fail_step(Verdict why, double dt) const;
   /// Error and turns of a part.
   struct PartResult {
-    double error = 0;      ///< estimated [m]
-    double turn = 0;       ///< greatest of an edge [rad]
-    double held_turn = 0;  ///< greatest of what supports hold [rad]
+    double error = 0;         ///< estimated [m]
+    double turn = 0;          ///< greatest of an edge [rad]
+    double held_turn = 0;     ///< greatest of what supports hold [rad]
+    double rebound_gain = 0;  ///< greatest, see ReboundWork
   };
   /// Excess for which parts are rejected, beside errors: turn of supported edges over the greatest accurate turn; way
   /// of an obstacle [m].

@@ -25,6 +25,8 @@ constexpr int kResolutionPeriod = 64, kEnergyPeriod = 16;
 // w^3 / 32. In energy-momentum steps edges that turn by w have the rate 2 tan(w / 2) / dt. Parts of fourth-order steps
 // twist there and back, and so turn by less.
 constexpr double kMaxHeldTurn = 0.25, kMaxHeldTurnOfPart = 0.15;
+// Share of the kinetic energy that forces of impacts may add in a step, see ReboundWork.
+constexpr double kMaxReboundGain = 1e-4;
 /// True if a shorter step reduced an excess. A user's function that jumps within a step jumps by as much in a shorter
 /// one.
 bool lessens(double now, double before) { return before == 0.0 || now < 0.9 * before; }
@@ -167,7 +169,7 @@ Verdict World::Implementation::judge(const StepControl& control, const PartResul
   const Excess now{held_turn_of(part),
                    contact && !obstacle_motions.empty() ? farthest_obstacle(kept.state, state) : 0.0};
   const bool unresolved =
-      (now.turn > 1.0 && lessens(now.turn, rejected.turn)) ||
+      part.rebound_gain > kMaxReboundGain || (now.turn > 1.0 && lessens(now.turn, rejected.turn)) ||
       (contact && ((contact->unresolved(dt) && lessens(now.way, rejected.way)) || contact->missed(kept.state.q)));
   if (unresolved && control.may_subdivide(lengths)) {
     rejected = now;
@@ -283,6 +285,7 @@ bool World::Implementation::inner_step(double dt, int slot, PartResult& part) {
   if (tape) record_step(*tape, model, contact(), *this, *this, {rule_of_step(), dt, systems.work.move, begins});
   part.error = r.error;
   part.turn = std::max(part.turn, r.largest_turn);
+  part.rebound_gain = std::max(part.rebound_gain, r.rebound_gain);
   part.held_turn = std::max(part.held_turn, prescribed.held.turn);
   if (rule_of_step() == StepRule::energy_momentum) part.held_turn = std::max(part.held_turn, prescribed.held.spin);
   ledger.load_work += r.load_work;

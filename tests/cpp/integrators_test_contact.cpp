@@ -303,7 +303,6 @@ TEST(Contact, MatrixIsExactInAnImpactWithAndWithoutRestitution) {
         named.scene.contact.restitution = restitution;
         named.scene.contact.obstacle_restitution = VectorX::Constant(1, restitution);
         Case c = slipped(named, 0.02);
-        c.increment = 1e-5;  // between the ends of restitution's switch
         expect_exact(c, Integrator::backward_euler, StepRule::backward_euler, false, 5.0);
         expect_exact(c, Integrator::implicit_midpoint, StepRule::midpoint, false, 5.0);
         expect_exact(c, Integrator::energy_momentum, StepRule::energy_momentum, false, 5.0);
@@ -320,11 +319,6 @@ TEST(PressingLaw, WorksAsMuchOverAStepAsContactStoresWhileSurfacesMeet) {
       const double end = start + std::pow(10.0, -0.05 * k) * 0.1 * random.normal();
       const double stored = 7.0 * (pressing.energy(end).value - pressing.energy(start).value);
       EXPECT_NEAR(pressing.at(start, end).first * (end - start), stored, 1e-9 * std::abs(stored) + 1e-15);
-      // Half the energy comes back where surfaces part fast.
-      const PressingLaw half{law, radii, tolerance, 7.0, 0.0, 1.0, std::sqrt(0.5), 1e-6};
-      if (end > start + 1e-6) {
-        EXPECT_NEAR(half.at(start, end).first * (end - start), 0.5 * stored, 1e-9);
-      }
       // It never pushes more than the surfaces do that are nearest.
       const double most = std::min(7.0 * pressing.energy(std::min(start, end)).first, 0.0);
       EXPECT_GE(pressing.at(start, end).first, most * (1.0 + 1e-12));

@@ -51,7 +51,7 @@ def assert_momenta_and_energy_stay(
     scene: withe.Scene, things: Things, friction: float, *, angular: float, total: float
 ) -> None:
     """Run a cloud; `angular` and, without friction, `total` are the allowed relative errors of momentum and energy."""
-    simulation = scene.build(time_step=1e-3)
+    simulation = scene.build(time_step=1e-3, solver=withe.Solver(force_tolerance=1e-10))
     for thing, velocity, spin in things:
         if isinstance(thing, withe.Body):
             simulation.set_velocity(thing, velocity, angular=spin)

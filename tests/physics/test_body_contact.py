@@ -130,7 +130,7 @@ def test_a_ball_bounces_with_friction(restitution: float) -> None:
     velocity, spin = simulation.velocity(ball), simulation.angular_velocity(ball)[1]
     errors = np.abs(np.array([velocity[0], velocity[2], spin]) / expected - 1.0)
     measured(errors.max())
-    assert errors.max() < (1e-4 if restitution == 1.0 else 1e-2)  # restitution below 1 is accurate to 1 %
+    assert errors.max() < 1e-4
 
 
 @pytest.mark.case("bodies", "Ball that lies on two rods", source="elastica in the plane of each contact force")

@@ -391,13 +391,13 @@ class Contacts:
         Backward Euler, and "lagged" and "semi_explicit" friction, lose most of an impact that is shorter than a few
         steps. Energy removed by contact is reported in `Simulation.energy().dissipated`, stored energy in `.contact`.
 
-        Restitution. The coefficient e is energetic: contact returns e^2 of the work of compression [Stronge 1990, Proc.
-        R. Soc. A 431]. With e below 1, steps are subdivided until the impact is resolved; this may take hundreds of
-        times more steps when rods come to rest on balls and posts. ``adaptive=False`` and `max_halvings` of `build`
-        limit the subdivision. Weight also does work over the penetration p: v1^2 = e^2 v0^2 - (1 - e^2) 2 g p. Rods
-        vibrate after an impact, so their mean velocity is less than e times the velocity before. Surfaces come to rest
-        on each other if they meet more slowly than the slip tolerance, or more slowly than sqrt(g r / 100) with the
-        smaller radius r. Surfaces that stay in contact for longer than an impact also come to rest.
+        Restitution. With a coefficient e below 1, surfaces part at e times the speed at which they met [Newton; Moreau
+        1988]. Each impact is one event within one time step, with Coulomb's friction. The time step is not subdivided
+        for it. Impacts never return more energy than they take: where friction, or several contacts at once, would
+        gain energy, all rebounds of the step are weaker. Rods vibrate after an impact, so their mean velocity is less
+        than e times the velocity before. Surfaces come to rest on each other if they meet more slowly than the slip
+        tolerance, or more slowly than sqrt(g r / 100) with the smaller radius r. So do surfaces that would come back
+        within a time step.
 
         Momentum. Contact and friction between rods conserve linear and angular momentum in implicit midpoint and
         energy-momentum steps. "lagged" and "semi_explicit" friction conserve linear momentum, and angular momentum to

@@ -1,0 +1,114 @@
+#include "integrators/rebounds.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace withe {
+namespace {
+
+// Numbers of a column below this share of its greatest number have no effect.
+constexpr double kNegligible = 1e-16;
+
+/// Adds a contact's numbers to a vector over all unknowns.
+void scatter(const ReboundContact& contact, const double (&numbers)[kContactUnknowns], double factor, VectorX& out) {
+  for (int i = 0; i < kContactUnknowns; ++i)
+    if (contact.dofs[i] >= 0) out[contact.dofs[i]] += factor * numbers[i];
+}
+
+}  // namespace
+
+bool Rebounds::find(const Equations& equations) {
+  contacts_.clear();
+  if (const Contact* contact = equations.contact())
+    contacts_ = rebound_contacts(contact->problem(), contact->contacts());
+  return !contacts_.empty();
+}
+
+/// Shares contacts out among batches: in a batch, no two contacts have a component of the scene in common. One solution
+/// of the system of masses then serves a whole batch.
+void Rebounds::set_batches(const Model& model) {
+  batches_.clear();
+  std::vector<int> next(at(model.component_count), 0);
+  for (std::size_t i = 0; i < contacts_.size(); ++i) {
+    int batch = 0;
+    const auto each_component = [&](const auto& use) {
+      for (int dof : contacts_[i].dofs)
+        if (dof >= 0) use(next[at(model.dof_component[at(dof)])]);
+    };
+    each_component([&](int& free) { batch = std::max(batch, free); });
+    each_component([&](int& free) { free = batch + 1; });
+    if (at(batch) == batches_.size()) batches_.emplace_back();
+    batches_[at(batch)].push_back(i);
+  }
+}
+
+/// Sets one row of each contact of a batch, and its column.
+void Rebounds::set_rows(const Model& model, const std::vector<std::size_t>& batch, std::size_t k) {
+  row_.setZero(model.dof_count);
+  owner_.assign(at(model.component_count), -1);
+  for (std::size_t i : batch) {
+    if (k > 0 && !(contacts_[i].friction > 0.0)) continue;
+    scatter(contacts_[i], contacts_[i].rows[k], 1.0, row_);
+    for (int dof : contacts_[i].dofs)
+      if (dof >= 0) owner_[at(model.dof_component[at(dof)])] = static_cast<int>(i);
+  }
+  mass_->fold(row_);
+  column_ = row_;
+  mass_->solve(column_);
+  const double least = kNegligible * column_.lpNorm<Eigen::Infinity>();
+  for (int dof = 0; dof < model.dof_count; ++dof) {
+    const int owner = owner_[at(model.dof_component[at(dof)])];
+    if (owner < 0) continue;
+    ReboundRows& rows = rows_[at(owner)];
+    if (row_[dof] != 0.0) rows.row[k].entries.emplace_back(dof, row_[dof]);
+    if (std::abs(column_[dof]) > least) rows.column[k].entries.emplace_back(dof, column_[dof]);
+    rows.mobility[k] += row_[dof] * column_[dof];
+  }
+}
+
+ReboundWork Rebounds::find_velocity(const Model& model, const State& state, double elastic, VectorX& velocity) {
+  velocity = state.v;
+  find_rebounds(contacts_, rows_, elastic, velocity, impulses_);
+  ReboundWork work;
+  total_.setZero(model.dof_count);
+  for (std::size_t i = 0; i < contacts_.size(); ++i)
+    for (std::size_t k = 0; k < 3; ++k) {
+      rows_[i].row[k].add_to(impulses_[i][k], total_);
+      work.support_work -= impulses_[i][k] * contacts_[i].drift[k];
+    }
+  column_ = velocity - state.v;
+  multiply(model, mass_->mass(), column_, row_);
+  mass_->fold(row_);
+  for (const Constraint& c : model.constraints)
+    work.support_work += (c.held(row_) - c.held(total_)).dot(c.held(state.v));
+  work.dissipated = kinetic_energy(model, mass_->mass(), state.v) + work.support_work -
+                    kinetic_energy(model, mass_->mass(), velocity);
+  return work;
+}
+
+ReboundWork Rebounds::apply(const Model& model, const Parameters& parameters, double lost, State& state) {
+  if (!mass_) mass_ = std::make_unique<MassSystem>(model);
+  mass_->begin(state, parameters);
+  rows_.assign(contacts_.size(), ReboundRows{});
+  set_batches(model);
+  for (const std::vector<std::size_t>& batch : batches_)
+    for (std::size_t k = 0; k < 3; ++k) set_rows(model, batch, k);
+  ReboundWork work = find_velocity(model, state, 1.0, velocity_);
+  if (const double gain = -work.dissipated - lost; gain > 0.0) {
+    // All velocities between those with and without rebounds follow from impulses that contacts allow. The gain is a
+    // convex parabola of the share of the rebound: g(s) = g0 + (g1 - g0 - k) s + k s^2.
+    const ReboundWork least = find_velocity(model, state, 0.0, least_);
+    velocity_ -= least_;
+    const double square = kinetic_energy(model, mass_->mass(), velocity_), first = -least.dissipated - lost,
+                 slope = gain - first - square, under = slope * slope - 4.0 * square * std::min(first, 0.0),
+                 share = first < 0.0 ? 2.0 * -first / (slope + std::sqrt(under)) : 0.0;
+    velocity_ = least_ + share * velocity_;
+    work.support_work = least.support_work + share * (work.support_work - least.support_work);
+    work.dissipated = -(first + share * (slope + share * square)) - lost;
+    work.gain = std::max(first, 0.0) / kinetic_energy(model, mass_->mass(), state.v);
+  }
+  state.v = velocity_;
+  return work;
+}
+
+}  // namespace withe
