@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import warnings
 from collections.abc import Sequence
@@ -35,8 +36,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
             warnings.showwarning = _said
             return int(parsed.run(parsed))
     except (ValueError, OSError, ImportError, RuntimeError) as error:
-        sys.stderr.write(f"withe: {error}\n")
+        sys.stderr.write(f"withe: {_reason(error)}\n")
         return 2
+
+
+def _reason(error: Exception) -> str:
+    """Return the message of an error, without the error number of the operating system."""
+    if isinstance(error, OSError) and error.strerror and error.filename is not None:
+        return f"{error.strerror}: {os.fsdecode(error.filename)!r}"
+    return str(error)
 
 
 def _said(message: Warning | str, *_: Any, **__: Any) -> None:

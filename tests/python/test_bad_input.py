@@ -259,6 +259,7 @@ SIMULATIONS = [
     (lambda s, a: s.set_velocities(a, (0, 0, NAN)), "velocities of rod 'arm' must be finite"),
     (lambda s, a: s.set(a), "set needs at least one parameter"),
     (lambda s, a: s.set(a, colour=3), "rod 'arm' has no 'colour' to set; it has youngs_modulus"),
+    (lambda s, a: s.set(a, youngs_modulis=1), "discrete_curvature. Did you mean 'youngs_modulus'?"),
     (lambda s, a: s.set(a, youngs_modulus=-1), "youngs_modulus of rod 'arm' must be positive, got -1"),
     (lambda s, a: s.set(a, poisson_ratio=2), "poisson_ratio of rod 'arm' must lie in (-1, 0.5], got 2"),
     (lambda s, a: s.set(a, bend_stiffness=[1, 2, 3]), "bend_stiffness of rod 'arm' must have shape (2,) or (10, 2)"),
@@ -266,6 +267,7 @@ SIMULATIONS = [
     (lambda s, a: s.set(wind=1), "the scene has no 'wind' to set; it has gravity"),
     (lambda s, a: s.set(a.end, force=(0, 0, 1)), "target must not be a node or an edge"),
     (lambda s, a: s.get(a, "colour"), "'arm' has no 'colour'; it has youngs_modulus"),
+    (lambda s, a: s.get(a, "natural_curvatur"), "radius. Did you mean 'natural_curvature'?"),
     (lambda s, a: s.get("wall", "force"), "'wall' has no 'force'; it has position, rotation"),
     (
         lambda s, a: s.set_velocities(a, np.ma.masked_less(np.ones((11, 3)) - np.eye(11, 3), 0.5)),

@@ -302,7 +302,7 @@ def test_files_that_are_not_there_raise(tmp_path):
     with pytest.raises(FileNotFoundError, match=r"robot\.toml"):
         withe.Scene.load(tmp_path / "robot.toml")
     (tmp_path / "robot.toml").write_text('[[rods]]\npoints = "line.csv"\n')
-    with pytest.raises(FileNotFoundError, match=r"line\.csv"):
+    with pytest.raises(FileNotFoundError, match=r"robot\.toml, line 2.*line\.csv"):
         withe.Scene.load(tmp_path / "robot.toml")
     with pytest.raises(ValueError, match=r"must end in \.toml"):
         withe.Scene().save(tmp_path / "robot.txt")
@@ -344,6 +344,7 @@ def test_the_command_line_runs_plans_and_draws(tmp_path, capsys, monkeypatch):
     assert main(["run", "arm.toml", "--film", "films/arm.mp4"]) == 2
     assert "folder of --film does not exist: films" in capsys.readouterr().err
     assert main(["run", "leg.toml"]) == 2
+    assert capsys.readouterr().err == "withe: No such file or directory: 'leg.toml'\n"
     Path("leg.toml").write_text(ROD.replace("radius", "raduis"))
     assert main(["view", "leg.toml"]) == 2
     assert "withe: leg.toml, line 10: [[rods]] has no key 'raduis'" in capsys.readouterr().err

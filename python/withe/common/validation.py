@@ -22,6 +22,7 @@ __all__ = [
     "has_masked",
     "integer",
     "is_scalar",
+    "it_has",
     "meant",
     "near_word",
     "non_negative",
@@ -133,6 +134,13 @@ def meant(value: str, options: Iterable[str], otherwise: str) -> str:
     """Return the end of an error about an unknown word: the near word that may be meant, or else `otherwise`."""
     near = near_word(value, options)
     return otherwise if near is None else f"did you mean {near!r}?"
+
+
+def it_has(value: str, options: Iterable[str]) -> str:
+    """Return the end of an error about an unknown word: all known words, and the near word that may be meant."""
+    known = list(options)
+    near = near_word(value, known)
+    return f"it has {', '.join(known) or 'none'}" + ("" if near is None else f". Did you mean {near!r}?")
 
 
 def file_path(value: str | os.PathLike[str], *suffixes: str, instead: str = "") -> Path:

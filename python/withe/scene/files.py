@@ -230,6 +230,9 @@ class _Located:
         pass
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: object) -> None:
+        if isinstance(error, OSError):  # of a file that the scene names
+            reason = f"{error.strerror}, {self._error('', *self._place)}".removesuffix(": ")
+            raise type(error)(error.errno, reason, error.filename) from None
         if isinstance(error, ValueError | TypeError):
             raise self._error(str(error), *self._place, _meant_key(self._values, str(error))) from None
 

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from withe.common.validation import it_has
 from withe.parts.contacts import BodyPair
 from withe.parts.kinds import (
     DragPart,
@@ -113,7 +114,7 @@ def set_words(session: Session, target: Target, values: dict[str, Any], over: fl
         raise ValueError(nothing_to_set(target))
     for word in values:
         if word not in names:
-            raise ValueError(f"{owner_of(target)} has no {word!r} to set; it has {', '.join(names)}")
+            raise ValueError(f"{owner_of(target)} has no {word!r} to set; {it_has(word, names)}")
         if over > 0.0 and not known[word].is_ramped:
             ramped = ", ".join(name for name, each in known.items() if each.is_ramped) or "none"
             raise ValueError(f"{word} of {owner_of(target)} must be set without over=; words with over= are {ramped}")

@@ -45,7 +45,7 @@ def get_value(session: Session, target: Settable | str, word: str | None) -> Any
         raise ValueError(f"a pair of bodies has {', '.join(map(repr, words))} only, got {word!r}")
     if not words:
         raise ValueError(nothing_to_set(part))
-    raise ValueError(f"{part.name!r} has no {word!r}; it has {', '.join(words)}")
+    raise ValueError(f"{part.name!r} has no {word!r}; {validation.it_has(word, words)}")
 
 
 def find_target(session: Session, target: Settable | str | None) -> Target:

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from withe import _core
+from withe.common import validation
 from withe.parts.kinds import FluidPart, ObstaclePart, RodPart
 from withe.parts.parameters import ACTING_WORDS, NATURAL_WORDS, ROD_WORDS, RodParameters, in_order_of_setting
 from withe.parts.rods import curvature_array, curvature_given, stretch_array, twist_array
@@ -92,8 +93,8 @@ def rod_reader(session: Session, part: RodPart, word: str, arrays: Iterable[str]
     if word in NATURAL_WORDS:
         return lambda g: np.array(getattr(g.parameters, word)[part.index])
     if word not in (*ROD_WORDS, "radius"):
-        words = ", ".join((*ROD_WORDS, *NATURAL_WORDS, "radius", "points"))
-        raise ValueError(f"{part.name!r} has no {word!r} to differentiate by; it has {words}")
+        hint = validation.it_has(word, (*ROD_WORDS, *NATURAL_WORDS, "radius", "points"))
+        raise ValueError(f"{part.name!r} has no {word!r} to differentiate by; {hint}")
     first, last = edges_of(session, part.index)
     slopes = rod_slopes(session, part, word)
     if arrays is not None:

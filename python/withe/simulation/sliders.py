@@ -222,8 +222,8 @@ def _parameter(simulation: Solvable, given: Sequence[Any], what: str) -> _Parame
     part = find_target(simulation._session, target)
     known = word_of(part, word)
     if known is None or not known.is_set:
-        words = ", ".join(each.name for each in words_of(part) if each.is_set) or "none"
-        raise ValueError(f"{what}: {owner_of(part)} has no {word!r} to set; it has {words}")
+        hint = validation.it_has(word, [each.name for each in words_of(part) if each.is_set])
+        raise ValueError(f"{what}: {owner_of(part)} has no {word!r} to set; {hint}")
     components = _components(simulation, part, target, word, what)
     ends = given[2:] if len(given) == 4 else given[2]
     try:
