@@ -20,6 +20,7 @@ _REACH = 1.1  # distance of the rim of a floor from what is in view, over the ex
 _WHOLE = 0.4  # share of the radius within which a floor has its full colour
 _PATCH_CELLS = 256
 _BLURS = (0.008, 0.016, 0.028, 0.044)  # standard deviations over the side of the square, by height above the floor
+_LARGEST_PRODUCT = 1 << 18  # multiplications that OpenBLAS does not share among threads
 _SQUARE, _FACE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]), np.array([4, 0, 1, 2, 3])
 _BEYOND = 0.15  # margin of the shadow around what casts it, over the extent of the scene
 
@@ -106,7 +107,7 @@ class Floor:
             shares = np.maximum(1.0 - np.abs(levels - level), 0.0)  # between two levels, a part of both
             if shares.any():
                 cover = np.bincount(cells, shares * areas[inside], shape[0] * shape[1]).reshape(shape)
-                shade += blur[:, low:high] @ (cover.astype(np.float32) @ blur[left:right])
+                shade += _product(blur[:, low:high], _product(cover.astype(np.float32), blur[left:right]))
         shade *= (count / self._side) ** 2
         dark = -_DARKEST * np.expm1(-1.4 * shade[::-1, :, None])
         self._actor.texture = _texture(self._pyvista, self._bare + dark * (np.array(_SHADOW, np.float32) - self._bare))
@@ -156,6 +157,15 @@ def _colours(distance: FloatArray) -> npt.NDArray[np.float32]:
     """Colours of a floor at distances from its middle over its radius, shape (..., 3)."""
     paper = np.array([int(BACKGROUND[place : place + 2], 16) for place in (1, 3, 5)], float)
     return np.asarray(paper + _share(distance)[..., None] * (np.array(_FLOOR) - paper), np.float32)
+
+
+def _product(a: npt.NDArray[np.float32], b: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    """Return the product of two matrices, by parts of the first that BLAS multiplies without threads of its own.
+
+    Such threads spin between products: a shadow would take six times the processor time.
+    """
+    rows = max(1, _LARGEST_PRODUCT // b.size)
+    return np.concatenate([a[first : first + rows] @ b for first in range(0, len(a), rows)])
 
 
 def _blur(sigma: float, count: int) -> npt.NDArray[np.float32]:
