@@ -96,8 +96,8 @@ class Sphere:
         triangles : ndarray of int, shape (m, 3)
             Rows of the vertices, counter-clockwise from outside.
         """
-        angles = np.linspace(0.0, np.pi, 25)
-        return _turned(self.radius * np.sin(angles), -self.radius * np.cos(angles))
+        angles = np.linspace(0.0, np.pi, 37)
+        return _turned(self.radius * np.sin(angles), -self.radius * np.cos(angles), sides=72)
 
 
 @dataclass(frozen=True)
