@@ -117,6 +117,9 @@ def main() -> None:
     if library == "glibc" and tuple(map(int, version.split("."))) > BUILD_GLIBC:
         sys.exit(f"make wheel needs Debian 12 (glibc 2.36): libraries of glibc {version} would travel inside")
     shutil.rmtree(DIST, ignore_errors=True)
+    # Each Python recommends its own name of the compiler, and another name would compile the engine again.
+    os.environ.setdefault("CC", "cc")
+    os.environ.setdefault("CXX", "c++")
     wanted = {each: interpreter(each) for each in VERSIONS} if every else {"": Path(sys.executable)}
     if not any(wanted.values()):
         sys.exit(f"make wheels found none of Python {', '.join(VERSIONS)} with its headers")
