@@ -169,6 +169,7 @@ def main() -> None:
     """Learn, draw, film."""
     steps, seed, folder = asked(__doc__, 300_000, Path("out/follow_by_gradients"))
     check_tools()
+    print("Takes about 12 minutes.", flush=True)
     policy = learn(steps, seed, Curve(folder, between=10_000, task=Aimed()))
     draw_curve(folder, "analytic policy gradients")
     film(lambda seen, _: policy.predict(seen, deterministic=True)[0], folder / "learned.mp4", task=Aimed())
