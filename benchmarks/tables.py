@@ -11,10 +11,15 @@ import json
 import re
 from pathlib import Path
 
+import peers_picture
 from reporting import OUT
 
 PAGE = Path(__file__).with_name("README.md")
 NOT_SHOWN = ("Fronts",)  # dozens of rows: the plot shows them
+PICTURES = {  # of the folder pictures, by benchmark: what they show
+    "peers": "Run time against error in six scenes, for withe, PyElastica and MuJoCo",
+    "work_precision": "Error of the tip against run time for beams and helices: every integrator, and PyElastica",
+}
 HEAD = """# Benchmarks
 
 `make bench` runs all of these, `make bench NAME=skips` one; each leaves figures, spread, machine and goals in
@@ -31,6 +36,11 @@ def _table(rows: list[list[str]]) -> str:
     return "\n".join([_cells(rows[0]), "|" + "---|" * len(rows[0]), *map(_cells, rows[1:])])
 
 
+def picture(name: str) -> str:
+    """Return the picture of a benchmark as Markdown."""
+    return f"![{PICTURES[name]}](pictures/{name}.png)"
+
+
 def section(content: dict) -> str:
     """One benchmark as Markdown."""
     machine = content["machine"]
@@ -42,6 +52,8 @@ def section(content: dict) -> str:
         f"{content['date'][:10]}, took {content['took']:.0f} s.",
         "",
     ]
+    if content["name"] in PICTURES:
+        lines += [picture(content["name"]), ""]
     for title, rows in content["tables"].items():
         if not title.startswith(NOT_SHOWN) and len(rows) > 1:
             lines += [f"**{title}**", "", _table(rows), ""]
@@ -61,6 +73,7 @@ def main() -> None:
         if not content["quick"]:
             sections[content["name"]] = section(content)
     PAGE.write_text("\n".join([HEAD, *(sections[name].rstrip() + "\n" for name in sorted(sections))]))
+    peers_picture.draw(PAGE.read_text())
     print(f"wrote {PAGE}")
 
 

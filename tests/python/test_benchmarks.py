@@ -273,6 +273,21 @@ def test_a_page_shows_tables_and_goals_of_a_run():
     assert "Fronts" not in page
 
 
+def test_the_picture_of_the_peers_has_the_run_times_of_the_page():
+    from peers_picture import run_times
+
+    page = (FOLDER / "README.md").read_text()
+    found = run_times(page)
+    assert len(found) == 6
+    assert all(len(times["withe"]) == len(times["PyElastica"]) == 3 for times in found.values())
+    assert found["Michell's ring"]["MuJoCo"] == []
+    for scene, times in found.items():
+        error, seconds = times["withe"][-1]
+        assert f"| {scene} | {error:g} of the" in page
+        assert f"| {1e3 * seconds:.3g} ms |" in page
+    assert "](pictures/peers.png)" in page
+
+
 def test_conservation_is_measured_by_what_theory_knows():
     """Backward Euler loses a known angular momentum in each step; midpoint in a plane loses nothing."""
     from conservation import driven, euler_identity, midpoint_in_a_plane
