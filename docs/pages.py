@@ -378,7 +378,7 @@ def examples(folder: Path) -> None:
             page = [f"# {title}", "", head, ""]
             picture = PICTURES.get(name, f"{name}.png")
             if (ROOT / "examples" / "pictures" / picture).exists():
-                index += [f":img-top: ../../../examples/pictures/{picture}"]
+                index += [f":img-top: ../../../examples/pictures/{picture}", f":img-alt: {json.dumps(head)}"]
                 page += [f"![{title}](../../../examples/pictures/{picture})"]
             index += ["", head, ":::", ""]
             page += [*body.splitlines(), ""]
