@@ -154,7 +154,10 @@ def test_the_extremes_leave_the_simulation_as_it_is():
         ([("cord", "tension")], r"sliders\[0\] must be \(part, word, low, high\) or"),
         ([("cord", "tension", 5)], r"sliders\[0\] must be \(part, word, low, high\) or"),
         ([("cord", 3, 0, 5)], r"sliders\[0\] must be \(part, word, low, high\) or"),
-        ([("cord", "tenson", 0, 5)], r"sliders\[0\]: tendon 'cord' has no 'tenson' to set; it has tension. Did you mean"),
+        (
+            [("cord", "tenson", 0, 5)],
+            r"sliders\[0\]: tendon 'cord' has no 'tenson' to set; it has tension. Did you mean",
+        ),
         ([("arm", "radius", 0, 5)], "rod 'arm' has no 'radius' to set"),
         ([("nobody", "tension", 0, 5)], "nobody"),
         ([("cord", "tension", 5, 5)], r"low of sliders\[0\] must be below high, got 5 and 5"),
