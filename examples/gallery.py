@@ -272,10 +272,35 @@ def robot() -> Shot:
     return Shot(robot.walk(10, progress=False), speed=0.9, camera=(0.35, -1.0, 0.5), ground=-robot.LEG_RADIUS)
 
 
+def soft_legs() -> Shot:
+    """A quadruped with a rigid trunk and soft legs trots."""
+    import soft_legs
+
+    return Shot(soft_legs.walk(4.5), speed=0.6, camera=(0.45, -1.0, 0.45))
+
+
+def ball() -> Shot:
+    """Three soft fingers lift a ball by friction."""
+    import lift_ball
+
+    return Shot(lift_ball.lift(*lift_ball.build(), hold=0.4), speed=0.25, camera=(1.0, -0.8, 0.35))
+
+
+def guidewire() -> Shot:
+    """A guidewire is pushed through a bent vessel."""
+    import guidewire
+
+    scene, _, hand = guidewire.scene()
+    record, _, _ = guidewire.push(scene, hand, guidewire.INSERTION)
+    view = camera_at((0.01, -0.17, 0.19), (0.03, 0.036, 0.01), 0.2)
+    return Shot(record, speed=0.45, camera=view, ground=-0.02)
+
+
 ENTRIES: dict[str, Callable[[], Shot]] = {
     entry.__name__: entry
     for entry in (
-        robot, gripper, spider, tendons, servo_arm, helix, plectoneme, reef, granny, flagella, pile, fold, word, trefoil
+        robot, soft_legs, gripper, ball, spider, tendons, servo_arm, guidewire, helix, plectoneme, reef, granny,
+        flagella, pile, fold, word, trefoil,
     )
 }  # fmt: skip
 

@@ -56,6 +56,32 @@ def build() -> tuple[withe.Simulation, list[withe.Rod], list[withe.Support]]:
     return scene.build(time_step=TIME_STEP), fingers, palm
 
 
+def lift(
+    simulation: withe.Simulation, fingers: list[withe.Rod], palm: list[withe.Support], hold: float = HOLD
+) -> withe.Record:
+    """Close the fingers, lift and hold; return the motion, with the force on the ball and the lift of the palm."""
+    for finger in fingers:
+        inwards = -simulation.positions(finger)[0] * (1, 1, 0) / APART
+        d1, d2, _ = simulation.directors(finger)[0]
+        simulation.set(finger, natural_curvature=CURVATURE * np.array([inwards @ d1, inwards @ d2]), over=CURL)
+    for support in palm:
+        top = simulation.pose(support).position
+
+        def lifted(time: float, top: Array = top) -> Array:
+            """Return the position of a clamp."""
+            share = np.clip((time - CURL) / LIFT, 0.0, 1.0)
+            return top + HEIGHT * share**2 * (3.0 - 2.0 * share) * np.array([0.0, 0.0, 1.0])
+
+        simulation.move(support, path=lifted)
+    start = float(simulation.pose(palm[0]).position[2])
+    return simulation.run(
+        CURL + LIFT + hold,
+        record_every=0.02,
+        progress=False,
+        record={"force": on_ball, "lift": lambda now: now.pose(palm[0]).position[2] - start},
+    )
+
+
 def on_ball(simulation: withe.Simulation) -> Array:
     """Return the force of the fingers on the ball, shape (3,) [N]."""
     contacts = simulation.contacts()
@@ -92,26 +118,7 @@ def main() -> None:
     print("Takes about 5 s.", flush=True)
 
     simulation, fingers, palm = build()
-    for finger in fingers:
-        inwards = -simulation.positions(finger)[0] * (1, 1, 0) / APART
-        d1, d2, _ = simulation.directors(finger)[0]
-        simulation.set(finger, natural_curvature=CURVATURE * np.array([inwards @ d1, inwards @ d2]), over=CURL)
-    for support in palm:
-        top = simulation.pose(support).position
-
-        def lifted(time: float, top: Array = top) -> Array:
-            """Return the position of a clamp."""
-            share = np.clip((time - CURL) / LIFT, 0.0, 1.0)
-            return top + HEIGHT * share**2 * (3.0 - 2.0 * share) * np.array([0.0, 0.0, 1.0])
-
-        simulation.move(support, path=lifted)
-    start = float(simulation.pose(palm[0]).position[2])
-    record = simulation.run(
-        CURL + LIFT + HOLD,
-        record_every=0.02,
-        progress=False,
-        record={"force": on_ball, "lift": lambda now: now.pose(palm[0]).position[2] - start},
-    )
+    record = lift(simulation, fingers, palm)
     weight = MASS * GRAVITY
     whole = weight + sum(1100.0 * np.pi * RADIUS**2 * (TOP - TIP) * GRAVITY for _ in fingers)
     held = sum(simulation.reaction(support).force[2] for support in palm)
