@@ -405,7 +405,7 @@ def digest_of_package() -> str:
     """Return a digest of all files of the installed package."""
     digest = hashlib.sha256()
     folder = Path(withe.__file__).parent
-    for path in sorted(path for path in folder.rglob("*") if path.suffix in {".py", ".so", ".pt"}):
+    for path in sorted(path for path in folder.rglob("*") if path.suffix in {".py", ".so", ".pt", ".onnx"}):
         digest.update(str(path.relative_to(folder)).encode() + path.read_bytes())
     return digest.hexdigest()[:16]
 
