@@ -1,8 +1,20 @@
-"""Smoke test of an installed withe, run from outside the checkout: it imports, bends a beam, names bad input."""
+"""Smoke test of an installed withe, run from outside the checkout.
+
+It imports the package, looks for its data, bends a beam, and gives bad input.
+"""
 
 from pathlib import Path
 
 import withe
+
+DATA = (
+    "py.typed",
+    "_core.pyi",
+    "scene/scene.schema.json",
+    "perception/mask.onnx",
+    "deployment/small.pt",
+    "folding/small.pt",
+)
 
 
 def tip_sag() -> tuple[float, float]:
@@ -21,6 +33,9 @@ def tip_sag() -> tuple[float, float]:
 
 def main() -> None:
     """Fail unless everything holds."""
+    folder = Path(withe.__file__).parent
+    if missing := [name for name in DATA if not (folder / name).is_file()]:
+        raise SystemExit(f"the package lacks {', '.join(missing)}")
     sag, theory = tip_sag()
     if abs(sag / theory - 1) > 5e-3:
         raise SystemExit(f"tip sag {sag} m, linear theory {theory} m")
@@ -31,7 +46,7 @@ def main() -> None:
     else:
         raise SystemExit("a negative radius was not refused")
     libraries = {line.split()[-1] for line in Path("/proc/self/maps").read_text().splitlines() if "libklu" in line}
-    print(f"smoke test: withe {withe.__version__} from {Path(withe.__file__).parent}")
+    print(f"smoke test: withe {withe.__version__} from {folder}")
     print(f"smoke test: tip sag {sag:.6f} m, theory {theory:.6f} m; refused: {refusal}")
     print("smoke test: KLU from", *libraries)
 
