@@ -90,6 +90,7 @@ class PlausibilityWarning(UserWarning):
     - a tendon whose offset is more than 8 radii of its rod and more than a quarter of the length of its rods,
     - a rest angle or roll above a full turn that is a multiple of 15, as angles in degrees are,
     - a robot from a file that is larger than 20 m, or has a body above 10,000 kg,
+    - a body that is a cylinder, and so touches nothing, in a scene with obstacles or other bodies that touch,
     - a time step above ten of the slowest periods of the scene, without a fluid or drag,
     - a `withe.learning.Task.build` that draws random numbers without `redraw`, so that all robots are equal.
 

@@ -69,7 +69,8 @@ def make_body(
         middle = np.zeros(3) if center is None else validation.vector(center, f"center of {owner}")
     surface = None
     core = core_of(solid)
-    if validation.truth(touches, f"touches of {owner}") and core is not None:
+    is_to_touch = validation.truth(touches, f"touches of {owner}") and solid is not None
+    if is_to_touch and core is not None:
         surface = make_surface(core, owner, origin, axes, friction, restitution)
     elif friction is not None or restitution is not None:
         word = "restitution" if friction is None else "friction"
@@ -77,7 +78,8 @@ def make_body(
             f"{word} of {owner} has no effect, because it touches nothing: use a sphere, capsule, box, hull or mesh"
         )
     turned = axes @ moment @ axes.T
-    return BodyPart(name, index, kilograms, turned, origin + axes @ middle, origin, axes, solid, surface)
+    drawn_only = is_to_touch and surface is None
+    return BodyPart(name, index, kilograms, turned, origin + axes @ middle, origin, axes, solid, surface, drawn_only)
 
 
 def _inertia(value: npt.ArrayLike, owner: str) -> FloatArray:

@@ -152,6 +152,7 @@ class BodyPart(Part):
     rotation: FloatArray  # of its axes, columns, (3, 3)
     solid: Any  # for pictures; None: a body without shape
     surface: BodySurface | None = None  # None: it touches nothing
+    drawn_only: bool = False  # True if it was to touch, and its solid cannot
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ import numpy as np
 
 from withe.common.user_warnings import warn
 from withe.errors import PlausibilityWarning
-from withe.parts.kinds import DragPart, FluidPart, JoinPart, RodPart
+from withe.parts.kinds import BodyPart, DragPart, FluidPart, JoinPart, ObstaclePart, RodPart
 from withe.simulation.session import Session
 from withe.simulation.stepping import Stepping
 
@@ -21,7 +21,7 @@ _UNRESOLVED = 10.0  # periods in a time step; a few are taken on purpose, by bac
 
 
 def check_scene(stepping: Stepping) -> None:
-    """Warn of implausible materials and of an implausible time step, at the time of `Scene.build`."""
+    """Warn of implausible materials, bodies and time steps, at the time of `Scene.build`."""
     session = stepping.session
     gravity = float(np.linalg.norm(session.gravity))
     joined = {rod for join in session.directory.all(JoinPart) for rod, _ in join.nodes}
@@ -30,7 +30,21 @@ def check_scene(stepping: Stepping) -> None:
         _check_modulus(session, rod, gravity)
         if rod.index not in joined:  # stubs to which other rods are joined may be thicker than long
             _check_thickness(rod)
+    _check_bodies(session)
     _check_time_step(stepping)
+
+
+def _check_bodies(session: Session) -> None:
+    """Warn of a body that passes through everything, if there is something to touch."""
+    bodies = session.directory.all(BodyPart)
+    if not any(session.directory.all(ObstaclePart)) and all(body.surface is None for body in bodies):
+        return
+    for body in bodies:
+        if body.drawn_only:
+            _warn(
+                f"{body.owner} is a {type(body.solid).__name__.lower()}, which touches nothing",
+                "use a capsule or hull, or touches=False if it may pass through everything",
+            )
 
 
 def _check_thickness(rod: RodPart) -> None:
