@@ -20,6 +20,10 @@ namespace {
 // for equal steps, 2 where the step before was three times as long.
 constexpr double kMaxUsualTime = 2.0;
 
+// Violation, over the length of the scene, of a constraint of a closed loop that others should imply. Points of joints
+// are drawn to 1e-9.
+constexpr double kMaxViolation = 1e-6;
+
 /// Displacement by a force that acts over a step [m], filtered by (M / h^2 + K)^-1 [Hosea and Shampine 1996]. Modes
 /// that the step does not resolve, and therefore leaves bounded, then count for as little as they move.
 double moved_by(VectorX& force, Equations& equations, const Newton& newton, double h, StepWorkspace& work) {
@@ -148,7 +152,7 @@ void add_work(const Equations& equations, const Parameters& parameters, const Ve
     equations.load_force(data, work.assumed);
     result.load_work = work.assumed.dot(change);
   }
-  if (equations.dissipates(parameters)) result.dissipated = equations.dissipated(data, change);
+  if (equations.dissipates(parameters)) result.dissipated += equations.dissipated(data, change);
 }
 
 void add_support_work(const Equations& equations, const VectorX& v0, const VectorX& v1, double dt, double held_time,
@@ -188,6 +192,9 @@ bool acceptable(Equations& equations, const StepPlan& plan, const State& state, 
   // Inertia takes the tangent of half a turn, and is the same for another turn more; friction and twist are not.
   if (plan.rule == StepRule::energy_momentum && farthest_turn(equations.model(), state.q, q1) >= std::numbers::pi)
     return false;
+  if (equations.loops() && equations.loops()->greatest_violation(equations.problem(), work.z) >
+                               kMaxViolation * equations.model().length_scale)
+    return false;
   Contact* contact = equations.contact();
   if (!contact) return true;
   // Iterates pass through no surface, but they may find a way around an obstacle that the rod would have met.
@@ -211,6 +218,7 @@ void find_end_velocity(const Equations& equations, const StepPlan& plan, const S
     set_turning_velocities(equations.model(), state.v, work.change, plan.dt, v1);
   if (plan.rule != StepRule::backward_euler) set_body_velocities(equations.model(), state.v, work.change, plan.dt, v1);
   balance_bodies(equations.problem(), work.newton.data, v1);
+  for (const Loop& loop : equations.model().loops) v1.segment(loop.dof, equations.model().loop_size()).setZero();
   equations.assembler().set_held_part(work.held_velocity, v1);
   work.follow_gain = 0.0;
   if (plan.rule == StepRule::backward_euler) return;
@@ -277,6 +285,37 @@ void add_rebounds(const Equations& equations, const Parameters& parameters, cons
 
 }  // namespace
 
+namespace {
+
+/// Velocities that a user sets body by body may violate the rates of closed loops of joints. An impulse of the joints
+/// makes them consistent: the step of Newton's method over an interval so short that inertia alone resists. Returns the
+/// kinetic energy that the impulse removes [J].
+double make_rates_consistent(Equations& equations, const Parameters& parameters, const Prescribed& prescribed,
+                             const StepPlan& plan, double h, State& state, StepWorkspace& work) {
+  constexpr double kShort = 1e-6;  // over the interval of the step
+  const double interval = kShort * h;
+  const Model& model = equations.model();
+  equations.begin(state, parameters, plan.rule, interval, prescribed);
+  const double before = kinetic_energy(model, equations.mass(), state.v);
+  work.z = state.q;
+  equations.assembler().add_held_part(state.v, interval, work.z);
+  equations.place(work.z);
+  work.newton.matrix.owner = nullptr;
+  StepData& data = work.newton.data;
+  equations.evaluate(work.z, true, nullptr, data);
+  if (equations.assembler().solver().factorize().status != FactorStatus::ok) return 0.0;
+  VectorX& change = work.change;
+  change = -data.residual;
+  equations.assembler().solver().solve({change.data(), static_cast<std::size_t>(change.size())});
+  equations.expand(data, change);
+  if (!change.allFinite()) return 0.0;
+  state.v = (work.z + change - state.q) / interval;
+  for (const Loop& loop : model.loops) state.v.segment(loop.dof, model.loop_size()).setZero();
+  return before - kinetic_energy(model, equations.mass(), state.v);
+}
+
+}  // namespace
+
 StepResult implicit_step(Equations& equations, const Newton& newton, const Options& options,
                          const Parameters& parameters, const Prescribed& prescribed, const StepPlan& plan, State& state,
                          Predictor& predictor, StepWorkspace& work) {
@@ -286,6 +325,8 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   const double dt = plan.dt, h = euler ? dt : 0.5 * dt;
   if (!prescribed.held.reachable) return result;
   const bool holds = !model.constraints.empty();
+  if (equations.loops() && predictor.empty() && !state.v.isZero(0.0))
+    result.dissipated = make_rates_consistent(equations, parameters, prescribed, plan, h, state, work);
   if (holds) {
     find_held_velocity(model, prescribed.held, plan, state, work);
     work.held_acceleration = (1.0 / held_time(plan, state)) * (work.held_velocity - state.v);
@@ -296,10 +337,7 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   result.newton = solve_inner(equations, newton, options, plan, h, state, predictor, work);
   if (!result.newton.converged) return result;
   VectorX& q1 = work.move;
-  if (euler)
-    q1 = work.z;
-  else
-    q1 = 2.0 * work.z - state.q;
+  equations.problem().set_end(work.z, q1);
   if (!acceptable(equations, plan, state, q1, work, result)) return result;
   work.change = q1 - state.q;
   const bool conserves = plan.rule == StepRule::energy_momentum;

@@ -24,6 +24,7 @@ StepNorms::StepNorms(const Model& model) : model_(model), shortest_edge_(model.s
   coordinates_.setZero(model.dof_count);
   for (int dof : model.node_dof) coordinates_.segment(dof, model.dimension).setOnes();
   for (const Slide& slide : model.slides) coordinates_[slide.dof] = 1.0;
+  for (const Loop& loop : model.loops) coordinates_.segment(loop.dof, model.dimension).setOnes();
   angles_ = 1.0 - coordinates_.array();
   inverse_arms_ = coordinates_ + (1.0 / shortest_edge_) * angles_;
   (model.planar() ? single_angles_ : rotations_) = model.frame_dof;

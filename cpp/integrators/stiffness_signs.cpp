@@ -27,6 +27,7 @@ LinearSolver& StiffnessSigns::symmetric_part() {
       to[static_cast<std::size_t>(symmetric_->place(row, column))] +=
           (row == column ? 1.0 : 0.5) * from[static_cast<std::size_t>(matrix.place(row, column))];
     }
+  if (equations_.loops()) equations_.loops()->condense(equations_.assembler(), matrix, *symmetric_);
   return *symmetric_;
 }
 

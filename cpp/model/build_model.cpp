@@ -68,6 +68,7 @@ class Builder {
     add_edges();
     find_clusters();
     add_bodies();
+    add_loops();
     model_.shortest_length = shortest_length();
     add_frames();
     add_stencils();
@@ -293,6 +294,19 @@ class Builder {
       if (cluster.body >= 0) cluster.frame = model_.body_frame[at(cluster.body)];
     for (const auto& [root, moving] : slide_places_)  // rods on a slide turn with the body
       if (clusters_[at(moving)].body < 0) clusters_[at(moving)].frame = clusters_[at(root)].frame;
+  }
+
+  void add_loops() {
+    for (const LoopDescription& loop : scene_.loops) {
+      Loop out;
+      out.copy_node = loop.copy_node;
+      out.body_node = loop.body_node;
+      out.copy_frame = model_.body_frame[at(loop.copy)];
+      out.body_frame = model_.body_frame[at(loop.body)];
+      out.body_center = scene_.bodies[at(loop.body)].center;
+      out.body = loop.body;
+      model_.loops.push_back(out);
+    }
   }
 
   /// Node that moves on a slide: the base of a body, or the node of rods.
@@ -639,6 +653,7 @@ class Builder {
       for (const RodPass& pass : cluster.passes) connect(global_node(cluster.passes.front()), global_node(pass));
     for (const CarriedPart& carried : model_.carried)
       if (carried.is_node()) connect(carried.base, carried.node);
+    for (const Loop& loop : model_.loops) connect(loop.copy_node, loop.body_node);
     std::vector<int> number(parent.size(), -1);
     const auto component_of = [&](int node) {
       int& found = number[static_cast<std::size_t>(root(node))];
@@ -652,6 +667,7 @@ class Builder {
     for (std::size_t e = 0; e < model_.edge_dof.size(); ++e) set(model_.edge_dof[e], 1, model_.edge_tail[e]);
     for (std::size_t f = 0; f < model_.frame_dof.size(); ++f)
       set(model_.frame_dof[f], model_.frame_size(), model_.frame_node[f]);
+    for (const Loop& loop : model_.loops) set(loop.dof, model_.loop_size(), loop.body_node);
     for (const Slide& slide : model_.slides)
       set(slide.dof, 1, model_.frame_node[static_cast<std::size_t>(slide.frame)]);
     for (const Hinge& hinge : model_.hinges)

@@ -117,6 +117,15 @@ struct BodyDescription {
   int carrier = -1;                   ///< body on whose hinge or slide it is; -1: none
 };
 
+/// Closure of a loop of joints. Joints of bodies form a tree. A joint that would close a loop has a massless copy of
+/// its second body instead. Multipliers hold this copy and the body together; see steps/loop_forces.hpp.
+struct LoopDescription {
+  int copy = -1;       ///< index of the copy among the bodies
+  int body = -1;       ///< index of the body
+  int copy_node = -1;  ///< row of a point that the copy carries
+  int body_node = -1;  ///< row of the same point of the body
+};
+
 enum class SupportKind {
   pin,             ///< position only
   clamp,           ///< position and the frame of the wall, by a stencil of half length
@@ -345,6 +354,7 @@ struct SceneDescription {
   std::vector<RodDescription> rods;
   std::vector<BodyDescription> bodies;
   std::vector<JointDescription> joints;
+  std::vector<LoopDescription> loops;
   std::vector<SupportDescription> supports;
   std::vector<UncorrectedEnd> uncorrected_ends;  ///< found by `build_model`; once one, always one
   std::vector<LoadDescription> loads;

@@ -135,6 +135,10 @@ void lay_out_unknowns(Model& model) {
       }
     }
   for (int node = 0; node < model.node_count; ++node) place_node(node, false);
+  for (Loop& loop : model.loops) {
+    loop.dof = next;
+    next += model.loop_size();
+  }
   for (const CarriedPart& part : model.carried) {
     int& own = part.is_node()    ? model.node_dof[at(part.node)]
                : part.is_frame() ? model.frame_dof[at(part.own_frame)]

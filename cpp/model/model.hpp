@@ -78,6 +78,14 @@ struct CarriedPart {
   bool is_frame() const { return own_frame >= 0; }
 };
 
+/// A closed loop of joints, and its multipliers: forces [N] and moments [N m] on the copy, in the axes of the copy.
+struct Loop {
+  int copy_node = -1, body_node = -1, copy_frame = -1, body_frame = -1;
+  int body_center = -1;  ///< node with the mass of the body
+  int body = -1;
+  int dof = -1;  ///< of the first force; forces come first, then moments
+};
+
 /// The angle of a revolute joint by the unknowns, 0 as drawn: sign (q[turning] - q[against]). In space a hinge has its
 /// own unknown, and `against` is unused. In a plane the hinge lies between two frames. In a plane nothing turns about
 /// an axis that lies in it.
@@ -227,7 +235,8 @@ struct Model {
   VectorX half_share;                  ///< but 5/12 at a frame and 7/12 at the edge's other end; see build_model.cpp
   std::vector<Hinge> hinges;           ///< in space
   std::vector<Slide> slides;
-  std::vector<int> body_frame;           ///< per body
+  std::vector<int> body_frame;  ///< per body
+  std::vector<Loop> loops;
   std::vector<CarriedPart> carried;      ///< parts that bodies carry, each after those that carry it
   std::vector<JointAngle> joint_angles;  ///< per revolute joint, in the order of the scene's joints and their links
   std::vector<std::vector<StencilPlace>> place;  ///< [rod][stencil]
@@ -261,6 +270,8 @@ struct Model {
 
   bool planar() const { return plane.has_value(); }
   int frame_size() const { return planar() ? 1 : 3; }
+  /// Multipliers of a closed loop of joints.
+  int loop_size() const { return dimension + frame_size(); }
   int component_of_node(int node) const {
     return dof_component[static_cast<std::size_t>(node_dof[static_cast<std::size_t>(node)])];
   }

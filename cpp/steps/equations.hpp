@@ -70,6 +70,8 @@ class Equations {
   void forget_contacts();
   /// Null if no hand yields.
   HandForces* hands() { return terms_.hands; }
+  /// Null if joints of bodies form no closed loop.
+  const LoopForces* loops() const { return terms_.loops; }
   /// Share of a step of z that contact allows, from 0 to 1.
   double allowed(const VectorX& z, const VectorX& step);
   /// True if anything is in contact at z. Updates the contacts for an evaluation at z.

@@ -371,6 +371,7 @@ void balance_bodies(const StepProblem& problem, const StepData& data, VectorX& v
   if (!problem.conserves_energy()) return;
   for (int b = 0; b < static_cast<int>(model.body_frame.size()); ++b) {
     const int dof = model.frame_dof[at(model.body_frame[at(b)])];
+    if (problem.mass.rows[dof] == 0.0) continue;  // a copy at a closed loop of joints
     if (model.planar()) {
       v1[dof] -= problem.duration() * data.residual[dof] * problem.mass.inverse[dof];
     } else {

@@ -64,10 +64,14 @@ struct StepProblem {
   double duration() const { return in_middle() ? 2.0 * interval : interval; }
   /// q1 that belongs to z, and the derivative of q1 by z.
   void set_end(const VectorX& z, VectorX& end) const {
-    if (in_middle())
-      end = 2.0 * z - start->q;
-    else
+    if (!in_middle()) {
       end = z;
+      return;
+    }
+    end = 2.0 * z - start->q;
+    // A multiplier acts in the middle of a step, and has no value at its end.
+    for (const Loop& loop : model.loops)
+      end.segment(loop.dof, model.loop_size()) = z.segment(loop.dof, model.loop_size());
   }
   double end_rate() const { return in_middle() ? 2.0 : 1.0; }
 };

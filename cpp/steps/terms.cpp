@@ -37,6 +37,7 @@ Terms make_terms(const Model& model, const Loads& loads, StepRule rule, bool exa
   if (moves && scene.fluid.model == FluidModel::resistive) add(std::make_unique<ResistiveForces>(model));
   if (scene.contact.any()) terms.contact = add(std::make_unique<ContactForces>(model));
   add(std::make_unique<Inertia>(model, exact));
+  if (!model.loops.empty()) terms.loops = add(std::make_unique<LoopForces>(model));
   add(std::make_unique<Drag>());
   add(std::make_unique<Gravity>());
   if (scene.has_custom_force) terms.custom = add(std::make_unique<CustomTerm>(applied));
@@ -95,6 +96,7 @@ std::vector<std::string> asymmetries_of(const Model& model, const Loads& loads, 
   if (scene.fluid.model == FluidModel::resistive && rule != StepRule::statics)
     found.emplace_back("resistive-force theory");
   add_asymmetries(terms.hands, exact, found);
+  if (!model.loops.empty()) found.emplace_back("closed loops of joints");
   if (exact && rule != StepRule::statics && (!model.planar() || rule != StepRule::backward_euler))
     found.emplace_back("every derivative of inertia and viscosity");
   return found;

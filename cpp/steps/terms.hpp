@@ -10,6 +10,7 @@
 #include "steps/custom_term.hpp"
 #include "steps/fluid_forces.hpp"
 #include "steps/hand_forces.hpp"
+#include "steps/loop_forces.hpp"
 
 namespace withe {
 
@@ -20,6 +21,7 @@ struct Terms {
   ContactForces* contact = nullptr;
   CustomTerm* custom = nullptr;
   HandForces* hands = nullptr;
+  LoopForces* loops = nullptr;
   StokesletForces* stokeslets = nullptr;
 };
 

@@ -159,6 +159,7 @@ std::uint64_t fingerprint(const SceneDescription& scene) {
   }
   w(static_cast<std::int64_t>(scene.joints.size()));
   for (const JointDescription& joint : scene.joints) w(static_cast<std::int64_t>(joint.links.size()));
+  for (const LoopDescription& loop : scene.loops) w(loop.copy_node), w(loop.body_node);
   w(static_cast<std::int64_t>(drawn_loads(scene)));
   w(static_cast<std::int64_t>(scene.springs.size()));
   for (const SpringDescription& spring : scene.springs)

@@ -125,6 +125,10 @@ void register_body(py::module_& module) {
       .def_readwrite("carried", &BodyDescription::carried)
       .def_readwrite("inertia", &BodyDescription::inertia)
       .def_readwrite("carrier", &BodyDescription::carrier);
+
+  py::class_<LoopDescription>(module, "LoopDescription", "A closed loop of joints: a body, and its copy at a joint.")
+      .def(py::init<int, int, int, int>(), py::arg("copy"), py::arg("body"), py::arg("copy_node"),
+           py::arg("body_node"));
 }
 
 void register_contact(py::module_& module) {
@@ -302,6 +306,7 @@ void register_model(py::module_& module) {
       .def_readwrite("rods", &SceneDescription::rods)
       .def_readwrite("bodies", &SceneDescription::bodies)
       .def_readwrite("joints", &SceneDescription::joints)
+      .def_readwrite("loops", &SceneDescription::loops)
       .def_readwrite("supports", &SceneDescription::supports)
       .def_readwrite("loads", &SceneDescription::loads)
       .def_readwrite("springs", &SceneDescription::springs)

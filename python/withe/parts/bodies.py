@@ -111,26 +111,28 @@ def describe_bodies(directory: Directory) -> list[_core.BodyDescription]:
     """
     bodies = directory.all(BodyPart)
     places = {body: (base, carrier) for body, base, carrier in _bases(directory, bodies)}
-    slid = _slid_rows(directory, bodies)
+    slid = _slid_rows(directory)
     _check_held_once(directory, bodies, {body: base for body, (base, _) in places.items()}, slid)
+    given = [(body.index, body.name, body.inertia) for body in bodies]
+    copies = [
+        (loop.copy, f"copy of {bodies[loop.body].name} at {loop.joint}", np.zeros((3, 3))) for loop in directory.loops
+    ]
     found = []
-    for body in bodies:
-        rows = directory.layout.rows(-1 - body.index)
+    for index, name, inertia in given + copies:
+        rows = directory.layout.rows(-1 - index)
         description = _core.BodyDescription()
-        description.name = body.name
-        description.center = directory.row((-1 - body.index, 0))
-        description.node, description.carrier = places[body.index]
-        description.carried = sorted(
-            int(row) for row in rows if row != description.node and row not in slid[body.index]
-        )
-        description.inertia = body.inertia
+        description.name = name
+        description.center = directory.row((-1 - index, 0))
+        description.node, description.carrier = places[index]
+        description.carried = sorted(int(row) for row in rows if row != description.node and row not in slid[index])
+        description.inertia = inertia
         found.append(description)
     return found
 
 
-def _slid_rows(directory: Directory, bodies: list[BodyPart]) -> dict[int, set[int]]:
-    """Rows of sliding joints of each body."""
-    rows: dict[int, set[int]] = {body.index: set() for body in bodies}
+def _slid_rows(directory: Directory) -> dict[int, set[int]]:
+    """Rows of sliding joints of each body, and of copies of bodies at closed loops."""
+    rows: dict[int, set[int]] = {index: set() for index in range(len(directory.layout.body_points))}
     for join in directory.all(JoinPart):
         for node in join.nodes if join.kind == "sliding" else ():
             if node[0] < 0:
@@ -179,13 +181,14 @@ def _bases(directory: Directory, bodies: list[BodyPart]) -> Iterator[tuple[int, 
     """
     held = {directory.row(support.node) for support in directory.all(SupportPart)}
     joined = [node for join in directory.all(JoinPart) for node in join.nodes if node[0] < 0]
-    rows = {body.index: [directory.row(node) for node in joined if node[0] == -1 - body.index] for body in bodies}
-    holds = {body.index: sorted(int(r) for r in directory.layout.rows(-1 - body.index) if r in held) for body in bodies}
+    count = len(directory.layout.body_points)
+    rows = {body: [directory.row(node) for node in joined if node[0] == -1 - body] for body in range(count)}
+    holds = {body: sorted(int(r) for r in directory.layout.rows(-1 - body) if r in held) for body in range(count)}
     owners: dict[int, list[int]] = {}
     for body, own in rows.items():
         for row in dict.fromkeys(own):
             owners.setdefault(row, []).append(body)
-    loops = UnionFind(len(bodies))
+    loops = UnionFind(count)
     for shared in owners.values():
         for other in shared[1:]:
             if loops.find(shared[0]) == loops.find(other):
@@ -197,8 +200,10 @@ def _bases(directory: Directory, bodies: list[BodyPart]) -> Iterator[tuple[int, 
         for join in directory.all(JoinPart)
         if join.axis is not None and all(node[0] < 0 for node in join.nodes)
     }
-    slid = _slid_rows(directory, bodies)
-    starts = sorted(rows, key=lambda body: not holds[body])
+    slid = _slid_rows(directory)
+    # A body that a support names carries others at the same point.
+    named = {-1 - support.node[0] for support in directory.all(SupportPart)}
+    starts = sorted(rows, key=lambda body: (not holds[body], body not in named))
     for start in starts:
         if start in done:
             continue

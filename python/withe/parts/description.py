@@ -28,6 +28,7 @@ from withe.parts.kinds import (
     SupportPart,
     TendonPart,
 )
+from withe.parts.loops import describe_loops
 from withe.parts.obstacle_shapes import check_channels
 from withe.parts.options import Bending
 from withe.parts.parameters import RodParameters
@@ -67,6 +68,7 @@ def describe(directory: Directory, gravity: FloatArray, bending: Bending = "angl
     check_channels(directory)
     scene.rods += describe_surfaces(directory)
     scene.bodies = describe_bodies(directory)
+    scene.loops = describe_loops(directory)
     scene.joints = [describe_joint(group) for group in groups(directory.all(JoinPart))]
     scene.supports = _describe_supports(directory)
     scene.loads = [describe_load(directory, load) for load in directory.all(LoadPart)]

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from withe.common import validation
 from withe.common.validation import near_word
 from withe.parts.handles import EdgeHandle, Handle, Layout, NodeHandle, Rod, parse_place, parse_point
-from withe.parts.kinds import Actuation, BodyPart, ContactSettings, Part, Pass, RodPart
+from withe.parts.kinds import Actuation, BodyPart, ClosedLoop, ContactSettings, Part, Pass, RodPart
 from withe.parts.table import handle_of, kind_of
 
 __all__ = ["Directory"]
@@ -27,6 +27,7 @@ class Directory:
         self.parts: dict[str, Part] = {}
         self.contact: ContactSettings = ContactSettings()
         self.actuations: tuple[Actuation, ...] = ()  # in the order of time
+        self.loops: tuple[ClosedLoop, ...] = ()  # found when the scene is built
         self._retired: dict[str, int] = {}  # greatest number of a released part that was named by one, by its word
 
     def copy(self) -> Directory:
@@ -36,6 +37,7 @@ class Directory:
         other.parts = dict(self.parts)
         other.contact = self.contact
         other.actuations = self.actuations
+        other.loops = self.loops
         other._retired = dict(self._retired)
         return other
 

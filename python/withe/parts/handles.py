@@ -122,6 +122,20 @@ class Layout:
         self._merges.append((a, b))
         self._rows = None
 
+    def split(self, a: tuple[int, int], b: tuple[int, int]) -> None:
+        """Make two nodes two again that were made one by one joint."""
+        self._merges.remove((a, b))
+        self._rows = None
+
+    def add_copy(self, position: FloatArray) -> int:
+        """Append a copy of a body at a joint as a scene is built: its first point is the body's, its second the joint.
+
+        Returns its index.
+        """
+        self.body_points.append((position, position))
+        self._rows = None
+        return len(self.body_points) - 1
+
     def rows(self, rod: int) -> npt.NDArray[np.int64]:
         """Rows of the nodes of a rod, or of the points of a body."""
         return self._numbered()[rod if rod >= 0 else len(self.rods) - 1 - rod]

@@ -21,6 +21,7 @@ __all__ = [
     "SUPPORT_KINDS",
     "Actuation",
     "BodyPart",
+    "ClosedLoop",
     "ContactModel",
     "ContactSettings",
     "CustomForcePart",
@@ -173,6 +174,16 @@ class JoinPart(Part):
     limits: tuple[float, float] | None = None  # [rad]
     limit_stiffness: float = 0.0  # [N m/rad]
     restitution: float = 1.0  # of the stops [-]
+
+
+@dataclass(frozen=True, eq=False)
+class ClosedLoop:
+    """Closure of a loop of joints: a joint has a massless copy of its second body, which multipliers hold together."""
+
+    joint: str
+    body: int  # index of the body
+    copy: int  # index of the copy among the bodies of the layout
+    node: Pass  # point of the body at the joint
 
 
 @dataclass(frozen=True, eq=False)

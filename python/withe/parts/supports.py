@@ -13,7 +13,7 @@ from withe.common.union_find import UnionFind
 from withe.parts.directory import Directory
 from withe.parts.handles import Body, NodeHandle
 from withe.parts.hands import check_free
-from withe.parts.kinds import BodyPart, JoinPart, Pass, RodPart, SupportKind, SupportPart
+from withe.parts.kinds import JoinPart, Pass, RodPart, SupportKind, SupportPart
 
 __all__ = ["check_not_held", "free_rods", "held_rows", "make_clamp", "make_pin"]
 
@@ -124,12 +124,14 @@ def _projector(free: npt.ArrayLike | None, what: str) -> FloatArray:
 def free_rods(directory: Directory, supports: Iterable[SupportPart]) -> list[RodPart]:
     """Return the rods that no support holds, also not through the rods and bodies that they are joined to."""
     rods = directory.all(RodPart)
-    groups = UnionFind(len(rods) + len(directory.all(BodyPart)))
+    groups = UnionFind(len(rods) + len(directory.layout.body_points))
 
     def number(node: Pass) -> int:
         return node[0] if node[0] >= 0 else len(rods) - 1 - node[0]
 
     for join in directory.all(JoinPart):
         groups.unite(*map(number, join.nodes))
+    for loop in directory.loops:
+        groups.unite(len(rods) + loop.body, len(rods) + loop.copy)
     held = {groups.find(number(part.node)) for part in supports}
     return [rod for rod in rods if groups.find(rod.index) not in held]

@@ -15,6 +15,7 @@ from withe.robots.composing import MassProperties, free_place, massless_base, un
 from withe.robots.description import RobotBody, RobotDescription, RobotJoint
 from withe.robots.files import CompiledRobot, compiled
 from withe.robots.mujoco_joints import BALL, FREE, HINGE, SLIDE, greatest_torque, has_force_limit, stops_of
+from withe.robots.mujoco_loops import connections
 from withe.robots.names import name_of
 from withe.robots.shapes import drawn_geoms, solid_of
 from withe.robots.unsupported import listed, unsupported_content
@@ -74,12 +75,14 @@ class _Reader:
         if self._model.nbody < 2:
             raise ValueError(f"{self._path} must have a body, got none")
         model = self._model
-        self._unsupported += unsupported_content(model)
         groups = {top: np.nonzero(self._weld == top)[0].tolist() for top in sorted(set(self._weld.tolist()))}
         groups[0].remove(0)
         self._size = self._extent()
+        self._connections = connections(model, self._data, self._size)
+        self._unsupported += unsupported_content(model, {each.equality for each in self._connections})
         moving = float(np.asarray(model.body_mass)[self._weld != 0].sum())
         has_base = bool(groups[0]) or any(self._needs_base(joint) for joint in range(model.njnt))
+        has_base = has_base or any(self._weld[body] == 0 for each in self._connections for body in each.bodies)
         if not has_base:
             del groups[0]
         numbers = {top: i for i, top in enumerate(groups)}
@@ -184,6 +187,10 @@ class _Reader:
                 values = (*self._spring(joint), *stops_of(model, joint), *servo)
                 found.append(RobotJoint(name, _KINDS[kind], parent, child, at, axis, *values))
                 parent = child
+        for equality, (first, second), at in self._connections:
+            name = model.equality(equality).name or name_of(model, "equality", equality)
+            ends = numbers[int(self._weld[first])], numbers[int(self._weld[second])]
+            found.append(RobotJoint(name, "pinned", *ends, at, None))
         return tuple(found)
 
     def _spring(self, joint: int) -> tuple[float, float, float]:

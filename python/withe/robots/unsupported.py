@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Set
 from typing import Any
 
 import numpy as np
@@ -25,10 +25,13 @@ def listed(names: Iterable[str], most: int = 6) -> str:
     return ", ".join(known[:most]) + more
 
 
-def unsupported_content(model: Any) -> Iterator[str]:
-    """Yield what a model has that a scene of rigid bodies and joints lacks, with names."""
+def unsupported_content(model: Any, closed: Set[int]) -> Iterator[str]:
+    """Yield what a model has that a scene of rigid bodies and joints lacks, with names.
+
+    `closed`: equality constraints that become joints.
+    """
     yield from _of_joints(model)
-    yield from _of_equalities(model)
+    yield from _of_equalities(model, closed)
     for kind, count in _NAMED.items():
         number = int(getattr(model, count))
         if number:
@@ -85,11 +88,12 @@ def _optional(model: Any, word: str, count: int) -> Any:
     return getattr(model, word, np.zeros(count))
 
 
-def _of_equalities(model: Any) -> Iterator[str]:
-    for kind in sorted(set(np.asarray(model.eq_type, dtype=int).tolist())):
+def _of_equalities(model: Any, closed: Set[int]) -> Iterator[str]:
+    kinds = {i: kind for i, kind in enumerate(np.asarray(model.eq_type, dtype=int).tolist()) if i not in closed}
+    for kind in sorted(set(kinds.values())):
         word = _EQUALITIES[kind] if kind < len(_EQUALITIES) else f"kind {kind}"
         names = []
-        for i in np.nonzero(np.asarray(model.eq_type) == kind)[0].tolist():
+        for i in (number for number, own in kinds.items() if own == kind):
             first = int(model.eq_obj1id[i])
             of = {"connect": "body", "weld": "body", "joint": "joint", "tendon": "tendon"}.get(word, "equality")
             if word in ("connect", "weld") and int(model.eq_objtype[i]) != 1:  # mjOBJ_BODY

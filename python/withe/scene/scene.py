@@ -513,6 +513,8 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
         then in N/m, rest_angle in m, damping in N s/m and moment in N.
         `Simulation.joint_angle` returns theta.
 
+        Joints of bodies may form closed loops, such as a four-bar linkage. `build` finds them.
+
         Parameters
         ----------
         a, b, *others : NodeHandle, Body or str

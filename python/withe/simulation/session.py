@@ -15,6 +15,7 @@ from withe.parts.contacts import drawn_frictions
 from withe.parts.description import describe, parameters_of
 from withe.parts.directory import Directory
 from withe.parts.kinds import CustomForcePart, DragPart, FluidPart, LoadPart, MassPart, RodPart, SupportPart
+from withe.parts.loops import open_loops
 from withe.parts.options import BuildOptions, check_tolerances
 from withe.simulation.settings import Settings
 
@@ -82,6 +83,7 @@ class Session:
             A scene that cannot be built.
         """
         place_surfaces(scene)
+        open_loops(scene)
         description = describe(scene, gravity, options.bending)
         if rods := scene.all(RodPart):
             check_tolerances(

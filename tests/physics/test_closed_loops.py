@@ -1,0 +1,274 @@
+"""Closed loops of joints between rigid bodies, against linkages with one unknown, and conservation over drawn loops."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
+
+import withe
+from cases import measured
+from convergence import assert_order, assert_order_at_least
+
+Array = npt.NDArray[np.float64]
+G = 9.81
+NORMAL = np.array([0.0, 1.0, 0.0])
+
+
+def bar(scene: withe.Scene, start: npt.ArrayLike, end: npt.ArrayLike, mass: float, turn: Array | None = None) -> Any:
+    """Add a thin uniform bar between two points; its axes are those of the drawing before `turn`."""
+    a, b = np.asarray(start, float), np.asarray(end, float)
+    length = float(np.linalg.norm(b - a))
+    inertia = mass * length**2 / 12.0 * (np.eye(3) - np.outer(b - a, b - a) / length**2) + 1e-9 * np.eye(3)
+    axes = np.eye(3) if turn is None else turn
+    middle = axes @ (0.5 * (a + b))
+    return scene.add_body(mass=mass, inertia=axes @ inertia @ axes.T, position=middle)
+
+
+class FourBar:
+    """A four-bar linkage in the plane y = 0, with its motion by the angle of the crank."""
+
+    lengths = (0.1, 0.25, 0.2)  # crank, coupler, rocker [m]
+    base = 0.22  # between the pivots [m]
+    masses = (0.2, 0.3, 0.25)
+
+    def points(self, angle: float) -> Array:
+        """Return both pivots and both moving joints, (4, 2): pivot, crank pin, rocker pin, pivot."""
+        a, b, c = self.lengths
+        pin = a * np.array([np.cos(angle), np.sin(angle)])
+        pivot = np.array([self.base, 0.0])
+        apart = pivot - pin
+        size = float(np.linalg.norm(apart))
+        along = (b**2 - c**2 + size**2) / (2.0 * size)
+        across = np.sqrt(b**2 - along**2)
+        other = pin + (along * apart + across * np.array([-apart[1], apart[0]])) / size
+        return np.array([np.zeros(2), pin, other, pivot])
+
+    def configuration(self, angle: float) -> Array:
+        """Return the middles (x, z) and angles of the three bars, (3, 3)."""
+        p = self.points(angle)
+        ways = np.diff(p, axis=0)
+        return np.column_stack([0.5 * (p[1:] + p[:-1]), np.arctan2(ways[:, 1], ways[:, 0])])
+
+    def slope(self, angle: float) -> Array:
+        """Return derivatives of the configuration by the angle."""
+        h = 1e-5
+        far = self.configuration(angle + 2 * h) - self.configuration(angle - 2 * h)
+        near = self.configuration(angle + h) - self.configuration(angle - h)
+        return np.asarray((8.0 * near - far) / (12.0 * h))
+
+    def inertia(self, angle: float) -> float:
+        """Return the moment of inertia of the linkage at the crank [kg m^2]."""
+        m = np.array(self.masses)
+        about = m * np.array(self.lengths) ** 2 / 12.0 + 1e-9
+        s = self.slope(angle)
+        return float((m * (s[:, 0] ** 2 + s[:, 1] ** 2) + about * s[:, 2] ** 2).sum())
+
+    def acceleration(self, angle: float, rate: float) -> float:
+        """Return the angular acceleration of the crank under gravity along -z [rad/s^2]."""
+        h = 1e-4
+        by_angle = (self.inertia(angle + h) - self.inertia(angle - h)) / (2.0 * h)
+        weight = G * float(np.dot(self.masses, self.slope(angle)[:, 1]))
+        return -(0.5 * by_angle * rate**2 + weight) / self.inertia(angle)
+
+    def scene(self, angle: float, turn: Array | None = None, base: str = "body") -> tuple[withe.Scene, list[Any]]:
+        """Draw the linkage, `turn` about the origin, with hinges whose axes are normal to its plane."""
+        axes = np.eye(3) if turn is None else turn
+        p = [np.array([x, 0.0, z]) for x, z in self.points(angle)]
+        scene = withe.Scene(gravity=axes @ (0.0, 0.0, -G))
+        bars = [bar(scene, a, b, m, axes) for a, b, m in zip(p, p[1:], self.masses, strict=False)]
+        axis = axes @ NORMAL
+        ground = scene.add_body(mass=1.0, inertia=1e-2, name="ground")
+        scene.clamp(ground)
+        chain = [ground, *bars, ground]
+        for k, (one, two) in enumerate(zip(chain, chain[1:], strict=False)):
+            scene.join(one, two, "revolute", at=axes @ p[k], axis=axis, name=f"hinge {k}")
+        return scene, bars
+
+    def set_rate(self, simulation: withe.Simulation, bars: list[Any], angle: float, rate: float, axes: Array) -> None:
+        """Set consistent velocities of all bars. An angle in the plane turns about -y."""
+        for each, (x, z, turn) in zip(bars, rate * self.slope(angle), strict=True):
+            simulation.set_velocity(each, axes @ (x, 0.0, z), angular=axes @ (-turn * NORMAL))
+
+
+def crank_angle(simulation: withe.Simulation, crank: Any, pivot: npt.ArrayLike = (0, 0, 0)) -> float:
+    """Return the angle of the crank in the plane."""
+    way = simulation.position(crank) - pivot
+    return float(np.arctan2(way[2], way[0]))
+
+
+@pytest.mark.case("bodies", "Four-bar linkage that swings under gravity", source="Lagrange's equation of its crank")
+@pytest.mark.parametrize(("integrator", "order"), [("energy_momentum", 2.0), ("implicit_midpoint", 2.0)])
+def test_a_four_bar_linkage_swings(integrator: str, order: float) -> None:
+    """The angle of the crank after half a second."""
+    linkage, start, rate = FourBar(), 1.0, 6.0
+    exact = solve_ivp(
+        lambda _, y: [y[1], linkage.acceleration(y[0], y[1])], (0.0, 0.5), [start, rate], rtol=1e-10, atol=1e-10
+    ).y[0, -1]
+    errors = []
+    for step in (4e-3, 2e-3, 1e-3):
+        scene, bars = linkage.scene(start)
+        simulation = scene.build(time_step=step, integrator=integrator)
+        linkage.set_rate(simulation, bars, start, rate, np.eye(3))
+        energy = simulation.energy().total
+        simulation.step(round(0.5 / step))
+        difference = crank_angle(simulation, bars[0]) - exact
+        errors.append(abs((difference + np.pi) % (2.0 * np.pi) - np.pi))
+        if integrator == "energy_momentum":
+            assert simulation.energy().total == pytest.approx(energy, abs=1e-8)
+    measured(errors[-1], "rad")
+    assert_order(errors, order)
+
+
+class SliderCrank:
+    """A crank that turns evenly, a uniform coupler, and a slider on the line of the crank's pivot; no gravity."""
+
+    crank, coupler, rate = 0.15, 0.30, 20.0  # [m], [m], [rad/s]
+    coupler_mass, slider_mass = 0.1, 0.2
+
+    def kinematics(self, time: float) -> tuple[Array, Array]:
+        """Return pin, coupler's middle, slider (x, z), and the coupler's angle, as (7,); and second derivatives."""
+
+        def place(t: float) -> Array:
+            theta = self.rate * t
+            pin = self.crank * np.array([np.cos(theta), np.sin(theta)])
+            phi = -np.arcsin(pin[1] / self.coupler)
+            way = self.coupler * np.array([np.cos(phi), np.sin(phi)])
+            return np.array([*pin, *(pin + 0.5 * way), *(pin + way), phi])
+
+        h = 2e-4
+        terms = [place(time + k * h) for k in (-2, -1, 0, 1, 2)]
+        second = (-terms[0] + 16 * terms[1] - 30 * terms[2] + 16 * terms[3] - terms[4]) / (12 * h * h)
+        return terms[2], np.asarray(second)
+
+    def velocity(self, time: float) -> Array:
+        """Return the rates of the kinematics."""
+        h = 1e-4
+        terms = [self.kinematics(time + k * h)[0] for k in (-2, -1, 1, 2)]
+        return np.asarray((terms[0] - 8 * terms[1] + 8 * terms[2] - terms[3]) / (12 * h))
+
+    def forces(self, time: float) -> Array:
+        """Return the force of the guide on the slider, the force of the crank on the coupler (2), and the torque."""
+        place, second = self.kinematics(time)
+        half = 0.5 * (place[4:6] - place[0:2])
+        turning = self.coupler_mass * self.coupler**2 / 12.0 + 1e-9
+        slider_x = -self.slider_mass * second[4]  # force on the coupler at the slider
+        # Moments about the middle of the coupler: half x (slider force - pin force) = turning phi''.
+        weight = self.coupler_mass * second[2:4]
+        slider_z = (turning * second[6] + half[1] * (2.0 * slider_x - weight[0])) / (2.0 * half[0]) + 0.5 * weight[1]
+        on_coupler = weight - (slider_x, slider_z)
+        torque = place[0] * on_coupler[1] - place[1] * on_coupler[0]
+        return np.array([slider_z, *on_coupler, torque])
+
+
+@pytest.mark.case("bodies", "Slider-crank at an even rate: forces", source="d'Alembert's principle")
+def test_a_slider_crank_moves_and_pulls() -> None:
+    """Position and speed of the slider, of second order; forces in the middle of the last step, of first order.
+
+    Forces have a part of the order of the step that alternates, because the drawn velocities are consistent, while
+    those of the midpoint rule are so to second order.
+    """
+    case = SliderCrank()
+    errors, force_errors = [], []
+    for steps in (100, 200, 400):
+        end = np.pi / 3.0 / case.rate
+        step = end / steps
+        scene = withe.Scene(gravity=(0, 0, 0))
+        frame = scene.add_body(mass=1.0, inertia=1e-2, name="frame")
+        scene.clamp(frame)
+        crank = scene.add_body(mass=1e-3, inertia=1e-5, position=(0, 0, 0), name="crank")
+        motor = scene.clamp(crank)
+        place, _ = case.kinematics(0.0)
+        tip = place[4:6]
+        coupler = bar(scene, (case.crank, 0, 0), (tip[0], 0, 0), case.coupler_mass)
+        slider = scene.add_body(mass=case.slider_mass, inertia=1e-4, position=(tip[0], 0, 0))
+        pin = scene.join(crank, coupler, "revolute", at=(case.crank, 0, 0), axis=NORMAL)
+        scene.join(coupler, slider, "revolute", at=(tip[0], 0, 0), axis=NORMAL)
+        guide = scene.join(frame, slider, "sliding", at=(tip[0], 0, 0), axis=(1, 0, 0))
+        simulation = scene.build(time_step=step)
+        simulation.move(motor, path=lambda t: ((0, 0, 0), Rotation.from_rotvec(-case.rate * t * NORMAL).as_matrix()))
+        v = case.velocity(0.0)
+        simulation.set_velocity(crank, angular=-case.rate * NORMAL)
+        simulation.set_velocity(coupler, (v[2], 0, v[3]), angular=-v[6] * NORMAL)
+        simulation.set_velocity(slider, (v[4], 0, 0))
+        simulation.step(steps)
+        found = np.array([simulation.position(slider)[0], simulation.velocity(slider)[0]])
+        expected = np.array([case.kinematics(end)[0][4], case.velocity(end)[4]])
+        errors.append(np.abs(found / expected - 1.0).max())
+        on_slider, on_coupler = simulation.reaction(guide).force, simulation.reaction(pin).force
+        torque = -simulation.reaction(motor).moment[1]
+        forces = case.forces(end - 0.5 * step)
+        scale = np.array([10.0, 10.0, 10.0, 1.0])
+        force_errors.append(
+            np.abs((np.array([on_slider[2], on_coupler[0], on_coupler[2], torque]) - forces) / scale).max()
+        )
+    measured(force_errors[-1])
+    assert errors[-1] < 1e-5
+    assert force_errors[-1] < 1e-3
+    assert_order(errors, 2.0)
+    assert_order_at_least(force_errors, 1.0)
+
+
+def ring(seed: int, kinds: list[str], spring: bool = False) -> tuple[withe.Scene, list[Any]]:
+    """Draw a free ring of bodies, not in a plane, with joints of these kinds, and a spring across it."""
+    rng = np.random.default_rng(seed)
+    count = len(kinds)
+    scene = withe.Scene(gravity=(0, 0, 0))
+    turn = 2.0 * np.pi * np.arange(count) / count
+    points = 0.1 * np.column_stack([np.cos(turn), np.sin(turn), 0.3 * rng.normal(size=count)])
+    bodies = []
+    for i in range(count):
+        moments = 1e-5 * rng.uniform(1.0, 1.8, 3)
+        axes = Rotation.random(rng=rng)
+        middle = 0.5 * (points[i] + points[(i + 1) % count]) + 0.01 * rng.normal(size=3)
+        bodies.append(
+            scene.add_body(
+                mass=rng.uniform(0.02, 0.06),
+                inertia=moments,
+                center=0.01 * rng.normal(size=3),
+                position=middle,
+                rotation=axes,
+            )
+        )
+    for i, kind in enumerate(kinds):
+        axis = rng.normal(size=3) if kind in ("revolute", "sliding") else None
+        words: dict[str, Any] = {"stiffness": 2.0} if kind == "sliding" else {}
+        scene.join(bodies[i - 1], bodies[i], kind, at=points[i], axis=axis, **words)  # type: ignore[call-overload]
+    if spring:
+        ends = [bodies[0].at(points[0] + 0.01), bodies[count // 2].at(points[count // 2] - 0.01)]
+        scene.add_spring(*ends, stiffness=5.0)
+    return scene, bodies
+
+
+RINGS = {
+    "pinned": (["pinned"] * 4, False),
+    "spring": (["pinned"] * 4, True),
+    "hinges": (["revolute"] * 7, False),
+    "mixed": (["pinned", "revolute", "sliding", "pinned", "revolute", "pinned"], True),
+    "slides": (["sliding", "pinned", "pinned", "sliding", "pinned"], False),
+}
+
+
+@pytest.mark.case("bodies", "Drawn closed loops of joints: energy and momenta", source="conservation")
+@pytest.mark.parametrize("name", RINGS)
+@pytest.mark.parametrize("seed", range(3))
+def test_drawn_loops_keep_momenta_and_energy(name: str, seed: int) -> None:
+    """Momenta to 1e-9 of their size, energy to 1e-6, over 1,000 steps; the loop stays closed."""
+    scene, bodies = ring(seed, *RINGS[name])
+    rng = np.random.default_rng(seed)
+    simulation = scene.build(time_step=1e-3)
+    for body in bodies:
+        simulation.set_velocity(body, 0.3 * rng.normal(size=3), angular=5.0 * rng.normal(size=3))
+    simulation.step()  # makes the velocities consistent
+    energy, momentum = simulation.energy(), simulation.momentum()
+    simulation.step(1000)
+    now = simulation.momentum()
+    linear = np.linalg.norm(now.linear - momentum.linear) / np.linalg.norm(momentum.linear)
+    angular = np.linalg.norm(now.angular - momentum.angular) / np.linalg.norm(momentum.angular)
+    measured(max(linear, angular))
+    assert max(linear, angular) < 1e-9
+    assert simulation.energy().total == pytest.approx(energy.total, abs=1e-6 * energy.kinetic)
