@@ -288,30 +288,46 @@ void add_rebounds(const Equations& equations, const Parameters& parameters, cons
 namespace {
 
 /// Velocities that a user sets body by body may violate the rates of closed loops of joints. An impulse of the joints
-/// makes them consistent: the step of Newton's method over an interval so short that inertia alone resists. Returns the
-/// kinetic energy that the impulse removes [J].
+/// makes them consistent: the step of Newton's method over an interval so short that inertia alone resists. Forces at
+/// rest are subtracted, so that they leave no rounding errors. Returns the kinetic energy that the impulse removes [J].
 double make_rates_consistent(Equations& equations, const Parameters& parameters, const Prescribed& prescribed,
                              const StepPlan& plan, double h, State& state, StepWorkspace& work) {
-  constexpr double kShort = 1e-6;  // over the interval of the step
+  constexpr double kShort = 1e-4;  // over the interval of the step
   const double interval = kShort * h;
   const Model& model = equations.model();
-  equations.begin(state, parameters, plan.rule, interval, prescribed);
-  const double before = kinetic_energy(model, equations.mass(), state.v);
-  work.z = state.q;
-  equations.assembler().add_held_part(state.v, interval, work.z);
-  equations.place(work.z);
-  work.newton.matrix.owner = nullptr;
+  const VectorX before = state.v;
   StepData& data = work.newton.data;
-  equations.evaluate(work.z, true, nullptr, data);
-  if (equations.assembler().solver().factorize().status != FactorStatus::ok) return 0.0;
+  work.newton.matrix.owner = nullptr;
+  equations.begin(state, parameters, plan.rule, interval, prescribed);
+  const double energy = kinetic_energy(model, equations.mass(), before);
+  VectorX& held = work.difference;
+  held.setZero(before.size());
+  equations.assembler().add_held_part(before, interval, held);
   VectorX& change = work.change;
-  change = -data.residual;
+  const auto add_residual = [&](const VectorX& z, double factor) {
+    work.z = z;
+    equations.place(work.z);
+    equations.evaluate(work.z, false, nullptr, data);
+    change += factor * data.residual;
+  };
+  change.setZero(before.size());
+  add_residual(state.q, -1.0);
+  state.v.setZero();
+  add_residual(state.q, 1.0);
+  if (!held.isZero(0.0)) {
+    add_residual(state.q + held, -1.0);
+    add_residual(state.q, 1.0);
+  }
+  state.v = before;
+  equations.evaluate(state.q, true, nullptr, data);
+  if (equations.assembler().solver().factorize().status != FactorStatus::ok) return 0.0;
   equations.assembler().solver().solve({change.data(), static_cast<std::size_t>(change.size())});
+  change += held;
   equations.expand(data, change);
   if (!change.allFinite()) return 0.0;
-  state.v = (work.z + change - state.q) / interval;
+  state.v = change / interval;
   for (const Loop& loop : model.loops) state.v.segment(loop.dof, model.loop_size()).setZero();
-  return before - kinetic_energy(model, equations.mass(), state.v);
+  return energy - kinetic_energy(model, equations.mass(), state.v);
 }
 
 }  // namespace

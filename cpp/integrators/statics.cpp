@@ -146,14 +146,15 @@ class Statics {
     if (walk.points == 1 && leaves_saddles_ && falls())
       return let_fall(walk.reached, result) ? Point::left : Point::lost;
     // A branch that was stable and is so no more is left where that happens.
-    if (leaves_saddles_ && walk.was_stable && !firm() && equations_.has_potential() && !stable(walk.reached)) {
+    if (leaves_saddles_ && walk.was_stable && !firm(walk.reached) && equations_.has_potential() &&
+        !stable(walk.reached)) {
       result.branch_changed = true;
       leave_saddle(walk.reached, 0);
       if (!settle(walk.reached, result)) return Point::lost;
       walk.was_stable = false;
       return Point::left;
     }
-    walk.was_stable = firm();
+    walk.was_stable = firm(walk.reached);
     return Point::on_path;
   }
 
@@ -192,7 +193,10 @@ class Statics {
     return equations_.contact() && !equations_.has_potential() ? equations_.contact()->count() : 0;
   }
 
-  bool firm() const {
+  /// True if the present point of the path is stable by the pivots of its matrix. A matrix with multipliers has no such
+  /// signs.
+  bool firm(double factor) {
+    if (equations_.loops()) return stable(factor);
     return tangent_.factorization.status == FactorStatus::ok && tangent_.factorization.negative_pivots == 0;
   }
 
@@ -201,7 +205,7 @@ class Statics {
   /// wells. Surfaces that an obstacle has been pushed into are to leave each other, not to fall.
   bool falls() {
     // Signs of pivots are known of symmetric matrices only.
-    if (!equations_.has_potential_here() || (equations_.has_potential() && firm()) || !tangent_.found) return false;
+    if (!equations_.has_potential_here() || (equations_.has_potential() && firm(0.0)) || !tangent_.found) return false;
     if (equations_.contact() && equations_.contact()->contacts().depth() > kMaxDepth) return false;
     return newton_.norms().displacement(tangent_.rate) > kMaxNearMove * equations_.model().length_scale && !stable(0.0);
   }
@@ -380,7 +384,7 @@ class Statics {
   /// the present state; `shortest` or less where it is so in none.
   double definite_interval(double factor, double h, double shortest) {
     evaluate(factor);
-    const VectorX weight = equations_.mass().rows.cwiseMax(1e-300);
+    const VectorX weight = signs_.weights();
     LinearSolver& stiffness = signs_.symmetric_part();
     while (h > shortest && !signs_.definite(stiffness, 1.0 / (h * h), weight)) h *= 0.5;
     return h;
@@ -389,8 +393,9 @@ class Statics {
   /// Levenberg-Marquardt on the potential: every accepted step lowers it.
   bool descend(int max_steps, NewtonResult& last) {
     VectorX z;
+    if (equations_.loops()) return false;  // the potential has a saddle, not a minimum, in the multipliers
     path_.go_to(1.0);
-    const VectorX weight = equations_.mass().rows.cwiseMax(1e-300);
+    const VectorX weight = signs_.weights();
     double damping = 0.0;
     for (int k = 0; k < max_steps; ++k) {
       work_.poll();

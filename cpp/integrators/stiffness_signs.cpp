@@ -79,10 +79,34 @@ StiffnessSigns::Lowest StiffnessSigns::lowest(const VectorX& mode, const State& 
   return {least.value, least.rounding + left};
 }
 
+/// A hinge or a slide between bodies has no inertia of its own, but that of the parts that it moves.
+VectorX StiffnessSigns::weights() const {
+  VectorX weight = equations_.mass().rows;
+  const StepProblem& problem = equations_.problem();
+  const Model& model = problem.model;
+  VectorX moved = weight;
+  Carrying carrying;
+  for (std::size_t i = model.carried.size(); i-- > 0;) {  // parts of parts first
+    const CarriedPart& part = model.carried[i];
+    find_carrying(problem, problem.start->q, i, carrying);
+    for (std::size_t b = 0; b < part.body_dofs.size(); ++b)
+      for (int d = 0; d < part.own_size; ++d) {
+        const double follow = carrying.follow(d, static_cast<Eigen::Index>(b));
+        moved[part.body_dofs[b]] += follow * follow * moved[part.own_dof + d];
+      }
+  }
+  const auto take = [&](int dof) {
+    if (weight[dof] == 0.0) weight[dof] = moved[dof];
+  };
+  for (const Hinge& hinge : model.hinges) take(hinge.dof);
+  for (const Slide& slide : model.slides) take(slide.dof);
+  return weight.cwiseMax(1e-300);
+}
+
 VectorX StiffnessSigns::lowest_mode(int seed) {
   const Model& model = equations_.model();
   LinearSolver& solver = symmetric_part();
-  const VectorX weight = equations_.mass().rows.cwiseMax(1e-300);
+  const VectorX weight = weights();
   const double stiffness = equations_.assembler().greatest_stiffness(weight);
   double damping = stiffness > 0.0 ? 1e-16 * stiffness : 1.0;  // a free body has none
   while (!definite(solver, damping, weight) && damping < 1e3 * stiffness) damping *= 2.0;

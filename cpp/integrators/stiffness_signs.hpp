@@ -27,6 +27,8 @@ class StiffnessSigns {
   /// Neutral motion of length 1 if there is a potential, or empty. `slack` multiplies the rounding error, because input
   /// may be rounded: a drawing that is straight except for its last digits prefers one side.
   VectorX neutral_motion(const State& state, StepData& data, double slack = 1.0);
+  /// Inertia per unknown, for a part that moves others also theirs.
+  VectorX weights() const;
   /// Direction of the most negative curvature against mass, by inverse iteration on a matrix that is shifted
   /// until it is definite.
   VectorX lowest_mode(int seed);

@@ -366,17 +366,45 @@ void set_body_velocities(const Model& model, const VectorX& v0, const VectorX& c
   }
 }
 
+namespace {
+
+/// Moves what is left of the residual at the base of a body into the velocity of its centre of mass. Returns the moment
+/// that is left about the base, and on massless copies of the body.
+Vector3 balance_base(const StepProblem& problem, const StepData& data, int body, VectorX& v1) {
+  const Model& model = problem.model;
+  const BodyDescription& of = model.description.bodies[at(body)];
+  const double mass = problem.parameters->added_mass(of.center);
+  const bool is_carried = std::any_of(model.carried.begin(), model.carried.end(),
+                                      [&](const CarriedPart& part) { return part.node == of.node; });
+  Vector3 moment = Vector3::Zero();
+  for (const Loop& loop : model.loops)
+    if (loop.body == body) moment += frame_vector(model, data.residual, loop.copy_frame);
+  const auto& bodies = model.description.bodies;
+  const bool is_shared = std::any_of(bodies.begin(), bodies.begin() + body,
+                                     [&](const BodyDescription& before) { return before.node == of.node; });
+  if (is_carried || is_shared || mass == 0.0) return moment;
+  const Vector3 force = node_vector(model, data.residual, of.node);
+  const Vector3 lever = node_position(model, data.z, of.node) - node_position(model, data.z, of.center);
+  put_node_vector(model, of.center, node_vector(model, v1, of.center) - problem.duration() / mass * force, v1);
+  return moment + lever.cross(force);
+}
+
+}  // namespace
+
 void balance_bodies(const StepProblem& problem, const StepData& data, VectorX& v1) {
   const Model& model = problem.model;
   if (!problem.conserves_energy()) return;
   for (int b = 0; b < static_cast<int>(model.body_frame.size()); ++b) {
     const int dof = model.frame_dof[at(model.body_frame[at(b)])];
     if (problem.mass.rows[dof] == 0.0) continue;  // a copy at a closed loop of joints
+    // A loop collects the tolerance of its multipliers, too.
+    const Vector3 left = model.loops.empty() ? Vector3(Vector3::Zero()) : balance_base(problem, data, b, v1);
     if (model.planar()) {
-      v1[dof] -= problem.duration() * data.residual[dof] * problem.mass.inverse[dof];
+      v1[dof] -= problem.duration() * (data.residual[dof] + left.dot(model.plane->normal)) * problem.mass.inverse[dof];
     } else {
       const TurningBody body(problem, data.z, b);
-      v1.segment<3>(dof) -= problem.duration() * body.inertia.ldlt().solve(Vector3(data.residual.segment<3>(dof)));
+      v1.segment<3>(dof) -=
+          problem.duration() * body.inertia.ldlt().solve(Vector3(data.residual.segment<3>(dof) + left));
     }
   }
 }

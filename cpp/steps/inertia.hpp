@@ -38,7 +38,8 @@ void set_turning_velocities(const Model& model, const VectorX& v0, const VectorX
 /// both ends is that of the step.
 void set_body_velocities(const Model& model, const VectorX& v0, const VectorX& change, double dt, VectorX& v1);
 /// Moves what is left of the residual of bodies into their angular velocities. The angular momentum of a body that
-/// tumbles for many turns then collects neither rounding nor the tolerance of Newton's method.
+/// tumbles for many turns then collects neither rounding nor the tolerance of Newton's method. With closed loops of
+/// joints, the linear momentum of bodies does not, either.
 void balance_bodies(const StepProblem& problem, const StepData& data, VectorX& v1);
 /// Derivatives of these velocities by `change`, per unknown: 2 / dt for unknowns that are not angles.
 void set_velocity_rates(const Model& model, const VectorX& change, double dt, VectorX& rates);

@@ -124,18 +124,14 @@ void LoopForces::begin(StepProblem& problem) {
   const Model& model = problem.model;
   const Parameters& p = *problem.parameters;
   const double length = model.length_scale;
-  double rest = 0.0;
-  if (!problem.moves()) {
-    rest = p.added_mass.sum() * p.gravity.norm() / length + p.spring_stiffness.sum() +
-           p.joint_stiffness.sum() / (length * length);
-    if (rest == 0.0) rest = 1.0;
-  }
+  const double rate = problem.moves() ? 1.0 / (problem.interval * problem.interval) : 0.0;
+  double rest = p.added_mass.sum() * p.gravity.norm() / length + p.spring_stiffness.sum() +
+                p.joint_stiffness.sum() / (length * length);
+  if (rest == 0.0 && rate == 0.0) rest = 1.0;
   for (std::size_t k = 0; k < model.loops.size(); ++k) {
     const Loop& loop = model.loops[k];
-    const double rate = problem.moves() ? 1.0 / (problem.interval * problem.interval) : 0.0;
-    stiffness_[k] = problem.moves() ? rate * p.added_mass(loop.body_center) : rest;
-    turning_stiffness_[k] =
-        problem.moves() ? rate * p.body_inertia[at(loop.body)].trace() / 3.0 : rest * length * length;
+    stiffness_[k] = rest + rate * p.added_mass(loop.body_center);
+    turning_stiffness_[k] = rest * length * length + rate * p.body_inertia[at(loop.body)].trace() / 3.0;
   }
 }
 
@@ -224,9 +220,11 @@ void LoopForces::add_rounding(const StepProblem& problem, StepData& data) const 
   const int n = model.dimension, size = model.loop_size();
   for (int e = 0; e < table_.count(); ++e) {
     const int* d = table_.dofs(e);
+    // Rows of nodes pass only a small share of their bound on to bodies, see `fold_bounds`.
+    constexpr double kPassed = 16.0;
     const double force = kRounding * stiffness_[at(e)] * std::max(data.rounding.reach, 1e-300),
                  moment = kRounding * turning_stiffness_[at(e)];
-    for (int i = 0; i < 2 * size; ++i) data.floor[d[i]] += i < 2 * n ? force : moment;
+    for (int i = 0; i < 2 * size; ++i) data.floor[d[i]] += kPassed * (i < 2 * n ? force : moment);
     for (int i = 0; i < size; ++i) data.floor[d[2 * size + i]] += i < n ? force : moment;
   }
 }
@@ -268,15 +266,16 @@ void LoopForces::condense(const Assembler& assembler, const LinearSolver& from, 
   std::vector<int> rows;
   for (int multiplier : multipliers) {
     rows.clear();
-    double greatest = 0.0;
+    double along = 0.0, square = 0.0;  // stiffness of the scene along the constraint
     const auto slope = [&](int row) { return a[static_cast<std::size_t>(from.place(row, multiplier))]; };
     for (int k = pattern.column_starts[at(multiplier)]; k < pattern.column_starts[at(multiplier) + 1]; ++k) {
       const int row = pattern.row_indices[at(k)];
-      if (!is_multiplier(row) && slope(row) != 0.0) rows.push_back(row);
+      if (is_multiplier(row) || slope(row) == 0.0) continue;
+      rows.push_back(row);
+      square += slope(row) * slope(row);
+      along += slope(row) * slope(row) * std::abs(assembler.diagonal(row));
     }
-    for (int row : rows)
-      greatest = std::max(greatest, std::abs(assembler.diagonal(row)) / std::max(slope(row) * slope(row), 1e-12));
-    const double stiff = kStiff * (greatest > 0.0 ? greatest : 1.0);
+    const double stiff = kStiff * (along > 0.0 ? along / (square * square) : 1.0);
     for (std::size_t i = 0; i < rows.size(); ++i)
       for (std::size_t j = 0; j <= i; ++j) entry(rows[i], rows[j]) += stiff * slope(rows[i]) * slope(rows[j]);
   }

@@ -9,8 +9,8 @@
 /// multipliers do no work, and have no resultant force or moment: energy and momenta are exact as in a tree.
 ///
 /// The force is E (lambda + s E^T g) with the gap g, an augmented Lagrangian. The second part is zero in the solution.
-/// It makes the matrix regular where the tree alone is not, and its pivots positive. The stiffness s is that of the
-/// inertia of B in a step.
+/// It makes the matrix regular where the tree alone is not, and its pivots positive. The stiffness s is that of
+/// weights and springs, and of the inertia of B in a step.
 ///
 /// Loops may have constraints that others imply: hinges of a four-bar linkage are parallel, so its parts never leave
 /// their plane. Only an independent set of constraints is kept, and multipliers of the others are zero. The set is

@@ -1,5 +1,8 @@
+#include <algorithm>
 #include <optional>
 #include <utility>
+
+#include <Eigen/SVD>
 
 #include "gradients/state_vector.hpp"
 #include "steps/carried_parts.hpp"
@@ -50,6 +53,42 @@ SparseMatrix matrix_of(const Model& model, const MassMatrix& mass) {
   return assembled(model.dof_count, model.dof_count, entries);
 }
 
+/// The basis of free motions without those that closed loops of joints bar, and without multipliers. `stiffness`: with
+/// the columns of multipliers.
+SparseMatrix without_loops(const Model& model, const SparseMatrix& stiffness, const SparseMatrix& free) {
+  if (model.loops.empty()) return free;
+  constexpr double kNegligible = 1e-9;  // singular value, over the greatest one
+  std::vector<bool> is_multiplier(at(model.dof_count), false);
+  for (const Loop& loop : model.loops) std::fill_n(is_multiplier.begin() + loop.dof, model.loop_size(), true);
+  MatrixX slopes = MatrixX::Zero(model.dof_count, model.loop_size() * static_cast<Eigen::Index>(model.loops.size()));
+  Eigen::Index count = 0;
+  for (const Loop& loop : model.loops)
+    for (int i = 0; i < model.loop_size(); ++i, ++count)
+      for (SparseMatrix::InnerIterator entry(stiffness, loop.dof + i); entry; ++entry)
+        if (!is_multiplier[at(entry.row())]) slopes(entry.row(), count) = entry.value();
+  const MatrixX rates = free.transpose() * slopes;
+  std::vector<Eigen::Index> coupled;
+  Entries entries;
+  Eigen::Index columns = 0;
+  for (Eigen::Index k = 0; k < free.cols(); ++k) {
+    SparseMatrix::InnerIterator first(free, k);
+    if (first && is_multiplier[at(first.row())]) continue;
+    if (rates.row(k).isZero(0.0))
+      entries.emplace_back(k, columns++, 1.0);
+    else
+      coupled.push_back(k);
+  }
+  MatrixX bars(rates.cols(), static_cast<Eigen::Index>(coupled.size()));
+  for (std::size_t k = 0; k < coupled.size(); ++k)
+    bars.col(static_cast<Eigen::Index>(k)) = rates.row(coupled[k]).transpose();
+  Eigen::JacobiSVD<MatrixX> svd(bars, Eigen::ComputeFullV);
+  svd.setThreshold(kNegligible);
+  for (Eigen::Index k = svd.rank(); k < bars.cols(); ++k, ++columns)
+    for (std::size_t i = 0; i < coupled.size(); ++i)
+      entries.emplace_back(coupled[i], columns, svd.matrixV()(static_cast<Eigen::Index>(i), k));
+  return free * assembled(free.cols(), columns, entries);
+}
+
 /// The basis of free motions, in which parts that bodies carry follow them.
 SparseMatrix with_carried(const StepProblem& problem, StepData& data, SparseMatrix basis) {
   const Model& model = problem.model;
@@ -78,8 +117,8 @@ Linearisation World::linearise() const {
   system.begin(self.state, self.parameters, StepRule::statics, 0.0, prescribed);
   StepData evaluation;
   system.evaluate(self.state.q, true, nullptr, evaluation);
-  const SparseMatrix free = free_basis(model), basis = with_carried(system.problem(), evaluation, free),
-                     back = basis.transpose();
+  const SparseMatrix free = without_loops(model, matrix_of(system.assembler()), free_basis(model)),
+                     basis = with_carried(system.problem(), evaluation, free), back = basis.transpose();
   const StrainParts parts(system, self.state, evaluation.configuration);
   const VectorX imbalance = evaluation.residual;  // forces on carried nodes are among those of their bodies
   system.elastic() = parts.without();

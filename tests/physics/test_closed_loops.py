@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import pickle
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 import withe
@@ -272,3 +275,205 @@ def test_drawn_loops_keep_momenta_and_energy(name: str, seed: int) -> None:
     measured(max(linear, angular))
     assert max(linear, angular) < 1e-9
     assert simulation.energy().total == pytest.approx(energy.total, abs=1e-6 * energy.kinetic)
+
+
+@pytest.mark.case(
+    "bodies", "Four-bar linkage at rest: angle and frequency", source="potential and inertia of its crank"
+)
+@pytest.mark.parametrize("turn", [None, Rotation.from_rotvec((0.4, -1.1, 0.7)).as_matrix()])
+def test_a_four_bar_linkage_hangs_in_stable_balance(turn: Array | None) -> None:
+    """From a drawing on the far side of the unstable equilibrium, wherever the scene points."""
+    linkage, axes = FourBar(), np.eye(3) if turn is None else turn
+
+    def slope(angle: float) -> float:
+        return G * float(np.dot(linkage.masses, linkage.slope(angle)[:, 1]))
+
+    lowest = brentq(slope, 4.0, 5.0, xtol=1e-13)
+    scene, bars = linkage.scene(2.2, turn)
+    simulation = scene.build(integrator="static")
+    result = simulation.equilibrium()
+    assert result.stable
+    way = axes.T @ simulation.position(bars[0])
+    error = (np.arctan2(way[2], way[0]) - lowest + np.pi) % (2.0 * np.pi) - np.pi
+    assert abs(error) < 1e-7
+    h = 1e-4
+    stiffness = (slope(lowest + h) - slope(lowest - h)) / (2.0 * h)
+    found = simulation.linearise().frequencies(1)[0]
+    expected = np.sqrt(stiffness / linkage.inertia(lowest)) / (2.0 * np.pi)
+    measured(abs(found / expected - 1.0))
+    assert found == pytest.approx(expected, rel=1e-5)
+    forces = [simulation.reaction(f"hinge {k}").force for k in range(4)]
+    np.testing.assert_allclose(forces[0] - forces[3], G * sum(linkage.masses) * axes[:, 2], atol=1e-8)
+
+
+def test_an_unstable_balance_of_a_linkage_is_unstable() -> None:
+    """Its highest position."""
+    linkage = FourBar()
+
+    def slope(angle: float) -> float:
+        return float(np.dot(linkage.masses, linkage.slope(angle)[:, 1]))
+
+    highest = brentq(slope, 1.4, 1.8, xtol=1e-14)
+    simulation = linkage.scene(highest)[0].build(integrator="static")
+    assert not simulation.equilibrium(stable=False).stable
+
+
+def test_a_linkage_moves_alike_wherever_it_points() -> None:
+    """Rotation of the whole scene, 1e-9 of its size."""
+    linkage, places = FourBar(), []
+    turn = Rotation.from_rotvec((0.4, -1.1, 0.7)).as_matrix()
+    for axes in (np.eye(3), turn):
+        scene, bars = linkage.scene(1.0, axes)
+        tight = withe.Solver(step_tolerance=1e-12, force_tolerance=1e-12)
+        simulation = scene.build(time_step=1e-3, solver=tight)
+        linkage.set_rate(simulation, bars, 1.0, 6.0, axes)
+        simulation.step(200)
+        places.append([axes.T @ simulation.position(each) for each in bars])
+    np.testing.assert_allclose(places[1], places[0], atol=1e-9 * linkage.base)
+
+
+@pytest.mark.parametrize("integrator", ["energy_momentum", "implicit_midpoint", "backward_euler", "fourth_order"])
+def test_every_implicit_integrator_keeps_loops_closed(integrator: str) -> None:
+    """Points of the last hinge on both of its bodies, to rounding."""
+    linkage = FourBar()
+    scene, bars = linkage.scene(1.0)
+    simulation = scene.build(time_step=2e-3, integrator=integrator)  # type: ignore[arg-type]
+    linkage.set_rate(simulation, bars, 1.0, 6.0, np.eye(3))
+    simulation.step(50)
+    rocker = simulation.position(bars[2]) + simulation.rotation(bars[2]) @ (
+        np.array([linkage.base, 0.0, 0.0]) - [linkage.configuration(1.0)[2, 0], 0.0, linkage.configuration(1.0)[2, 1]]
+    )
+    np.testing.assert_allclose(rocker, (linkage.base, 0, 0), atol=1e-9)
+
+
+def test_a_bar_between_two_walls_is_a_loop() -> None:
+    """A bar on a hinge and on a ball that slides: statically determinate, half of its weight on each."""
+    scene = withe.Scene()
+    left, right = (scene.add_body(mass=1.0, inertia=1.0, position=(x, 0, 0)) for x in (-1.0, 1.0))
+    scene.clamp(left)
+    scene.clamp(right)
+    beam = bar(scene, (-0.5, 0, 0), (0.5, 0, 0), 2.0)
+    scene.join(left, beam, "revolute", at=(-0.5, 0, 0), axis=NORMAL)
+    carriage = scene.add_body(mass=1e-6, inertia=1e-9, position=(0.5, 0, 0))
+    scene.join(beam, carriage, "pinned", at=(0.5, 0, 0))
+    guide = scene.join(right, carriage, "sliding", at=(0.5, 0, 0), axis=(1, 0, 0))
+    simulation = scene.build(integrator="static")
+    assert simulation.equilibrium().stable
+    np.testing.assert_allclose(simulation.position(beam), 0.0, atol=1e-9)
+    np.testing.assert_allclose(simulation.reaction(guide).force, (0, 0, G * (1.0 + 1e-6)), rtol=1e-7, atol=1e-6)
+
+
+def test_supports_of_two_bodies_close_a_loop() -> None:
+    """Crank and rocker on hinges of the world move as on a clamped body."""
+    linkage, angles = FourBar(), []
+    for base in (False, True):
+        if base:
+            scene, bars = linkage.scene(1.0)
+        else:
+            p = [np.array([x, 0.0, z]) for x, z in linkage.points(1.0)]
+            scene = withe.Scene()
+            bars = [bar(scene, a, b, m) for a, b, m in zip(p, p[1:], linkage.masses, strict=False)]
+            scene.clamp(bars[0], at=p[0], spin=NORMAL)
+            scene.clamp(bars[2], at=p[3], spin=NORMAL)
+            scene.join(bars[0], bars[1], "revolute", at=p[1], axis=NORMAL)
+            scene.join(bars[1], bars[2], "revolute", at=p[2], axis=NORMAL)
+        simulation = scene.build(time_step=1e-3)
+        simulation.step(200)
+        angles.append(crank_angle(simulation, bars[0]))
+    assert angles[0] == pytest.approx(angles[1], abs=1e-7)
+
+
+@pytest.mark.parametrize("planar", [True, False])
+def test_a_loop_with_rods_beside_it_moves_in_its_plane(planar: bool) -> None:
+    """A flexible boom on the coupler; the planar scene moves as in space."""
+    linkage = FourBar()
+    scene, bars = linkage.scene(1.0)
+    rubber = withe.Material(youngs_modulus=1e8, density=1e3)
+    tip = np.array([linkage.points(1.0)[2][0], 0.0, linkage.points(1.0)[2][1]])
+    boom = scene.add_rod(start=tip, end=tip + np.array([0.1, 0.0, 0.05]), nodes=6, radius=3e-3, material=rubber)
+    scene.join(bars[1], boom.start)
+    simulation = scene.build(time_step=1e-3, planar=planar)
+    assert ("3D" in str(simulation.plan).splitlines()[0]) != planar
+    energy = simulation.energy().total
+    simulation.step(100)
+    assert simulation.energy().total == pytest.approx(energy, abs=1e-9)
+    np.testing.assert_allclose(simulation.position(bars[0])[1], 0.0, atol=1e-12)
+    assert crank_angle(simulation, bars[0]) == pytest.approx(-0.1, abs=100.0)
+
+
+def test_constraints_that_follow_from_others_are_left_out() -> None:
+    """Four hinges with parallel axes need three multipliers, four balls six."""
+    linkage = FourBar()
+    assert "3 multipliers" in str(linkage.scene(1.0)[0].build().plan)
+    scene, _ = ring(0, ["pinned"] * 4)
+    assert "6 multipliers" in str(scene.build().plan)
+
+
+def test_velocities_that_contradict_each_other_become_consistent() -> None:
+    """The crank alone is set in motion; an impulse of the joints takes energy, and reactions do not ring."""
+    linkage = FourBar()
+    scene, bars = linkage.scene(1.0)
+    simulation = scene.build(time_step=1e-3)
+    simulation.set_velocity(bars[0], np.cross((0, -6.0, 0), simulation.position(bars[0])), angular=(0, -6.0, 0))
+    before = simulation.energy()
+    forces = []
+    for _ in range(20):
+        simulation.step()
+        forces.append(simulation.reaction("hinge 3").force)
+    now = simulation.energy()
+    assert now.dissipated > 0.1 * before.kinetic
+    assert now.total + now.dissipated == pytest.approx(before.total + before.dissipated, abs=1e-6 * before.kinetic)
+    assert np.abs(np.diff(forces, 2, axis=0)).max() < 0.03 * np.abs(forces).max()
+
+
+def test_loops_continue_from_copies_pickles_snapshots_and_files(tmp_path: Path) -> None:
+    """All to the bit."""
+    linkage = FourBar()
+    scene, _ = linkage.scene(1.0)
+    simulation = scene.build(time_step=1e-3)
+    simulation.step(5)
+    others = [simulation.copy(), pickle.loads(pickle.dumps(simulation))]
+    snapshot = simulation.snapshot()
+    simulation.step(10)
+    expected = simulation.positions()
+    for other in others:
+        other.step(10)
+        np.testing.assert_array_equal(other.positions(), expected)
+    simulation.restore(snapshot)
+    simulation.step(10)
+    np.testing.assert_array_equal(simulation.positions(), expected)
+    scene.save(tmp_path / "linkage.toml")
+    again = withe.Scene.load(tmp_path / "linkage.toml").build(time_step=1e-3)
+    again.step(15)
+    np.testing.assert_array_equal(again.positions(), expected)
+
+
+def test_a_joint_of_a_loop_has_an_angle_a_spring_and_stops() -> None:
+    """The servo of the hinge that closes the loop holds the linkage; its angle is that of the bodies."""
+    linkage, angles = FourBar(), []
+    scene, bars = linkage.scene(1.0)
+    servo = scene["hinge 3"]
+    simulation = scene.build(integrator="static")
+    simulation.set(servo, stiffness=50.0)
+    assert simulation.equilibrium().stable
+    turn = simulation.rotation(bars[2])
+    angles = [simulation.joint_angle(servo), float(np.arctan2(-turn[0, 2], turn[0, 0]))]
+    assert angles[0] == pytest.approx(angles[1], abs=1e-9)
+    assert abs(angles[0]) > 1e-4
+    assert simulation.joint_torque(servo) == pytest.approx(-50.0 * angles[0], abs=1e-9)
+
+
+def test_a_drawing_in_a_dead_centre_is_refused() -> None:
+    """A parallelogram that is drawn flat may leave this position in two ways."""
+    scene = withe.Scene(gravity=(0, 0, 0))
+    points = np.array([(0, 0, 0), (0.1, 0, 0), (0.4, 0, 0), (0.3, 0, 0)], float)
+    frame = scene.add_body(mass=1.0, inertia=1e-2)
+    scene.clamp(frame)
+    bars = [bar(scene, a, b, 0.1) for a, b in zip(points, points[1:], strict=False)]
+    chain = [frame, *bars, frame]
+    for k, (one, two) in enumerate(zip(chain, chain[1:], strict=False)):
+        scene.join(one, two, "revolute", at=points[k], axis=NORMAL)
+    simulation = scene.build(time_step=1e-3)
+    simulation.set_velocity(bars[0], (0, 0, 0.5), angular=(0, -10.0, 0))
+    with pytest.raises(withe.ConvergenceError):
+        simulation.step(300)

@@ -333,9 +333,33 @@ def test_limits_of_force_and_velocity_are_those_of_servos(tmp_path):
     assert scene.build().get(robot["hinge"], "max_torque") == 1.5
 
 
-def test_a_loop_that_an_equality_closes_is_a_warning(tmp_path):
-    loop = '<equality><connect name="loop" body1="link" anchor="0.2 0 0"/></equality>'
-    _, caught = quietly(lambda: withe.Scene().add_robot(mjcf(tmp_path, ARM, loop)))
+LINKAGE = """<body name="crank"><joint name="first" axis="0 1 0"/>
+<geom type="capsule" fromto="0 0 0 0 0 .1" size=".005" mass="0.1"/>
+<body name="coupler" pos="0 0 .1"><joint name="second" axis="0 1 0"/>
+<geom type="capsule" fromto="0 0 0 .2 0 .05" size=".005" mass="0.2"/>
+<body name="rocker" pos=".2 0 .05"><joint name="third" axis="0 1 0"/>
+<geom type="capsule" fromto="0 0 0 0 0 -.1" size=".005" mass="0.1"/></body></body></body>"""
+
+
+def test_a_connect_constraint_closes_a_loop(tmp_path):
+    loop = '<equality><connect name="loop" body1="rocker" anchor="0 0 -0.1"/></equality>'
+    scene = withe.Scene()
+    robot, caught = quietly(lambda: scene.add_robot(mjcf(tmp_path, LINKAGE, loop)))
+    assert not any("equality" in str(each.message) for each in caught)
+    simulation = scene.build(time_step=1e-3)
+    simulation.set_velocity(robot["crank"], angular=(0, 2.0, 0))
+    simulation.step(100)
+    foot = simulation.position(robot["rocker"]) + simulation.rotation(robot["rocker"]) @ (0, 0, -0.1)
+    np.testing.assert_allclose(foot, (0.2, 0, -0.05), atol=1e-9)
+    assert np.abs(simulation.position(robot["coupler"])[0]) > 1e-3
+    assert np.isfinite(simulation.reaction(robot["loop"]).force).all()
+
+
+def test_a_connect_constraint_of_points_apart_is_a_warning(tmp_path):
+    loop = '<equality><connect name="loop" site1="far" site2="near"/></equality>'
+    sites = LINKAGE.replace('<joint name="third"', '<site name="near" pos="0 0 -0.1"/><joint name="third"')
+    sites += '<site name="far" pos="0.3 0 0"/>'
+    _, caught = quietly(lambda: withe.Scene().add_robot(mjcf(tmp_path, sites, loop)))
     assert any("equality constraints of type connect 'loop'" in str(each.message) for each in caught)
 
 

@@ -222,8 +222,11 @@ def _may_touch(directory: Directory) -> bool:
     if directory.contact.rods is not None:
         return False
     rods = len(directory.layout.rods)
-    parts = UnionFind(rods + len(directory.all(BodyPart)))
+    count = rods + len(directory.layout.body_points)
+    parts = UnionFind(count)
+    for loop in directory.loops:
+        parts.unite(rods + loop.body, rods + loop.copy)
     place = [owner if owner >= 0 else rods - 1 - owner for join in directory.all(JoinPart) for owner, _ in join.nodes]
     for first, second in zip(place[::2], place[1::2], strict=True):
         parts.unite(first, second)
-    return len({parts.find(i) for i in range(rods + len(directory.all(BodyPart)))}) > 1
+    return len({parts.find(i) for i in range(count)}) > 1

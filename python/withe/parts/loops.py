@@ -15,21 +15,21 @@ __all__ = ["describe_loops", "open_loops"]
 def open_loops(directory: Directory) -> None:
     """Give each joint that closes a loop a massless copy of its second body, so that all joints form a tree.
 
-    Supported bodies count as connected: a joint between two of them closes a loop, too.
+    A scene without loops, or whose loops are already open, stays as it is. Supported bodies count as connected: a
+    joint between two of them closes a loop, too.
 
     Raises
     ------
     ValueError
         Rods on both sides of a joint that closes a loop.
     """
-    bodies = directory.all(BodyPart)
-    if not bodies:
+    if not directory.all(BodyPart):
         return
     joins = directory.all(JoinPart)
     supports = [support for support in directory.all(SupportPart) if support.grasp is None]
     nodes = [*(node for join in joins for node in join.nodes), *(support.node for support in supports)]
     place_of = {node: i for i, node in enumerate(dict.fromkeys(nodes))}
-    ground = len(bodies)
+    ground = len(directory.layout.body_points)
     part_of = {node: -1 - node[0] if node[0] < 0 else ground + 1 + i for node, i in place_of.items()}
     places, parts = UnionFind(len(place_of)), UnionFind(ground + 1 + len(place_of))
     for support in supports:
