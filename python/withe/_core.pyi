@@ -31,6 +31,7 @@ __all__: list[str] = [
     "JointLink",
     "Linearisation",
     "LoadDescription",
+    "LoopDescription",
     "MomentAdjoint",
     "Momentum",
     "ObstacleDescription",
@@ -219,6 +220,18 @@ class BodyDescription:
     def node(self) -> int: ...
     @node.setter
     def node(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+
+class LoopDescription:
+    """
+    A closed loop of joints: a body, and its copy at a joint.
+    """
+    def __init__(
+        self,
+        copy: typing.SupportsInt | typing.SupportsIndex,
+        body: typing.SupportsInt | typing.SupportsIndex,
+        copy_node: typing.SupportsInt | typing.SupportsIndex,
+        body_node: typing.SupportsInt | typing.SupportsIndex,
+    ) -> None: ...
 
 class RodPass:
     """
@@ -648,6 +661,10 @@ class SceneDescription:
     def loads(self) -> list[LoadDescription]: ...
     @loads.setter
     def loads(self, arg0: collections.abc.Sequence[LoadDescription]) -> None: ...
+    @property
+    def loops(self) -> list[LoopDescription]: ...
+    @loops.setter
+    def loops(self, arg0: collections.abc.Sequence[LoopDescription]) -> None: ...
     @property
     def positions(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
     @positions.setter
