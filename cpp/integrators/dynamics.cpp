@@ -20,10 +20,6 @@ namespace {
 // for equal steps, 2 where the step before was three times as long.
 constexpr double kMaxUsualTime = 2.0;
 
-// Violation, over the length of the scene, of a constraint of a closed loop that others should imply. Points of joints
-// are drawn to 1e-9.
-constexpr double kMaxViolation = 1e-6;
-
 /// Displacement by a force that acts over a step [m], filtered by (M / h^2 + K)^-1 [Hosea and Shampine 1996]. Modes
 /// that the step does not resolve, and therefore leaves bounded, then count for as little as they move.
 double moved_by(VectorX& force, Equations& equations, const Newton& newton, double h, StepWorkspace& work) {
@@ -192,9 +188,7 @@ bool acceptable(Equations& equations, const StepPlan& plan, const State& state, 
   // Inertia takes the tangent of half a turn, and is the same for another turn more; friction and twist are not.
   if (plan.rule == StepRule::energy_momentum && farthest_turn(equations.model(), state.q, q1) >= std::numbers::pi)
     return false;
-  if (equations.loops() && equations.loops()->greatest_violation(equations.problem(), work.z) >
-                               kMaxViolation * equations.model().length_scale)
-    return false;
+  if (breaks_loops(equations, work.z)) return false;
   Contact* contact = equations.contact();
   if (!contact) return true;
   // Iterates pass through no surface, but they may find a way around an obstacle that the rod would have met.

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "integrators/step_parts.hpp"
 #include "integrators/stiffness_signs.hpp"
 #include "steps/elastic_forces.hpp"
 
@@ -70,6 +71,7 @@ class Statics {
   StaticResult run() {
     StaticResult result;
     find(result);
+    result.converged = result.converged && !breaks_loops(equations_, state_.q);
     if (!result.converged) note_imbalance(result.newton);
     return result;
   }

@@ -5,6 +5,16 @@
 
 namespace withe {
 
+/// Violation, over the length of the scene, of a constraint of a closed loop that others should imply, as far as the
+/// loop leaves a dead centre in which it is drawn. Points of joints are drawn to 1e-9.
+inline constexpr double kMaxLoopViolation = 1e-6;
+
+/// True if closed loops of joints are open at z.
+inline bool breaks_loops(const Equations& equations, const VectorX& z) {
+  return equations.loops() && equations.loops()->greatest_violation(equations.problem(), z) >
+                                  kMaxLoopViolation * equations.model().length_scale;
+}
+
 /// Adds the work of loads over the step, and the dissipation except that of contact, from the forces of the step.
 void add_work(const Equations& equations, const Parameters& parameters, const VectorX& change, StepWorkspace& work,
               StepResult& result);

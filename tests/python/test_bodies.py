@@ -288,7 +288,7 @@ def test_two_balls_between_two_bodies_are_a_hinge():
     scene = two()
     scene.join("palm", "fist", "pinned", at=(0.25, 0, 0), name="first")
     scene.join("palm", "fist", "pinned", at=(0.25, 0, 0.1), name="second")
-    simulation = scene.build()
+    simulation = scene.build(planar=False)
     assert "1 closed loop(s) of joints: 5 multipliers" in str(simulation.plan)
     simulation.set_velocity("fist", angular=(0, 3.0, 0))
     simulation.step()
