@@ -248,8 +248,9 @@ double LoopForces::greatest_violation(const StepProblem& problem, const VectorX&
 }
 
 void LoopForces::condense(const Assembler& assembler, const LinearSolver& from, LinearSolver& symmetric) const {
-  // Stiffness along a constraint, over that of the scene there. It moves a critical load by the inverse of this.
-  constexpr double kStiff = 1e5;
+  // Stiffness along a constraint, over that of the scene there. Its inverse, and its rounding error, are the shares of
+  // the stiffness of the scene by which that of a motion is wrong: equal at the root of the inverse rounding error.
+  constexpr double kStiff = 1e8;
   const SparsityPattern& pattern = assembler.pattern();
   const std::span<const double> a = from.values();
   const std::span<double> to = symmetric.values();

@@ -77,18 +77,23 @@ Curvature curvature_along(Equations& system, const State& state, const VectorX& 
   system.evaluate(state.q, true, nullptr, scratch);
   system.elastic() = whole;
   Curvature out;
+  // Parts that bodies carry follow them. The matrix has their forces in the rows of the bodies.
+  VectorX moved = direction, own = direction;
+  system.expand(scratch, moved);
+  for (const CarriedPart& part : system.model().carried) own.segment(part.own_dof, part.own_size).setZero();
   VectorX image(direction.size());
-  const VectorX size = direction.cwiseAbs();
+  VectorX size = own.cwiseAbs();
   LinearSolver& rest = system.assembler().solver();
-  rest.multiply(view(direction), view(image));
-  out.value = direction.dot(image);
+  rest.multiply(view(own), view(image));
+  out.value = own.dot(image);
   for (double& entry : rest.values()) entry = std::abs(entry);
   rest.multiply(view(size), view(image));
   out.rounding = size.dot(image);
+  size = moved.cwiseAbs();
   const auto count = static_cast<Eigen::Index>(parts.stiffnesses().size());
   VectorX strain = VectorX::Zero(count), greatest = VectorX::Zero(count);
   for (const Eigen::Triplet<double>& g : parts.gradients()) {
-    strain(g.row()) += g.value() * direction(g.col());
+    strain(g.row()) += g.value() * moved(g.col());
     greatest(g.row()) += std::abs(g.value()) * size(g.col());
   }
   const Eigen::Map<const VectorX> k(parts.stiffnesses().data(), count);
