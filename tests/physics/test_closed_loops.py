@@ -169,7 +169,8 @@ class SliderCrank:
 
 
 @pytest.mark.case("bodies", "Slider-crank at an even rate: forces", source="d'Alembert's principle")
-def test_a_slider_crank_moves_and_pulls() -> None:
+@pytest.mark.parametrize("angle", [np.pi / 3.0, 2.0])
+def test_a_slider_crank_moves_and_pulls(angle: float) -> None:
     """Position and speed of the slider, of second order; forces in the middle of the last step, of first order.
 
     Forces have a part of the order of the step that alternates, because the drawn velocities are consistent, while
@@ -177,8 +178,8 @@ def test_a_slider_crank_moves_and_pulls() -> None:
     """
     case = SliderCrank()
     errors, force_errors = [], []
-    for steps in (100, 200, 400):
-        end = np.pi / 3.0 / case.rate
+    for steps in (250, 500, 1000):
+        end = angle / case.rate
         step = end / steps
         scene = withe.Scene(gravity=(0, 0, 0))
         frame = scene.add_body(mass=1.0, inertia=1e-2, name="frame")
@@ -201,7 +202,7 @@ def test_a_slider_crank_moves_and_pulls() -> None:
         simulation.step(steps)
         found = np.array([simulation.position(slider)[0], simulation.velocity(slider)[0]])
         expected = np.array([case.kinematics(end)[0][4], case.velocity(end)[4]])
-        errors.append(np.abs(found / expected - 1.0).max())
+        errors.append(np.abs(found / expected - 1.0))
         on_slider, on_coupler = simulation.reaction(guide).force, simulation.reaction(pin).force
         torque = -simulation.reaction(motor).moment[1]
         forces = case.forces(end - 0.5 * step)
@@ -210,9 +211,10 @@ def test_a_slider_crank_moves_and_pulls() -> None:
             np.abs((np.array([on_slider[2], on_coupler[0], on_coupler[2], torque]) - forces) / scale).max()
         )
     measured(force_errors[-1])
-    assert errors[-1] < 1e-5
+    assert errors[-1][0] < 1e-6
+    assert errors[-1][1] < 1e-4
     assert force_errors[-1] < 1e-3
-    assert_order(errors, 2.0)
+    assert_order([error.max() for error in errors], 2.0)
     assert_order_at_least(force_errors, 1.0)
 
 
