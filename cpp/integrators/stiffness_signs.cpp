@@ -46,7 +46,7 @@ bool StiffnessSigns::stable(const State& state, StepData& data) {
   }
   if (definite(symmetric_part(), -1.0, neutral_shift(equations_, kMaxRounding))) return true;
   const Lowest found = lowest(lowest_mode(0), state, data);
-  return found.curvature > -found.unknown;
+  return found.curvature >= -found.unknown;  // both are zero along a motion that nothing resists
 }
 
 bool StiffnessSigns::neutral(const State& state, StepData& data) {

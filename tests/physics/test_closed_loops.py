@@ -539,3 +539,47 @@ def test_an_inverted_pendulum_on_a_body_is_unstable() -> None:
     assert not simulation.equilibrium(stable=False).stable
     assert simulation.equilibrium().stable
     np.testing.assert_allclose(simulation.position(upper), (0, 0, -0.1), atol=1e-9)
+
+
+@pytest.mark.parametrize("joint", ["pinned", "revolute"])
+def test_a_body_that_hangs_on_a_ball_is_stable(joint: str) -> None:
+    """Nothing resists its rotation about the vertical: a neutral motion is not an unstable one."""
+    scene = withe.Scene()
+    base = scene.add_body(mass=1.0, inertia=1e-2)
+    scene.clamp(base)
+    upper, lower = (scene.add_body(mass=0.1, inertia=2e-4, position=(0, 0, z)) for z in (-0.1, -0.2))
+    scene.join(base, upper, "pinned", at=(0, 0, -0.05))
+    axis = {"axis": NORMAL} if joint == "revolute" else {}
+    scene.join(upper, lower, joint, at=(0, 0, -0.15), **axis)  # type: ignore[call-overload]
+    assert scene.build(integrator="static").equilibrium().stability == "stable"
+
+
+def test_a_hexapod_carries_its_load() -> None:
+    """Five loops: six legs with ball joints at both ends, and springs along them. Its height is that of rest."""
+    scene = withe.Scene()
+    base = scene.add_body(mass=1.0, inertia=1e-2)
+    scene.clamp(base)
+    top = scene.add_body(mass=2.0, inertia=(0.02, 0.02, 0.04), position=(0, 0, 0.3))
+    legs, rise = [], []
+    for i in range(6):
+        one, other = np.radians(60.0 * i + np.array([-5.0, 25.0]) * (-1.0) ** i)
+        foot = 0.25 * np.array([np.cos(one), np.sin(one), 0.0])
+        head = np.array([0.15 * np.cos(other), 0.15 * np.sin(other), 0.3])
+        way = head - foot
+        lower, upper = (scene.add_body(mass=0.1, inertia=2e-4, position=foot + share * way) for share in (0.25, 0.75))
+        scene.join(base, lower, "pinned", at=foot)
+        axis = way / np.linalg.norm(way)
+        legs.append(scene.join(lower, upper, "sliding", at=0.5 * (foot + head), axis=axis, stiffness=2e4, damping=40.0))
+        scene.join(upper, top, "pinned", at=head)
+        rise.append(axis[2])
+    simulation = scene.build(time_step=2e-3)
+    assert "5 closed loop(s) of joints: 30 multipliers" in str(simulation.plan)
+    simulation.step(1000)
+    # The springs carry the platform and the upper halves of the legs.
+    load = (2.0 + 6 * 0.1) * G
+    lift = sum(simulation.reaction(leg).force[2] for leg in legs)
+    assert lift == pytest.approx(load, rel=1e-5)
+    shortened = [-simulation.joint_angle(leg) for leg in legs]
+    np.testing.assert_allclose(shortened, np.mean(shortened), rtol=1e-3)
+    height = 0.3 - simulation.position(top)[2]
+    assert height == pytest.approx(np.mean(shortened) / np.mean(rise), rel=1e-2)
