@@ -5,9 +5,21 @@
 #include "steps/inertia.hpp"
 
 namespace withe {
+namespace {
+
+std::vector<ElementTable*> tables_of(LoopForces* loops) {
+  std::vector<ElementTable*> tables;
+  if (loops != nullptr) loops->declare(tables);
+  return tables;
+}
+
+}  // namespace
 
 MassSystem::MassSystem(const Model& model)
-    : problem_(model), assembler_(model, {}, Symmetry::symmetric, SolverKind::automatic) {
+    : problem_(model),
+      loops_(model.loops.empty() ? nullptr : std::make_unique<LoopForces>(model)),
+      assembler_(model, tables_of(loops_.get()), loops_ ? Symmetry::unsymmetric : Symmetry::symmetric,
+                 SolverKind::automatic) {
   problem_.rule = StepRule::settling;
   problem_.interval = 1.0;
   problem_.prescribed = &Prescribed::nothing();
@@ -23,6 +35,13 @@ void MassSystem::begin(const State& state, const Parameters& parameters) {
   const std::span<double> values = assembler_.solver().values();
   std::fill(values.begin(), values.end(), 0.0);
   add_mass_matrix(problem_, problem_.mass, 1.0, assembler_, values);
+  if (loops_) {
+    data_.z = state.q;
+    data_.gradient.setZero(model.dof_count + kPadding);
+    data_.row_magnitude.setZero(model.dof_count + kPadding);
+    loops_->begin(problem_);
+    loops_->add(problem_, data_, assembler_, values);
+  }
   if (!model.carried.empty()) {
     carrying_.assign(model.carried.size(), Carrying{});
     assembler_.fold_carried([&](std::size_t i, bool needed) {
@@ -44,6 +63,8 @@ void MassSystem::solve(VectorX& rows) {
   assembler_.project(rows);
   assembler_.solver().solve({rows.data(), static_cast<std::size_t>(rows.size())});
   expand_step(problem_, problem_.start->q, rows);
+  const Model& model = problem_.model;
+  for (const Loop& loop : model.loops) rows.segment(loop.dof, model.loop_size()).setZero();
 }
 
 }  // namespace withe

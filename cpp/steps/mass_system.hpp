@@ -1,8 +1,12 @@
 #pragma once
-/// The masses of a scene as a system of equations: M x = b at a configuration, where held unknowns stay, and parts that
-/// bodies carry follow these.
+/// The masses of a scene as a system of equations: M x = b at a configuration, where held unknowns stay, parts that
+/// bodies carry follow these, and closed loops of joints stay closed.
+
+#include <memory>
+#include <vector>
 
 #include "assembly/assembler.hpp"
+#include "steps/loop_forces.hpp"
 #include "steps/step_problem.hpp"
 
 namespace withe {
@@ -22,7 +26,9 @@ class MassSystem {
 
  private:
   StepProblem problem_;
+  std::unique_ptr<LoopForces> loops_;  ///< null if there are none
   Assembler assembler_;
+  StepData data_;
   std::vector<Carrying> carrying_;
   mutable VectorX unused_;
 };

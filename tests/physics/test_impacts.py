@@ -34,7 +34,7 @@ def test_an_impact_gives_back_no_more_than_it_took_and_leaves_what_slides(impact
 def test_surfaces_part_at_the_speed_that_restitution_says(impact: Impact, integrator: Any) -> None:
     for restitution in (0.3, 0.6, 0.9):
         outcome = run(impact, integrator, restitution, gravity=False)
-        assert outcome.given_back == pytest.approx(restitution, rel=0.01)
+        assert outcome.given_back == pytest.approx(restitution, rel=1e-3)
 
 
 @pytest.mark.case("contact", "Energy lost in elastic impacts of rods", source="conservation")

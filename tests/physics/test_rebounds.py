@@ -79,6 +79,30 @@ def test_a_ball_that_meets_a_bar_on_a_hinge_turns_it(place: float) -> None:
     assert simulation.velocity(body)[2] == pytest.approx(spin * -place + 0.5, rel=1e-3)
 
 
+def test_a_ball_that_meets_a_linkage_moves_all_its_bars() -> None:
+    """Two equal cranks on the ground carry a bar: it goes on in parallel, with the mass M + 2 I / r^2."""
+    scene = withe.Scene(gravity=(0, 0, 0))
+    cranks = []
+    for x in (0.0, 0.2):
+        crank = scene.add_body(withe.solids.Box((0.01, 0.01, 0.1)), density=2000, position=(x, 0, -0.05), touches=False)
+        scene.clamp(crank.at((x, 0, -0.1)), spin=(0, 1, 0))
+        cranks.append(crank)
+    bar = scene.add_body(withe.solids.Box((0.22, 0.02, 0.02)), density=2000, position=(0.1, 0, 0))
+    for x, crank in zip((0.0, 0.2), cranks, strict=True):
+        scene.join(crank, bar, "revolute", at=(x, 0, 0), axis=(0, 1, 0))
+    ball(scene, -0.01 - RADIUS - 0.0031, 0.0)
+    scene.enable_contact(restitution=0.5)
+    simulation = scene.build(time_step=1e-3)
+    simulation.set_velocity("body 4", (1.0, 0, 0))
+    simulation.step(5)
+    mass, crank_mass = 2000.0 * 0.22 * 4e-4, 2000.0 * 1e-5
+    inertia = crank_mass * (0.1**2 + 0.01**2) / 12.0 + crank_mass * 0.05**2
+    moved = mass + 2.0 * inertia / 0.1**2
+    speed = 1.5 * body_mass() / (moved + body_mass())
+    assert simulation.velocity(bar)[0] == pytest.approx(speed, rel=2e-3)
+    assert simulation.velocity("body 4")[0] == pytest.approx(speed - 0.5, abs=2e-3)
+
+
 def test_a_bat_gives_its_speed_and_does_the_work() -> None:
     """A held box that moves up at w meets a ball that comes at v: it leaves at w + e (v + w)."""
     scene = withe.Scene(gravity=(0, 0, 0))

@@ -52,6 +52,13 @@ def stub():
     return scene
 
 
+def can(**options):
+    scene = withe.Scene()
+    scene.add_floor()
+    scene.add_body(withe.solids.Cylinder(0.03, 0.1), density=1000, position=(0, 0, 0.05), name="can", **options)
+    return scene
+
+
 def joint(rest_angle):
     scene, rod = arm(build=False)
     other = scene.add_rod(start=(0.3, 0, 0), end=(0.5, 0, 0), nodes=6, radius=5e-3, material=RUBBER)
@@ -81,6 +88,7 @@ SLIPS = {
     "rest angle": (lambda: joint(-45.0), "rest_angle of joint 'knee' is -45 rad", "degrees"),
     "set rest angle": (lambda: set_rest_angle(90.0), "rest_angle of joint 'knee' is 90 rad", "degrees"),
     "roll": (lambda: turn(180.0), "roll of support 'wall' is 180 rad", "degrees"),
+    "cylinder": (lambda: can().build(), "body 'can' is a cylinder, which touches nothing", "capsule or hull"),
     "time step": (lambda: arm(STEEL, time_step=5.0), "time_step is 5 s, longer than the slowest period", "in seconds"),
 }
 
@@ -106,6 +114,7 @@ def test_a_slip_is_warned_of_once_with_the_number_and_what_it_may_be(slip):
         lambda: add_tendon((0.039, 0.0)),
         lambda: arm(length=0.1, radius=0.049),
         lambda: stub().build(),
+        lambda: can(touches=False).build(),
         lambda: joint(4.0 * np.pi),
         lambda: turn(40.0 * np.pi),
         lambda: turn(9.0),

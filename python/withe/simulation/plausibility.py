@@ -42,7 +42,7 @@ def _check_bodies(session: Session) -> None:
     for body in bodies:
         if body.drawn_only:
             _warn(
-                f"{body.owner} is a {type(body.solid).__name__.lower()}, which touches nothing",
+                f"body {body.name!r} is a {type(body.solid).__name__.lower()}, which touches nothing",
                 "use a capsule or hull, or touches=False if it may pass through everything",
             )
 
