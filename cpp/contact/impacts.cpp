@@ -107,6 +107,12 @@ double pull_of(const ContactProblem& problem, const Touching& t) {
 /// True if surfaces with a restitution below 1 are on their way to an impact.
 bool comes_to_strike(const Touching& t) { return t.pair.restitution < 1.0 && t.approach > 0.0 && t.age == 0.0; }
 
+/// True if a force at the end of the step may keep surfaces where an impact leaves them. A barrier is infinite where
+/// they touch, so it keeps its own distance.
+bool is_placed(const ContactProblem& problem, const Touching& t) {
+  return comes_to_strike(t) && problem.description().law != ContactLaw::barrier;
+}
+
 /// The impact of a contact that begins in the step, at a constant acceleration before and after it.
 Strike strike_of(const ContactProblem& problem, const Touching& t) {
   const ContactPair& pair = t.pair;
@@ -267,7 +273,7 @@ void add_approach_slopes(const ContactProblem& problem, const Touching& touching
 void set_pressing(const ContactProblem& problem, Touching& t) {
   const ContactPair& pair = t.pair;
   const double whole = problem.tolerance(pair, t.stiffness / pair.share),
-               tolerance = comes_to_strike(t) ? kStrikeTolerance * whole : whole;
+               tolerance = is_placed(problem, t) ? kStrikeTolerance * whole : whole;
   t.law = {problem.description().law, pair.radii(), tolerance, t.stiffness, t.yielded};
   t.energy = t.law.energy(t.proximity.distance);
   t.energy.value *= t.stiffness;
@@ -285,7 +291,10 @@ void set_pressing(const ContactProblem& problem, Touching& t) {
     if (share < 1.0) t.law.elastic_by_way = elastic_share_slopes(problem, t).way;
   }
   if (t.law.elastic == 0.0 && !t.strike.happens) return;
-  if (t.strike.happens) t.law.yielded = -t.strike.apart;
+  if (is_placed(problem, t))
+    t.law.yielded = -t.strike.apart;
+  else
+    t.strike.apart = 0.0;
   t.before = start_distance(problem, pair);
   const bool begins = t.age == 0.0 && pair.rod_a != pair.rod_b;
   t.turn = begins ? turned(problem, t) : 0.0;

@@ -80,6 +80,23 @@ def test_restitution_is_that_of_speeds_for_thick_rods_and_low_falls() -> None:
         assert reached == pytest.approx(restitution**2, rel=5e-3)
 
 
+@pytest.mark.parametrize("friction_model", ["anchored", "lagged"])
+@pytest.mark.parametrize("model", ["imcv2", "imcv1", "barrier", "spillmann_teschner"])
+def test_every_contact_model_has_restitution(model: Any, friction_model: Any) -> None:
+    scene = withe.Scene(gravity=(0, 0, 0))
+    rod = scene.add_rod(start=(-0.05, 0, 0.01), end=(0.05, 0, 0.01), nodes=9, radius=5e-3, material=RUBBER)
+    scene.add_floor(restitution=0.6, friction=0.2)
+    scene.enable_contact(model=model, friction_model=friction_model)
+    simulation = scene.build(time_step=1e-3)
+    simulation.set_velocities(rod, (0, 0, -1.0))
+    start = simulation.energy().total
+    simulation.step(10)
+    assert simulation.velocities(rod)[:, 2] == pytest.approx(0.6, rel=1e-6)
+    energy = simulation.energy()
+    assert energy.dissipated == pytest.approx(0.64 * start, rel=1e-6)
+    assert energy.total + energy.dissipated == pytest.approx(start, rel=1e-6)
+
+
 def test_steps_that_outlast_an_impact_that_gives_nothing_back_are_not_cut() -> None:
     # A sheet of paper that falls flat: edges swing on their contacts in microseconds, of which nobody wants to know.
     scene = withe.Scene()
