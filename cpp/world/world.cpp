@@ -446,8 +446,13 @@ void World::set_body_motion(int body, const Vector3& velocity, const Vector3& sp
       v.segment<3>(dof) = turn;
   };
   const auto spin_of = [&](int f) { return frame_vector(model, v, f); };
+  const VectorX before = v;
   put_node_vector(model, base, velocity, v);
   put_spin(frame, spin);
+  for (const Constraint& c : model.constraints) {
+    const Vector3 kept = c.held(before) + c.free * c.part(v);
+    v.segment(c.first, c.size) = kept.head(c.size);
+  }
   // Parts follow their bodies; of a body on a joint of another, only its motion in the joint is its own.
   for (const CarriedPart& part : model.carried) {
     const Matrix3 turned = frame_rotation(model, self.state, part.frame);

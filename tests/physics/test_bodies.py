@@ -529,3 +529,24 @@ def test_a_free_body_is_caught_by_a_clamp() -> None:
     simulation.step(5)
     np.testing.assert_allclose(simulation.position(body), held, atol=1e-12)
     np.testing.assert_allclose(simulation.velocity(body), 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("at", [(0.0, 0.0, 0.0), (0.07, 0.0, 0.01)])
+def test_a_body_on_a_hinge_turns_about_it_from_the_start(at: tuple[float, float, float]) -> None:
+    """The support keeps the point that it holds, though only an angular velocity is set."""
+    scene = withe.Scene(gravity=(0, 0, 0))
+    bar = scene.add_body(withe.solids.Box((0.2, 0.02, 0.02)), density=1000, position=(0.1, 0, 0))
+    hinge = scene.clamp(bar.at(at), spin=(0, 1, 0))
+    simulation = scene.build(time_step=1e-3)
+    simulation.set_velocity(bar, angular=(0.5, 2.0, 0.0))  # the hinge takes what is not about its axis
+    arm = np.array([0.1, 0, 0]) - at
+    mass = 1000.0 * 0.2 * 4e-4
+    np.testing.assert_allclose(simulation.velocity(bar), np.cross((0, 2, 0), arm), atol=1e-12)
+    inertia = mass * ((0.2**2 + 0.02**2) / 12.0 + arm @ arm)
+    assert simulation.energy().kinetic == pytest.approx(2.0 * inertia, rel=1e-12)
+    for _ in range(20):
+        simulation.step()
+        np.testing.assert_allclose(simulation.angular_velocity(bar), (0, 2, 0), atol=1e-9)
+        assert np.linalg.norm(simulation.reaction(hinge).force) == pytest.approx(
+            mass * 4.0 * np.linalg.norm(arm), rel=1e-4
+        )

@@ -108,10 +108,10 @@ def test_a_block_rocks() -> None:
         leans.append(np.arcsin(simulation.rotation(box)[0, 2]))
     upright = int(np.argmax(np.array(leans) < 0.0))
     found = float(np.interp(0.0, leans[upright - 1 : upright + 1][::-1], times[upright - 1 : upright + 1][::-1]))
-    before, after = np.diff(leans)[[upright - 8, upright + 12]] / 2e-4
+    before, after = np.diff(leans)[[upright - 3, upright + 2]] / 2e-4
     measured(abs(found / exact - 1.0))
     assert found == pytest.approx(exact, rel=1e-3)
-    assert after / before == pytest.approx(1.0 - 1.5 * np.sin(half) ** 2, rel=0.04)
+    assert after / before == pytest.approx(1.0 - 1.5 * np.sin(half) ** 2, rel=0.012)  # weight acts meanwhile
 
 
 @pytest.mark.case("bodies", "Block on a wedge that slides", source="m g sin a cos a / (M + m sin^2 a)")

@@ -256,6 +256,15 @@ def test_joints_of_bodies_that_cannot_be_are_refused(nodes, words, message):
         two().join(*nodes, **words)
 
 
+def test_read_outs_of_rods_name_those_of_bodies() -> None:
+    scene = withe.Scene()
+    palm = scene.add_body(Box((0.1, 0.1, 0.1)), density=1000, name="palm")
+    simulation = scene.build()
+    for read in (simulation.positions, simulation.velocities):
+        with pytest.raises(ValueError, match="got the body 'palm': use `position`, `velocity`"):
+            read(palm)
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [

@@ -127,6 +127,10 @@ class Directory:
 
     def rod(self, handle: Handle | str, what: str = "rod") -> RodPart:
         """The rod that a handle or a name stands for."""
+        if what == "rod" and isinstance(body := self.find_any(handle, what), BodyPart):
+            raise ValueError(
+                f"rod must be a rod, got the body {body.name!r}: use `position`, `velocity` and `rotation` of bodies"
+            )
         return self.find(handle, RodPart, what)
 
     def node(self, handle: Handle | str, what: str = "node", or_body: bool = False) -> tuple[Pass, str]:

@@ -461,6 +461,8 @@ class Placement:
         angular : array_like of shape (3,) [rad/s]
             Angular velocity in the axes of the world. By default it stays.
 
+        Supports keep the motion of what they hold: a body on a hinge of the world turns about the hinge.
+
         Raises
         ------
         ValueError
