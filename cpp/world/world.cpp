@@ -426,9 +426,9 @@ void World::set_gravity(const Vector3& gravity) {
   set({&setting, 1});
 }
 
-void World::set_body_motion(int body, const Vector3& velocity, const Vector3& spin) {
+void World::set_body_motion(int body, const Vector3& velocity, const Vector3& spin, const Vector3& held) {
   Implementation& self = *implementation_;
-  require(velocity.allFinite() && spin.allFinite(), "velocities of a body must be finite");
+  require(velocity.allFinite() && spin.allFinite() && held.allFinite(), "velocities of a body must be finite");
   self.account_for_settings();
   const int frame = self.model.body_frame.at(at(body)), base = self.model.frame_node[at(frame)];
   if (self.model.planar()) {
@@ -446,13 +446,13 @@ void World::set_body_motion(int body, const Vector3& velocity, const Vector3& sp
       v.segment<3>(dof) = turn;
   };
   const auto spin_of = [&](int f) { return frame_vector(model, v, f); };
-  const VectorX before = v;
+  VectorX of_support = v;
+  put_node_vector(model, base, held, of_support);
   put_node_vector(model, base, velocity, v);
   put_spin(frame, spin);
-  for (const Constraint& c : model.constraints) {
-    const Vector3 kept = c.held(before) + c.free * c.part(v);
-    v.segment(c.first, c.size) = kept.head(c.size);
-  }
+  for (const Constraint& c : model.constraints)
+    if (c.first == model.node_dof[at(base)])
+      v.segment(c.first, c.size) = (c.held(of_support) + c.free * c.part(v)).head(c.size);
   // Parts follow their bodies; of a body on a joint of another, only its motion in the joint is its own.
   for (const CarriedPart& part : model.carried) {
     const Matrix3 turned = frame_rotation(model, self.state, part.frame);

@@ -258,7 +258,8 @@ class World {
   Vector3 body_spin(int body) const;         ///< angular velocity of a rigid body [rad/s]
   int body_base(int body) const;             ///< node whose unknowns are those of a rigid body
   /// Sets the velocity of the base of a body [m/s], and its angular velocity [rad/s]; all its points follow.
-  void set_body_motion(int body, const Vector3& velocity, const Vector3& spin);
+  /// `held`: velocity of that node in the directions that supports hold.
+  void set_body_motion(int body, const Vector3& velocity, const Vector3& spin, const Vector3& held);
   VectorX spins(int rod) const;  ///< per edge, angular velocity about the tangent [rad/s]
   Energy energy() const;
   /// Energy of one rod: kinetic, stretch, bend, twist, gravity and their sum. The energy around a joint belongs to the

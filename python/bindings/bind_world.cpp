@@ -473,10 +473,10 @@ void define_readouts(WorldClass& world) {
       "body_spin", [](const GuardedWorld& self, int body) { return self.reading().body_spin(body); }, py::arg("body"));
   world.def(
       "set_body_motion",
-      [](GuardedWorld& self, int body, const Vector3& velocity, const Vector3& spin) {
-        self.changing().set_body_motion(body, velocity, spin);
+      [](GuardedWorld& self, int body, const Vector3& velocity, const Vector3& spin, const Vector3& held) {
+        self.changing().set_body_motion(body, velocity, spin, held);
       },
-      py::arg("body"), py::arg("velocity"), py::arg("spin"));
+      py::arg("body"), py::arg("velocity"), py::arg("spin"), py::arg("held"));
   world.def("spins", [](const GuardedWorld& self, int rod) { return self.reading().spins(rod); }, py::arg("rod"));
   world.def("take_warnings", [](GuardedWorld& self) { return self.changing().take_warnings(); });
   world.def("energy", [](const GuardedWorld& self) { return self.reading().energy(); });

@@ -1369,6 +1369,7 @@ class World:
         body: typing.SupportsInt | typing.SupportsIndex,
         velocity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
         spin: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
+        held: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
     ) -> None: ...
     def set_friction_shares(
         self,

@@ -80,7 +80,9 @@ def set_body_velocity(
     spin = body_spin(session, body) if angular is None else validation.vector(angular, f"angular velocity of {owner}")
     base = session.world.body_base(part.index)
     arm = np.asarray(session.world.positions()[base]) - body_position(session, body)
-    session.world.set_body_motion(part.index, v + np.cross(spin, arm), spin)
+    moved = v + np.cross(spin, arm)
+    held = moved if velocity is not None else np.asarray(session.world.velocities()[base])
+    session.world.set_body_motion(part.index, moved, spin, held)
 
 
 def body_outlines(directory: Directory) -> list[BodyOutline]:

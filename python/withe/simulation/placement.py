@@ -457,11 +457,10 @@ class Placement:
         body : Body or str
             Body to change.
         velocity : array_like of shape (3,) [m/s]
-            Velocity of the origin of the body's axes. By default it stays.
+            Velocity of the origin of the body's axes. By default it stays, or, if a support holds a point of the body,
+            the velocity of that point: a body on a hinge of the world then turns about the hinge.
         angular : array_like of shape (3,) [rad/s]
             Angular velocity in the axes of the world. By default it stays.
-
-        Supports keep the motion of what they hold: a body on a hinge of the world turns about the hinge.
 
         Raises
         ------
