@@ -197,15 +197,15 @@ void Contact::update(const VectorX& q1) {
   current_ = true;
 }
 
+/// Impacts that have been found act for all later ends of the step, or Newton's method would lose them where surfaces
+/// are apart.
 void Contact::find(const VectorX& q) {
   set_.find(problem_, q, [&](const auto& add) { candidates_.find(q, problem_.bodies, add); });
   if (problem_.starting) return;
   std::vector<Touching>& striking = problem_.striking;
   for (const Touching& t : set_) {
     if (!(t.strike.apart > 0.0)) continue;
-    const auto place = std::lower_bound(
-        striking.begin(), striking.end(), t.pair.key,
-        [](const Touching& other, const ContactKey& key) { return comes_before(other.pair.key, key); });
+    const auto place = place_of(t.pair.key, striking.begin(), striking.end());
     if (place == striking.end() || !(place->pair.key == t.pair.key)) striking.insert(place, t);
   }
 }

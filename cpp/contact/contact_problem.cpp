@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "model/edge_vectors.hpp"
+
 namespace withe {
 namespace {
 
@@ -17,12 +19,6 @@ void set_body_masses(const Model& model, const Parameters& parameters, VectorX& 
     if (part.is_node() && part.slide < 0) of_frame(part.frame) += parameters.added_mass(part.node);
   for (const CarriedPart& surface : model.carried)
     if (surface.edge >= 0) edge_mass(surface.edge) = surface.is_held ? INFINITY : of_frame(surface.frame);
-}
-
-/// A vector in space, in the axes of the unknowns.
-Vec3d in_axes(const Model& model, const Vector3& v) {
-  if (model.planar()) return {v.dot(model.plane->first), v.dot(model.plane->second), 0.0};
-  return {v.x(), v.y(), v.z()};
 }
 
 bool by_bodies(const BodyOffset& a, const BodyOffset& b) { return a.rod != b.rod ? a.rod < b.rod : a.other < b.other; }

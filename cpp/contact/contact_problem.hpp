@@ -61,6 +61,13 @@ struct Touching {
   bool struck() const { return strike.happens && pressing.first < 0.0; }
 };
 
+/// Place of a pair in a sorted part of a list of contacts: of itself, or of the first one behind it.
+template <class Iterator>
+Iterator place_of(const ContactKey& key, Iterator from, Iterator end) {
+  return std::lower_bound(from, end, key,
+                          [](const Touching& t, const ContactKey& other) { return comes_before(t.pair.key, other); });
+}
+
 /// Friction with J and N of the start of the step; semi-explicit: along the slip velocity there, where it has one.
 struct LaggedFriction {
   double slip[3][kContactUnknowns];

@@ -71,9 +71,7 @@ void ContactSet::add_all(const ContactProblem& problem, const std::vector<Touchi
   for (const Touching& start : acting) {
     const auto from = touching_.begin() + static_cast<std::ptrdiff_t>(first);  // adding to them moves them
     const auto end = touching_.begin() + static_cast<std::ptrdiff_t>(last);
-    const auto found = std::lower_bound(from, end, start.pair.key, [](const Touching& t, const ContactKey& key) {
-      return comes_before(t.pair.key, key);
-    });
+    const auto found = place_of(start.pair.key, from, end);
     if (found != end && found->pair.key == start.pair.key) continue;
     set_forces(problem, records, add(problem, start.pair, problem.bodies.proximity(start.pair, q_, true)));
   }

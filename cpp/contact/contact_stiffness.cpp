@@ -438,7 +438,7 @@ void ContactStiffness::renew(ContactSet& start, std::vector<ContactRecord>& reco
     }
     const bool anew = !still && begins_anew(t, struck, record);
     if (!drawn && !anew) continue;
-    // The energy that the start of such an impact leaves out is lost.
+    // An impact with a restitution below 1 begins without energy. The energy that its contact stored is lost.
     if (anew && t.pair.restitution == 1.0) start.renew(problem_, i, record);
     records.push_back(record);
   }

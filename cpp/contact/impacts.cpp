@@ -127,12 +127,12 @@ Strike strike_of(const ContactProblem& problem, const Touching& t) {
     time = rate > 0.0 ? 2.0 * gap / (rate + std::sqrt(square)) : (std::sqrt(square) - rate) / pull;
   time = std::clamp(time, 0.0, duration);
   const double speed = std::max(0.0, rate + pull * time), left = duration - time;
-  strike.apart = std::min(0.0, start + kRecovery * speed * duration);
+  if (is_placed(problem, t)) strike.apart = std::min(0.0, start + kRecovery * speed * duration);
   // Surfaces rest that would come back within a step.
   const double parting = pair.restitution * speed;
   if (speed <= rest_speed(problem, pair) || 2.0 * parting <= pull * duration) return strike;
   strike.speed = parting - pull * left;
-  strike.apart += std::max(0.0, left * (parting - 0.5 * pull * left));
+  if (is_placed(problem, t)) strike.apart += std::max(0.0, left * (parting - 0.5 * pull * left));
   return strike;
 }
 
@@ -291,11 +291,8 @@ void set_pressing(const ContactProblem& problem, Touching& t) {
     if (share < 1.0) t.law.elastic_by_way = elastic_share_slopes(problem, t).way;
   }
   if (t.law.elastic == 0.0 && !t.strike.happens) return;
-  if (is_placed(problem, t))
-    t.law.yielded = -t.strike.apart;
-  else
-    t.strike.apart = 0.0;
-  t.before = start_distance(problem, pair);
+  if (is_placed(problem, t)) t.law.yielded = -t.strike.apart;
+  if (t.law.elastic > 0.0) t.before = start_distance(problem, pair);
   const bool begins = t.age == 0.0 && pair.rod_a != pair.rod_b;
   t.turn = begins ? turned(problem, t) : 0.0;
   if (t.turn > kMaxImpactTurn && touches_already(problem, pair)) t.turn *= kSlidingTurnShare;

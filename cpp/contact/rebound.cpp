@@ -32,7 +32,7 @@ ReboundContact rebound_of(const ContactProblem& problem, const Touching& t) {
   const int own = t.pair.curve() ? 9 : 6;
   out.drift[0] = 0.0;
   for (int i = 0; i < own; ++i) out.drift[0] -= slope[i] * moved[i % 3];
-  out.speed = t.struck() ? t.strike.speed : 0.0;
+  out.speed = t.strike.speed;
   out.friction = t.pair.friction;
   const LaggedFriction slip = lag_friction(problem, t);
   Vec3d direction[2];

@@ -212,7 +212,7 @@ void find_end_velocity(const Equations& equations, const StepPlan& plan, const S
     set_turning_velocities(equations.model(), state.v, work.change, plan.dt, v1);
   if (plan.rule != StepRule::backward_euler) set_body_velocities(equations.model(), state.v, work.change, plan.dt, v1);
   balance_bodies(equations.problem(), work.newton.data, v1);
-  for (const Loop& loop : equations.model().loops) v1.segment(loop.dof, equations.model().loop_size()).setZero();
+  clear_multipliers(equations.model(), v1);
   equations.assembler().set_held_part(work.held_velocity, v1);
   work.follow_gain = 0.0;
   if (plan.rule == StepRule::backward_euler) return;
@@ -270,58 +270,18 @@ void add_rebounds(const Equations& equations, const Parameters& parameters, cons
   const double dt = plan.dt, unbooked = plan.rule == StepRule::backward_euler
                                             ? dt * dt * kinetic_energy(model, equations.mass(), state.acceleration)
                                             : 0.0;
-  const ReboundWork done = work.rebounds.apply(model, parameters, lost + unbooked, state);
+  const ReboundWork done = work.rebounds.apply(model, parameters, lost + unbooked, work.masses(model), state);
   result.dissipated += unbooked + done.dissipated;
   result.support_work += done.support_work;
   result.rebound_gain = done.gain;
   state.acceleration += (1.0 / dt) * (state.v - work.velocity);
 }
 
-}  // namespace
-
-namespace {
-
 /// Velocities that a user sets body by body may violate the rates of closed loops of joints. An impulse of the joints
-/// makes them consistent: the step of Newton's method over an interval so short that inertia alone resists. Forces at
-/// rest are subtracted, so that they leave no rounding errors. Returns the kinetic energy that the impulse removes [J].
-double make_rates_consistent(Equations& equations, const Parameters& parameters, const Prescribed& prescribed,
-                             const StepPlan& plan, double h, State& state, StepWorkspace& work) {
-  constexpr double kShort = 1e-4;  // over the interval of the step
-  const double interval = kShort * h;
-  const Model& model = equations.model();
-  const VectorX before = state.v;
-  StepData& data = work.newton.data;
-  work.newton.matrix.owner = nullptr;
-  equations.begin(state, parameters, plan.rule, interval, prescribed);
-  const double energy = kinetic_energy(model, equations.mass(), before);
-  VectorX& held = work.difference;
-  held.setZero(before.size());
-  equations.assembler().add_held_part(before, interval, held);
-  VectorX& change = work.change;
-  const auto add_residual = [&](const VectorX& z, double factor) {
-    work.z = z;
-    equations.place(work.z);
-    equations.evaluate(work.z, false, nullptr, data);
-    change += factor * data.residual;
-  };
-  change.setZero(before.size());
-  add_residual(state.q, -1.0);
-  state.v.setZero();
-  add_residual(state.q, 1.0);
-  if (!held.isZero(0.0)) {
-    add_residual(state.q + held, -1.0);
-    add_residual(state.q, 1.0);
-  }
-  state.v = before;
-  equations.evaluate(state.q, true, nullptr, data);
-  if (equations.assembler().solver().factorize().status != FactorStatus::ok) return 0.0;
-  equations.assembler().solver().solve({change.data(), static_cast<std::size_t>(change.size())});
-  change += held;
-  equations.expand(data, change);
-  if (!change.allFinite()) return 0.0;
-  state.v = change / interval;
-  for (const Loop& loop : model.loops) state.v.segment(loop.dof, model.loop_size()).setZero();
-  return energy - kinetic_energy(model, equations.mass(), state.v);
+/// makes them consistent. Returns the kinetic energy that the impulse removes [J].
+double make_rates_consistent(const Model& model, const Parameters& parameters, State& state, StepWorkspace& work) {
+  MassSystem& masses = work.masses(model);
+  return masses.begin(state, parameters) ? masses.close_loops(state.v) : 0.0;
 }
 
 }  // namespace
@@ -336,7 +296,7 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   if (!prescribed.held.reachable) return result;
   const bool holds = !model.constraints.empty();
   if (equations.loops() && predictor.empty() && !state.v.isZero(0.0))
-    result.dissipated = make_rates_consistent(equations, parameters, prescribed, plan, h, state, work);
+    result.dissipated = make_rates_consistent(model, parameters, state, work);
   if (holds) {
     find_held_velocity(model, prescribed.held, plan, state, work);
     work.held_acceleration = (1.0 / held_time(plan, state)) * (work.held_velocity - state.v);

@@ -1,6 +1,8 @@
 #pragma once
 /// One time step: backward Euler, implicit midpoint, energy-momentum, and Verlet.
 
+#include <memory>
+
 #include "integrators/fourth_order.hpp"
 #include "integrators/newton.hpp"
 #include "integrators/predictor.hpp"
@@ -38,9 +40,15 @@ struct StepWorkspace {
   VectorX z, move, change, working, mean, velocity, held_velocity, held_acceleration, assumed, difference,
       whole_acceleration;
   Rebounds rebounds;
-  PressureGains pressure;  ///< energy gains of a backward Euler step under `adaptive`
+  std::unique_ptr<MassSystem> mass_system;  ///< null until it is needed
+  PressureGains pressure;                   ///< energy gains of a backward Euler step under `adaptive`
   Configuration after;
   State from, next;  ///< explicit steps
+
+  MassSystem& masses(const Model& model) {
+    if (!mass_system) mass_system = std::make_unique<MassSystem>(model);
+    return *mass_system;
+  }
 };
 
 /// Advances `state`, or leaves it as it was when the step is not accepted.

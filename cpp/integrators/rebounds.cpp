@@ -3,17 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/check.hpp"
+
 namespace withe {
 namespace {
 
 // Numbers of a column below this share of its greatest number have no effect.
 constexpr double kNegligible = 1e-16;
-
-/// Adds a contact's numbers to a vector over all unknowns.
-void scatter(const ReboundContact& contact, const double (&numbers)[kContactUnknowns], double factor, VectorX& out) {
-  for (int i = 0; i < kContactUnknowns; ++i)
-    if (contact.dofs[i] >= 0) out[contact.dofs[i]] += factor * numbers[i];
-}
 
 }  // namespace
 
@@ -43,18 +39,21 @@ void Rebounds::set_batches(const Model& model) {
 }
 
 /// Sets one row of each contact of a batch, and its column.
-void Rebounds::set_rows(const Model& model, const std::vector<std::size_t>& batch, std::size_t k) {
+void Rebounds::set_rows(const Model& model, const std::vector<std::size_t>& batch, std::size_t k, MassSystem& masses) {
   row_.setZero(model.dof_count);
   owner_.assign(at(model.component_count), -1);
   for (std::size_t i : batch) {
     if (k > 0 && !(contacts_[i].friction > 0.0)) continue;
-    scatter(contacts_[i], contacts_[i].rows[k], 1.0, row_);
-    for (int dof : contacts_[i].dofs)
-      if (dof >= 0) owner_[at(model.dof_component[at(dof)])] = static_cast<int>(i);
+    for (int u = 0; u < kContactUnknowns; ++u) {
+      const int dof = contacts_[i].dofs[u];
+      if (dof < 0) continue;
+      row_[dof] += contacts_[i].rows[k][u];
+      owner_[at(model.dof_component[at(dof)])] = static_cast<int>(i);
+    }
   }
-  mass_->fold(row_);
+  masses.fold(row_);
   column_ = row_;
-  mass_->solve(column_);
+  masses.solve(column_);
   const double least = kNegligible * column_.lpNorm<Eigen::Infinity>();
   for (int dof = 0; dof < model.dof_count; ++dof) {
     const int owner = owner_[at(model.dof_component[at(dof)])];
@@ -66,7 +65,8 @@ void Rebounds::set_rows(const Model& model, const std::vector<std::size_t>& batc
   }
 }
 
-ReboundWork Rebounds::find_velocity(const Model& model, const State& state, double elastic, VectorX& velocity) {
+ReboundWork Rebounds::find_velocity(const Model& model, const State& state, double elastic, MassSystem& masses,
+                                    VectorX& velocity) {
   velocity = state.v;
   find_rebounds(contacts_, rows_, elastic, velocity, impulses_);
   ReboundWork work;
@@ -77,35 +77,35 @@ ReboundWork Rebounds::find_velocity(const Model& model, const State& state, doub
       work.support_work -= impulses_[i][k] * contacts_[i].drift[k];
     }
   column_ = velocity - state.v;
-  multiply(model, mass_->mass(), column_, row_);
-  mass_->fold(row_);
+  multiply(model, masses.mass(), column_, row_);
+  masses.fold(row_);
   for (const Constraint& c : model.constraints)
     work.support_work += (c.held(row_) - c.held(total_)).dot(c.held(state.v));
-  work.dissipated = kinetic_energy(model, mass_->mass(), state.v) + work.support_work -
-                    kinetic_energy(model, mass_->mass(), velocity);
+  work.dissipated = kinetic_energy(model, masses.mass(), state.v) + work.support_work -
+                    kinetic_energy(model, masses.mass(), velocity);
   return work;
 }
 
-ReboundWork Rebounds::apply(const Model& model, const Parameters& parameters, double lost, State& state) {
-  if (!mass_) mass_ = std::make_unique<MassSystem>(model);
-  mass_->begin(state, parameters);
+ReboundWork Rebounds::apply(const Model& model, const Parameters& parameters, double lost, MassSystem& masses,
+                            State& state) {
+  require(masses.begin(state, parameters), "the masses of the scene must be positive");
   rows_.assign(contacts_.size(), ReboundRows{});
   set_batches(model);
   for (const std::vector<std::size_t>& batch : batches_)
-    for (std::size_t k = 0; k < 3; ++k) set_rows(model, batch, k);
-  ReboundWork work = find_velocity(model, state, 1.0, velocity_);
+    for (std::size_t k = 0; k < 3; ++k) set_rows(model, batch, k, masses);
+  ReboundWork work = find_velocity(model, state, 1.0, masses, velocity_);
   if (const double gain = -work.dissipated - lost; gain > 0.0) {
     // All velocities between those with and without rebounds follow from impulses that contacts allow. The gain is a
     // convex parabola of the share of the rebound: g(s) = g0 + (g1 - g0 - k) s + k s^2.
-    const ReboundWork least = find_velocity(model, state, 0.0, least_);
+    const ReboundWork least = find_velocity(model, state, 0.0, masses, least_);
     velocity_ -= least_;
-    const double square = kinetic_energy(model, mass_->mass(), velocity_), first = -least.dissipated - lost,
+    const double square = kinetic_energy(model, masses.mass(), velocity_), first = -least.dissipated - lost,
                  slope = gain - first - square, under = slope * slope - 4.0 * square * std::min(first, 0.0),
                  share = first < 0.0 ? 2.0 * -first / (slope + std::sqrt(under)) : 0.0;
     velocity_ = least_ + share * velocity_;
     work.support_work = least.support_work + share * (work.support_work - least.support_work);
     work.dissipated = -(first + share * (slope + share * square)) - lost;
-    work.gain = std::max(first, 0.0) / kinetic_energy(model, mass_->mass(), state.v);
+    work.gain = std::max(first, 0.0) / kinetic_energy(model, masses.mass(), state.v);
   }
   state.v = velocity_;
   return work;

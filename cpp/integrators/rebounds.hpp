@@ -1,7 +1,6 @@
 #pragma once
 /// Velocities after impacts with a restitution below 1, see contact/rebound.hpp.
 
-#include <memory>
 #include <vector>
 
 #include "contact/rebound.hpp"
@@ -19,22 +18,22 @@ struct ReboundWork {
   double gain = 0;
 };
 
-/// Scratch, made when it is first needed.
+/// Impulses at the end of a step, with their scratch.
 class Rebounds {
  public:
   /// Notes the contacts of a step that is about to be accepted. True if impulses apply.
   bool find(const Equations& equations);
   /// Changes the velocities of the state at the end of the step. `find` must have returned true. `lost`: energy that
   /// contact has removed in the step [J].
-  ReboundWork apply(const Model& model, const Parameters& parameters, double lost, State& state);
+  ReboundWork apply(const Model& model, const Parameters& parameters, double lost, MassSystem& masses, State& state);
 
  private:
   /// Finds the velocity after impulses, and their work.
-  ReboundWork find_velocity(const Model& model, const State& state, double elastic, VectorX& velocity);
+  ReboundWork find_velocity(const Model& model, const State& state, double elastic, MassSystem& masses,
+                            VectorX& velocity);
   void set_batches(const Model& model);
-  void set_rows(const Model& model, const std::vector<std::size_t>& batch, std::size_t k);
+  void set_rows(const Model& model, const std::vector<std::size_t>& batch, std::size_t k, MassSystem& masses);
 
-  std::unique_ptr<MassSystem> mass_;
   std::vector<ReboundContact> contacts_;
   std::vector<ReboundRows> rows_;
   std::vector<Impulse> impulses_;

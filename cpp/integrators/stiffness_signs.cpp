@@ -84,6 +84,7 @@ VectorX StiffnessSigns::weights() const {
   VectorX weight = equations_.mass().rows;
   const StepProblem& problem = equations_.problem();
   const Model& model = problem.model;
+  if (model.hinges.empty() && model.slides.empty()) return weight.cwiseMax(1e-300);
   VectorX moved = weight;
   Carrying carrying;
   for (std::size_t i = model.carried.size(); i-- > 0;) {  // parts of parts first

@@ -6,6 +6,12 @@
 
 namespace withe {
 
+/// A vector in space, in the axes of the unknowns of nodes: in a plane its two, and zero.
+inline Vec3d in_axes(const Model& model, const Vector3& v) {
+  if (model.planar()) return {v.dot(model.plane->first), v.dot(model.plane->second), 0.0};
+  return to_vec3(v);
+}
+
 /// Vector of a node, in the axes of space: velocities, or multipliers of rows; in a plane positions are from its
 /// origin.
 inline Vector3 node_vector(const Model& model, const VectorX& v, int node) {

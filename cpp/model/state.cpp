@@ -3,6 +3,7 @@
 #include "geometry/curvature.hpp"
 #include "geometry/frame_kernels.hpp"
 #include "geometry/rotation.hpp"
+#include "model/edge_vectors.hpp"
 
 namespace withe {
 namespace {
@@ -109,15 +110,12 @@ void compute_strains(const Model& model, const State& state, Configuration& out)
 }  // namespace
 
 ObstaclePlace obstacle_place(const Model& model, const ObstacleDescription& drawn, const ObstacleWay& way) {
-  const auto in_axes = [&](const Vector3& x, bool is_point) -> Vec3d {
-    if (!model.planar()) return to_vec3(x);
-    const Vector3 from = is_point ? Vector3(x - model.plane->origin) : x;
-    return {from.dot(model.plane->first), from.dot(model.plane->second), 0.0};
+  const auto place = [&](const Vector3& x) {
+    return in_axes(model, model.planar() ? Vector3(x - model.plane->origin) : x);
   };
   const bool plane = drawn.kind == ObstacleKind::plane;
   const Vec3d turn = model.planar() ? Vec3d{0.0, 0.0, way.turn.dot(model.plane->normal)} : to_vec3(way.turn);
-  return {in_axes(drawn.point + way.shift, true),
-          plane ? in_axes(drawn.other, false) : in_axes(drawn.other + way.shift, true), turn};
+  return {place(drawn.point + way.shift), plane ? in_axes(model, drawn.other) : place(drawn.other + way.shift), turn};
 }
 
 ObstacleWay way_from_drawn(const Model& model, const ObstacleDescription& drawn, const ObstaclePlace& place) {

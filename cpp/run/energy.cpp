@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "model/edge_vectors.hpp"
 #include "steps/hand_forces.hpp"
 #include "steps/terms.hpp"
 
@@ -13,12 +14,11 @@ namespace {
 /// Energy of the share part(node) of each node's mass.
 template <class Part>
 double gravity_energy(const Model& model, const EnergyCoefficients& k, const VectorX& q, const Part& part) {
-  Vector3 g = k.gravity;
-  if (model.planar()) g << k.gravity.dot(model.plane->first), k.gravity.dot(model.plane->second), 0.0;
+  const Vec3d g = in_axes(model, k.gravity);
   double energy = 0.0;
   for (int i = 0; i < model.node_count; ++i) {
     const int dof = model.node_dof[at(i)];
-    for (int d = 0; d < model.dimension; ++d) energy -= part(i) * k.node_mass(i) * g(d) * q(dof + d);
+    for (int d = 0; d < model.dimension; ++d) energy -= part(i) * k.node_mass(i) * g[d] * q(dof + d);
   }
   return energy;
 }

@@ -400,6 +400,14 @@ void find_carrying(const StepProblem& problem, const VectorX& z, std::size_t i, 
   out.known = true;
 }
 
+void fold_matrix(const StepProblem& problem, const VectorX& z, std::vector<Carrying>& carrying, Assembler& assembler) {
+  assembler.fold_carried([&](std::size_t i, bool needed) {
+    Carrying& part = carrying[i];
+    if (needed && !part.known) find_carrying(problem, z, i, part);
+    return part.known ? &part : nullptr;
+  });
+}
+
 // Share of bounds that bodies get. Bounds of contacts and their use in Newton's method have margins of 8 and 10.
 // Contacts of sharp edges are so stiff that these margins would cost angular momentum; 2.5 units of rounding error are
 // left.

@@ -38,6 +38,10 @@ void fold_rows(const StepProblem& problem, const VectorX& z, VectorX& rows, Vect
 /// Sets the derivatives at z of a part on which no forces act.
 void find_carrying(const StepProblem& problem, const VectorX& z, std::size_t i, Carrying& out);
 
+/// Adds the rows and columns of carried parts in the matrix at z to those of their bodies. `carrying`: derivatives, of
+/// which those are found that are needed and not known.
+void fold_matrix(const StepProblem& problem, const VectorX& z, std::vector<Carrying>& carrying, Assembler& assembler);
+
 /// Adds bounds on the rounding errors of carried parts to those of their bodies.
 void fold_bounds(const StepProblem& problem, VectorX& bounds);
 

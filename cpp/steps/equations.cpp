@@ -151,11 +151,7 @@ void Equations::fold(StepData& data, std::span<double> values) {
     fold_rows(problem_, data.z, data.gradient, data.row_magnitude);
   } else {
     fold_rows(problem_, data.z, data.gradient, data.row_magnitude, data.carrying);
-    assembler_.fold_carried([&](std::size_t i, bool needed) {
-      Carrying& part = data.carrying[i];
-      if (needed && !part.known) find_carrying(problem_, data.z, i, part);
-      return part.known ? &part : nullptr;
-    });
+    fold_matrix(problem_, data.z, data.carrying, assembler_);
   }
   if (moments) data.elastic_rows += data.gradient.head(model().dof_count);
 }

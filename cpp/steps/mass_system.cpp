@@ -1,6 +1,5 @@
 #include "steps/mass_system.hpp"
 
-#include "common/check.hpp"
 #include "steps/carried_parts.hpp"
 #include "steps/inertia.hpp"
 
@@ -25,36 +24,29 @@ MassSystem::MassSystem(const Model& model)
   problem_.prescribed = &Prescribed::nothing();
 }
 
-void MassSystem::begin(const State& state, const Parameters& parameters) {
+bool MassSystem::begin(const State& state, const Parameters& parameters) {
   const Model& model = problem_.model;
   problem_.start = &state;
   problem_.parameters = &parameters;
-  if (problem_.version != parameters.version || model.has_bodies()) set_mass(model, parameters, problem_.mass);
+  if (problem_.version != parameters.version) set_mass(model, parameters, problem_.mass);
   problem_.version = parameters.version;
   if (model.has_bodies()) turn_bodies(model, parameters, state, problem_.mass);
   const std::span<double> values = assembler_.solver().values();
   std::fill(values.begin(), values.end(), 0.0);
   add_mass_matrix(problem_, problem_.mass, 1.0, assembler_, values);
   if (loops_) {
-    data_.z = state.q;
-    data_.gradient.setZero(model.dof_count + kPadding);
-    data_.row_magnitude.setZero(model.dof_count + kPadding);
     loops_->begin(problem_);
-    loops_->add(problem_, data_, assembler_, values);
+    evaluate_loops(state.q, values);
   }
   if (!model.carried.empty()) {
     carrying_.assign(model.carried.size(), Carrying{});
-    assembler_.fold_carried([&](std::size_t i, bool needed) {
-      Carrying& part = carrying_[i];
-      if (needed && !part.known) find_carrying(problem_, state.q, i, part);
-      return part.known ? &part : nullptr;
-    });
+    fold_matrix(problem_, state.q, carrying_, assembler_);
   }
   assembler_.project_matrix();
-  require(assembler_.solver().factorize().status == FactorStatus::ok, "the masses of the scene must be positive");
+  return assembler_.solver().factorize().status == FactorStatus::ok;
 }
 
-void MassSystem::fold(VectorX& rows) const {
+void MassSystem::fold(VectorX& rows) {
   unused_.setZero(rows.size());
   fold_rows(problem_, problem_.start->q, rows, unused_);
 }
@@ -63,8 +55,34 @@ void MassSystem::solve(VectorX& rows) {
   assembler_.project(rows);
   assembler_.solver().solve({rows.data(), static_cast<std::size_t>(rows.size())});
   expand_step(problem_, problem_.start->q, rows);
+  clear_multipliers(problem_.model, rows);
+}
+
+/// Sets the rows of closed loops at z in data_, and adds their derivatives to a matrix.
+void MassSystem::evaluate_loops(const VectorX& z, std::span<double> values) {
+  data_.z = z;
+  data_.gradient.setZero(z.size() + kPadding);
+  data_.row_magnitude.setZero(z.size() + kPadding);
+  loops_->add(problem_, data_, assembler_, values);
+}
+
+/// The sum of held velocities h and x that minimises (v - h - x) . M (v - h - x) with G (h + x) = 0, G the rates of the
+/// constraints. Rows of loops are linear: their change from q to q + h has the right-hand side of G x = -G h.
+double MassSystem::close_loops(VectorX& velocity) {
   const Model& model = problem_.model;
-  for (const Loop& loop : model.loops) rows.segment(loop.dof, model.loop_size()).setZero();
+  const VectorX& q = problem_.start->q;
+  const double before = kinetic_energy(model, problem_.mass, velocity);
+  VectorX held = assembler_.held_part(velocity), rows;
+  expand_step(problem_, q, held);
+  multiply(model, problem_.mass, velocity - held, rows);
+  evaluate_loops(q, {});
+  rows += data_.gradient.head(model.dof_count);
+  evaluate_loops(q + held, {});
+  rows -= data_.gradient.head(model.dof_count);
+  fold(rows);
+  solve(rows);
+  velocity = held + rows;
+  return before - kinetic_energy(model, problem_.mass, velocity);
 }
 
 }  // namespace withe

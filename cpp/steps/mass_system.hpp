@@ -3,6 +3,7 @@
 /// bodies carry follow these, and closed loops of joints stay closed.
 
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "assembly/assembler.hpp"
@@ -16,21 +17,27 @@ class MassSystem {
   /// The model must outlive it.
   explicit MassSystem(const Model& model);
 
-  /// Factorises M at a state, which must outlive the calls that follow.
-  void begin(const State& state, const Parameters& parameters);
+  /// Factorises M at a state, which must outlive the calls that follow. False if closed loops have no independent rates
+  /// there.
+  bool begin(const State& state, const Parameters& parameters);
   /// Adds rows of parts that bodies carry to the rows of the bodies.
-  void fold(VectorX& rows) const;
+  void fold(VectorX& rows);
   /// Replaces folded rows b by x.
   void solve(VectorX& rows);
+  /// Replaces velocities by the nearest ones, measured by M, with which closed loops stay closed. Held velocities stay.
+  /// Returns the kinetic energy that this removes [J].
+  double close_loops(VectorX& velocity);
   const MassMatrix& mass() const { return problem_.mass; }
 
  private:
+  void evaluate_loops(const VectorX& z, std::span<double> values);
+
   StepProblem problem_;
   std::unique_ptr<LoopForces> loops_;  ///< null if there are none
   Assembler assembler_;
   StepData data_;
   std::vector<Carrying> carrying_;
-  mutable VectorX unused_;
+  VectorX unused_;
 };
 
 }  // namespace withe

@@ -76,6 +76,11 @@ struct StepProblem {
   double end_rate() const { return in_middle() ? 2.0 : 1.0; }
 };
 
+/// Multipliers of closed loops have no velocity.
+inline void clear_multipliers(const Model& model, VectorX& v) {
+  for (const Loop& loop : model.loops) v.segment(loop.dof, model.loop_size()).setZero();
+}
+
 /// Bounds on the rounding errors of a residual. No iteration removes these errors; see rounding.cpp.
 struct RoundingBounds {
   long number = -1;     ///< number of the problem to which they belong

@@ -7,12 +7,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Connection", "connections"]
+__all__ = ["BODY_OBJECT", "Connection", "connections"]
 
 FloatArray = npt.NDArray[np.float64]
 
 _CONNECT = 0  # mjEQ_CONNECT
-_BODY = 1  # mjOBJ_BODY
+BODY_OBJECT = 1  # mjOBJ_BODY: the constraint names bodies, not sites
 _DRAWN_APART = 1e-9  # greatest distance of two points that are one, over the size of the robot
 
 
@@ -37,7 +37,7 @@ def connections(model: Any, data: Any, size: float) -> list[Connection]:
     weld = np.asarray(model.body_weldid, dtype=int)
     for i in np.nonzero(np.asarray(model.eq_type) == _CONNECT)[0].tolist():
         objects = int(model.eq_obj1id[i]), int(model.eq_obj2id[i])
-        if int(model.eq_objtype[i]) == _BODY:
+        if int(model.eq_objtype[i]) == BODY_OBJECT:
             bodies = objects
             anchors = np.asarray(model.eq_data[i], dtype=float)[:6].reshape(2, 3)
             turns = (np.asarray(data.xmat[body], dtype=float).reshape(3, 3) for body in bodies)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from withe.robots.mujoco_joints import BALL, greatest_torque, has_force_limit, stops_of
+from withe.robots.mujoco_loops import BODY_OBJECT
 from withe.robots.names import name_of
 
 __all__ = ["listed", "unsupported_content"]
@@ -96,7 +97,7 @@ def _of_equalities(model: Any, closed: Set[int]) -> Iterator[str]:
         for i in (number for number, own in kinds.items() if own == kind):
             first = int(model.eq_obj1id[i])
             of = {"connect": "body", "weld": "body", "joint": "joint", "tendon": "tendon"}.get(word, "equality")
-            if word in ("connect", "weld") and int(model.eq_objtype[i]) != 1:  # mjOBJ_BODY
+            if word in ("connect", "weld") and int(model.eq_objtype[i]) != BODY_OBJECT:
                 of = "site"
             names.append(model.equality(i).name or name_of(model, of, first if of != "equality" else i))
         also = ", which the mimic of URDF is too" if word == "joint" else ""
