@@ -175,8 +175,9 @@ asan: $(STAMPS)/build_tools
 # What threads share: the pool of workers and batches.
 tsan: $(STAMPS)/build_tools
 	@cmake --preset tsan
-	@cmake --build build/tsan --target test_common test_world
+	@cmake --build build/tsan --target test_common test_solvers test_world
 	@build/tsan/tests/cpp/test_common --gtest_brief=1 --gtest_filter='WorkerPool.*'
+	@build/tsan/tests/cpp/test_solvers --gtest_brief=1 --gtest_filter='SolverThreads.*'
 	@build/tsan/tests/cpp/test_world --gtest_brief=1 --gtest_filter='Batch.*'
 
 # The interpreter is not built for them, so the sanitizer's library must be loaded first; pybind11's exceptions need the

@@ -120,7 +120,7 @@ def fluids(report: Report, quick: bool) -> None:
     report.table("Flagella of 68 nodes in a fluid", ("flagella", "ms a step"), rows)
 
 
-def pile(rods: int) -> withe.Simulation:
+def pile(rods: int, threads: int = 1) -> withe.Simulation:
     """Rods of 20 nodes, laid crosswise in layers on a floor."""
     scene = withe.Scene()
     rubber = withe.Material(youngs_modulus=1e6, poisson_ratio=0.5, density=1000.0)
@@ -137,7 +137,7 @@ def pile(rods: int) -> withe.Simulation:
         scene.add_rod(start=points[0], end=points[1], nodes=20, radius=PILE_RADIUS, material=rubber)
     scene.add_floor(friction=0.3)
     scene.enable_contact(friction=0.3, friction_model="lagged")
-    return scene.build(integrator="backward_euler", time_step=1e-3)
+    return scene.build(integrator="backward_euler", time_step=1e-3, threads=threads)
 
 
 def piles(report: Report, quick: bool) -> None:

@@ -1,4 +1,4 @@
-"""Many simulations side by side, the time to build a large scene, and the explicit step beside PyElastica's.
+"""Simulations side by side, one scene on two threads, the time to build, and an explicit step beside PyElastica's.
 
 python benchmarks/parallel.py [--quick]
 """
@@ -8,6 +8,7 @@ from __future__ import annotations
 import time
 
 import numpy as np
+from contact import pile
 from reporting import HAVE_ELASTICA, Report, Timing, arguments, bar, interleaved
 from rods_in_motion import CASES, simulation
 
@@ -39,6 +40,61 @@ def run_many(report: Report, quick: bool) -> None:
     report.figures["run_many"] = {"first": alone, "one": one.as_json(), "two": two.as_json(), "equal to the bit": same}
     report.goal("run_many, times faster on 2 threads", one.median / two.median, 1.8)
     report.goal("run_many, results that differ from one thread's", 0.0 if same else 1.0, 0, at_least=False)
+
+
+def _net(cords: int, threads: int) -> withe.Simulation:
+    """A square net of cords, pinned at each crossing, that hangs from its border."""
+    scene = withe.Scene()
+    rubber = withe.Material(youngs_modulus=1e7, poisson_ratio=0.5, density=1000.0)
+    length, nodes = 0.05 * (cords + 1), 4 * (cords + 1) + 1
+    lines = 0.05 * np.arange(1, cords + 1)
+    along = [
+        scene.add_rod(start=(0, y, 0), end=(length, y, 0), nodes=nodes, radius=1e-3, material=rubber) for y in lines
+    ]
+    across = [
+        scene.add_rod(start=(x, 0, 0), end=(x, length, 0), nodes=nodes, radius=1e-3, material=rubber) for x in lines
+    ]
+    for i, a in enumerate(along):
+        for j, b in enumerate(across):
+            scene.join(a.node(4 * (j + 1)), b.node(4 * (i + 1)), kind="pinned")
+    for cord in (*along, *across):
+        scene.pin(cord.start)
+        scene.pin(cord.end)
+    return scene.build(integrator="backward_euler", threads=threads)
+
+
+def one_scene(report: Report, quick: bool) -> None:
+    """Steps of large scenes on one thread and on two."""
+    cords, rods, steps, rounds = (6, 20, 1, 1) if quick else (40, 1000, 4, 5)
+    makers = {
+        f"net of {cords} cords a side": lambda threads: _net(cords, threads),
+        f"pile of {rods:,} rods": lambda threads: pile(rods, threads),
+    }
+    rows = []
+    for name, make in makers.items():
+        simulations = {str(threads): make(threads) for threads in (1, 2)}
+
+        def stepped(threads: str, simulations: dict[str, withe.Simulation] = simulations) -> float:
+            start = time.perf_counter()
+            simulations[threads].step(steps)
+            return (time.perf_counter() - start) / steps
+
+        for threads in simulations:
+            stepped(threads)
+        timings = interleaved({threads: lambda threads=threads: stepped(threads) for threads in simulations}, rounds)
+        one, two = timings["1"], timings["2"]
+        same = np.array_equal(simulations["1"].positions(), simulations["2"].positions())
+        ratio = one.median / two.median
+        unknowns = simulations["1"].plan.unknowns
+        rows.append((name, f"{unknowns:,}", f"{1e3 * one.median:.1f}", f"{1e3 * two.median:.1f}", f"{ratio:.2f}"))
+        report.figures[name] = {"one": one.as_json(), "two": two.as_json(), "equal to the bit": same}
+        report.goal(f"{name}, times faster on 2 threads", None if quick else ratio, 1.6)
+        report.goal(f"{name}, results that differ from one thread's", 0.0 if same else 1.0, 0, at_least=False)
+    report.table(
+        "A step of one scene, on one thread and on two (time on the wall)",
+        ("scene", "unknowns", "one thread [ms]", "two threads [ms]", "times faster"),
+        rows,
+    )
 
 
 def _hundred_rods() -> withe.Scene:
@@ -110,11 +166,11 @@ def explicit_step(report: Report, quick: bool) -> None:
 
 
 def main() -> None:
-    """All three."""
+    """All four."""
     quick = arguments(__doc__).quick
     report = Report("parallel", quick=quick)
-    with bar(3, "parallel", "parts") as shown:
-        for part in (run_many, start_up, explicit_step):
+    with bar(4, "parallel", "parts") as shown:
+        for part in (run_many, one_scene, start_up, explicit_step):
             part(report, quick)
             shown.advance(1)
     report.write()

@@ -215,6 +215,7 @@ void Assembler::analyse() {
   pattern_ = SparsityPattern::from_cliques(model_.dof_count, cliques);
   if (!carried_.empty()) set_beside();
   solver_ = make_linear_solver(pattern_, symmetry_, kind_);
+  solver_->share_work(workers_);
   const auto first = static_cast<std::ptrdiff_t>(solver_->values().size()) - pattern_.beside;
   for (std::ptrdiff_t& place : beside_)
     if (place >= 0) place += first;

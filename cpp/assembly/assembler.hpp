@@ -104,6 +104,12 @@ class Assembler {
   std::ptrdiff_t place(int row, int column) const;
   LinearSolver& solver() { return *solver_; }
   const LinearSolver& solver() const { return *solver_; }
+  /// Threads that share the work of this and all later solvers; null: none.
+  void share_work(WorkerPool* workers) {
+    workers_ = workers;
+    solver_->share_work(workers);
+  }
+  WorkerPool* workers() const { return workers_; }
   /// Places of the diagonal in the solver's values, per unknown.
   const std::vector<std::ptrdiff_t>& diagonal_offsets() const { return diagonal_; }
   double diagonal(int dof) const {
@@ -211,6 +217,7 @@ class Assembler {
   std::vector<std::vector<int>> groups_;   ///< groups of custom forces
   SparsityPattern pattern_;
   std::unique_ptr<LinearSolver> solver_;
+  WorkerPool* workers_ = nullptr;
   std::vector<std::ptrdiff_t> diagonal_;
   std::vector<std::ptrdiff_t> entries_;  ///< entries of the pattern, one after the other; exact matrices only
   std::vector<Block> blocks_;

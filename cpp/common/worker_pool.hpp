@@ -21,7 +21,7 @@ class WorkerPool {
 
   /// Calls work(i) once for every i below `count`, in any order, and returns when all calls have ended. While the
   /// calling thread waits for the others, it calls `waiting` about every 20 ms. Neither function may throw.
-  void run(std::size_t count, const std::function<void(std::size_t)>& work, const std::function<void()>& waiting);
+  void run(std::size_t count, const std::function<void(std::size_t)>& work, const std::function<void()>& waiting = {});
 
  private:
   struct Crew;

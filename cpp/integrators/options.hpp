@@ -27,6 +27,7 @@ struct Options {
   int max_iterations = 40;        ///< per Newton solve
   std::optional<long> max_steps;  ///< inner steps in one time step under `tolerance`; empty: see `kMaxWork`
   int max_halvings = 12;          ///< smallest step is time_step / 2^max_halvings
+  int threads = 1;                ///< threads that share the work of a step
   Without heuristics;             ///< heuristics that measurements switch off
 };
 

@@ -22,8 +22,12 @@ void Systems::build(const Model& model, const Options& options) {
   drop_others();
   model_ = &model;
   options_ = &options;
+  if (options.threads == 1)
+    workers_.reset();
+  else if (!workers_ || workers_->workers() != options.threads)
+    workers_ = std::make_unique<WorkerPool>(options.threads);
   newton_ = std::make_unique<Newton>(model, options);
-  scheme_ = std::make_unique<Equations>(model, equation_options(options));
+  scheme_ = std::make_unique<Equations>(model, scheme_options());
 }
 
 void Systems::drop_others() {
@@ -41,10 +45,18 @@ void Systems::drop_scratch() {
   work = std::move(fresh);
 }
 
+EquationOptions Systems::scheme_options() const {
+  EquationOptions result = equation_options(*options_);
+  result.workers = workers_.get();
+  return result;
+}
+
 EquationOptions Systems::static_options() const {
   Options symmetric = *options_;
   symmetric.integrator = Integrator::statics;
-  return equation_options(symmetric);
+  EquationOptions result = equation_options(symmetric);
+  result.workers = workers_.get();
+  return result;
 }
 
 Equations& Systems::statics() {

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 
+#include "common/worker_pool.hpp"
 #include "gradients/step_gradient.hpp"
 #include "integrators/dynamics.hpp"
 
@@ -38,7 +39,8 @@ class Systems {
   Equations& statics();
   /// Symmetric equations for read-outs, which leave every factorisation alone.
   Equations& readout() const;
-  /// Form of symmetric equations of equilibria.
+  /// Form of the equations of the time steps, and of symmetric equations of equilibria.
+  EquationOptions scheme_options() const;
   EquationOptions static_options() const;
   /// The adjoint of equilibria.
   StepGradient& gradient() const;
@@ -60,6 +62,7 @@ class Systems {
 
   const Model* model_ = nullptr;
   const Options* options_ = nullptr;
+  std::unique_ptr<WorkerPool> workers_;  ///< none where one thread does the work
   std::unique_ptr<Newton> newton_;
   std::unique_ptr<Equations> scheme_, statics_;
   mutable std::unique_ptr<Equations> readout_;

@@ -12,6 +12,8 @@
 
 namespace withe {
 
+class WorkerPool;
+
 /// Pattern of a square matrix, structurally symmetric, column by column, rows sorted, diagonal included.
 struct SparsityPattern {
   int size = 0;
@@ -70,6 +72,9 @@ class LinearSolver {
   /// y = A x with the unfactorised values().
   virtual void multiply(std::span<const double> x, std::span<double> y) const = 0;
   virtual std::unique_ptr<LinearSolver> clone() const = 0;
+  /// Lets several threads factorise and solve where this pays; null: this thread alone. Results have the same bits.
+  /// `workers` must outlive the solver and its clones.
+  virtual void share_work(WorkerPool* /*workers*/) {}
 };
 
 /// Analyses the pattern once. `automatic` takes the band when its half bandwidth is at most 24.

@@ -1,33 +1,61 @@
 #include "solvers/multifrontal.hpp"
 
 #include <algorithm>
+#include <atomic>
+#include <functional>
+#include <numeric>
 #include <vector>
 
+#include "common/worker_pool.hpp"
+#include "solvers/elimination_parts.hpp"
 #include "solvers/front_kernels.hpp"
+#include "solvers/parallel_front.hpp"
 #include "solvers/pattern_lookup.hpp"
 #include "solvers/supernodes.hpp"
 
 namespace withe {
 namespace {
 
+// Operations and entries of L below which a level is left to one thread: waking the others takes as long.
+constexpr double kMinShared = 2e5, kMinSharedEntries = 2e5;
+
 int padded(int length) { return (length + kFrontPadding - 1) / kFrontPadding * kFrontPadding; }
+
+/// Sets columns to zero, in large matrices only from the diagonal down.
+void clear_columns(double* column, int length, int count) {
+  if (count <= kPanelColumns) {
+    std::fill_n(column, std::ptrdiff_t{length} * count, 0.0);
+    return;
+  }
+  for (int c = 0; c < count; ++c, column += length) {
+    const int row = c / kFrontPadding * kFrontPadding;
+    std::fill_n(column + row, length - row, 0.0);
+  }
+}
 
 /// values(): column by column, in the order of the pattern; symmetric: the lower triangle.
 ///
-/// Multifrontal method [Liu 1992]. The columns of a supernode are eliminated in a dense front. The remaining matrix of
-/// the front is put on a stack, and the front of the parent adds it. Patterns and places are computed once, and the
-/// numeric phase uses them. An unsymmetric matrix has two sides, one for L and one for W. Each side has its own fronts.
+/// Multifrontal method [Liu 1992]. The columns of a supernode are eliminated in a dense front. The front of the parent
+/// adds the remaining matrix. Patterns and places are computed once, and the numeric phase uses them. An unsymmetric
+/// matrix has two sides, one for L and one for W. Each side has its own fronts.
+///
+/// Several threads share the subtrees of `EliminationParts`, and then the supernodes above them, level by level. Each
+/// subtree has a stack of remaining matrices, each supernode above has a place of its own. Sums do not depend on
+/// threads.
 class Multifrontal final : public LinearSolver {
  public:
   Multifrontal(const SparsityPattern& pattern, Symmetry symmetry)
       : pattern_(pattern),
         sides_(symmetry == Symmetry::symmetric ? 1 : 2),
         nodes_(find_supernodes(pattern)),
+        parts_(divide(nodes_)),
         inverse_pivots_(pattern.size, 0.0),
         work_(pattern.size) {
     number_values();
+    find_children();
     make_room();
     find_places();
+    make_vectors();
   }
 
   int size() const override { return pattern_.size; }
@@ -43,36 +71,28 @@ class Multifrontal final : public LinearSolver {
   Factorization factorize(std::span<const double> shift) override {
     require_shift(shift, size());
     factorized_ = false;
-    Factorization result;
-    std::fill(factor_.begin(), factor_.end(), 0.0);
-    for (std::size_t p = 0; p < places_.size(); ++p) factor_[places_[p]] = values_[p];
-    if (!shift.empty())
-      for (int k = 0; k < size(); ++k) factor_[pivots_[k]] += shift[nodes_.order[k]];
-    std::ptrdiff_t top = 0;  // top of the stack
-    for (int s = 0; s < nodes_.count(); ++s) {
-      Front fronts[2];
-      for (int side = 0; side < sides_; ++side) {
-        fronts[side] = front_of(s, side);
-        fronts[side].rest = rest_.data() + top + side * rest_side_size(s);
-      }
-      std::fill_n(rest_.begin() + top, rest_size(s), 0.0);
-      std::ptrdiff_t below = top;
-      for (int child = last_child_[s]; child >= 0; child = sibling_[child]) {
-        below -= rest_size(child);
-        for (int side = 0; side < sides_; ++side)
-          add_rest(child, rest_.data() + below + side * rest_side_size(child), fronts[side]);
-      }
-      front_kernels().eliminate(fronts[0], fronts[sides_ - 1]);
-      for (int c = 0; c < fronts[0].columns; ++c) {
-        const double pivot = fronts[0].factor[std::ptrdiff_t{fronts[0].length} * c + c];
-        if (!is_usable_pivot(pivot)) return {FactorStatus::singular, 0};
-        result.negative_pivots += sides_ == 1 && pivot < 0.0;
-      }
-      if (below < top) std::copy_n(rest_.begin() + top, rest_size(s), rest_.begin() + below);
-      top = below + rest_size(s);
+    std::atomic<int> negative = 0;
+    std::atomic<bool> usable = true;
+    run(parts_.subtrees.size(), [&](std::size_t i) {
+      for (int s = parts_.subtrees[i].first; s < parts_.subtrees[i].end && usable; ++s)
+        eliminate(s, shift, nullptr, negative, usable);
+    });
+    for (const EliminationParts::Level& level : parts_.levels) {
+      if (!usable) break;
+      const bool shared = workers_ && level.operations >= kMinShared;
+      // Supernodes that would keep one thread busy longer than the others.
+      std::size_t large = 0;
+      while (shared && large < level.supernodes.size() &&
+             nodes_.operations(level.supernodes[large]) * workers_->workers() > level.operations)
+        eliminate(level.supernodes[large++], shift, workers_, negative, usable);
+      const auto others = [&](std::size_t i) {
+        eliminate(level.supernodes[large + i], shift, nullptr, negative, usable);
+      };
+      run(level.supernodes.size() - large, others, shared);
     }
+    if (!usable) return {FactorStatus::singular, 0};
     factorized_ = true;
-    return result;
+    return {FactorStatus::ok, sides_ == 1 ? negative.load() : 0};
   }
 
   void solve(std::span<double> right_hand_side) const override { solve(right_hand_side, 0, sides_ - 1); }
@@ -94,7 +114,20 @@ class Multifrontal final : public LinearSolver {
 
   std::unique_ptr<LinearSolver> clone() const override { return std::make_unique<Multifrontal>(*this); }
 
+  void share_work(WorkerPool* workers) override {
+    const bool shared = workers && workers->workers() > 1 && !parts_.undivided(), before = workers_;
+    workers_ = shared ? workers : nullptr;
+    if (shared != before) make_room();
+  }
+
  private:
+  /// Calls work(i) for each i below `count`, by several threads where that is allowed. Does not allocate.
+  template <class Work>
+  void run(std::size_t count, const Work& work, bool shared = true) const {
+    if (workers_ && shared) return workers_->run(count, std::ref(work));
+    for (std::size_t i = 0; i < count; ++i) work(i);
+  }
+
   Front front_of(int s, int side) const {
     Front front;
     front.columns = nodes_.columns(s);
@@ -103,19 +136,99 @@ class Multifrontal final : public LinearSolver {
     front.rest_length = padded(nodes_.rest(s));
     front.factor = factor_.data() + side * side_size_ + factor_starts_[s];
     front.inverse_pivots = inverse_pivots_.data() + nodes_.column_starts[s];
-    front.scratch = scratch_.data() + side * scratch_size_;
+    front.scratch = scratch_.data() + scratch_starts_[s] + side * std::ptrdiff_t{front.length} * front.columns;
+    front.rest = rest_.data() + built_at_[s] + side * rest_side_size(s);
     return front;
+  }
+
+  /// Eliminates the columns of a supernode, whose children are done. `workers`: threads that share its front.
+  void eliminate(int s, std::span<const double> shift, WorkerPool* workers, std::atomic<int>& negative,
+                 std::atomic<bool>& usable) {
+    const Front fronts[2] = {front_of(s, 0), front_of(s, sides_ - 1)};
+    for (int side = 0; side < sides_; ++side) {
+      clear_columns(fronts[side].factor, fronts[side].length, fronts[side].columns);
+      for (int p = entry_starts_[side][s]; p < entry_starts_[side][s + 1]; ++p)
+        fronts[side].factor[entries_[side][p].place] = values_[entries_[side][p].value];
+      clear_columns(fronts[side].rest, fronts[side].rest_length, nodes_.rest(s));
+    }
+    if (!shift.empty())
+      for (int c = 0; c < fronts[0].columns; ++c)
+        fronts[0].factor[std::ptrdiff_t{fronts[0].length} * c + c] += shift[nodes_.order[nodes_.column_starts[s] + c]];
+    for (int child = last_child_[s]; child >= 0; child = sibling_[child])
+      for (int side = 0; side < sides_; ++side)
+        add_rest(child, rest_.data() + kept_at_[child] + side * rest_side_size(child), fronts[side]);
+    if (workers)
+      eliminate_together(*workers, fronts[0], fronts[sides_ - 1]);
+    else
+      front_kernels().eliminate(fronts[0], fronts[sides_ - 1]);
+    int below_zero = 0;
+    for (int c = 0; c < fronts[0].columns; ++c) {
+      const double pivot = fronts[0].factor[std::ptrdiff_t{fronts[0].length} * c + c];
+      if (!is_usable_pivot(pivot)) usable = false;
+      below_zero += pivot < 0.0;
+    }
+    negative += below_zero;
+    if (kept_at_[s] < built_at_[s])
+      std::copy_n(rest_.begin() + built_at_[s], rest_size(s), rest_.begin() + kept_at_[s]);
   }
 
   void solve(std::span<double> right_hand_side, int down, int up) const {
     require_solvable(factorized_, right_hand_side, size());
     for (int k = 0; k < size(); ++k) work_[k] = right_hand_side[nodes_.order[k]];
-    const FrontKernels& kernels = front_kernels();
-    const auto x = [&](int s) { return work_.data() + nodes_.column_starts[s]; };
-    const auto rows = [&](int s) { return nodes_.rows.data() + nodes_.row_starts[s]; };
-    for (int s = 0; s < nodes_.count(); ++s) kernels.solve_down(front_of(s, down), x(s), rows(s), work_.data());
-    for (int s = nodes_.count() - 1; s >= 0; --s) kernels.solve_up(front_of(s, up), x(s), rows(s), work_.data());
+    const bool shared = workers_ && kMinSharedEntries <= static_cast<double>(factor_.size());
+    run(parts_.subtrees.size(), [&](std::size_t i) { solve_down(parts_.subtrees[i], down); }, shared);
+    for (const EliminationParts::Level& level : parts_.levels)
+      run(
+          level.supernodes.size(), [&](std::size_t i) { solve_down(level.supernodes[i], down); },
+          level.entries >= kMinSharedEntries);
+    for (auto level = parts_.levels.rbegin(); level != parts_.levels.rend(); ++level)
+      run(
+          level->supernodes.size(), [&](std::size_t i) { solve_up(level->supernodes[i], up); },
+          level->entries >= kMinSharedEntries);
+    run(
+        parts_.subtrees.size(),
+        [&](std::size_t i) {
+          for (int s = parts_.subtrees[i].end - 1; s >= parts_.subtrees[i].first; --s) solve_up(s, up);
+        },
+        shared);
     for (int k = 0; k < size(); ++k) right_hand_side[nodes_.order[k]] = work_[k];
+  }
+
+  /// Solves L x = x in the columns of a subtree. The products with x, which are to be subtracted from the rows below
+  /// its root, are summed in the vector of the root.
+  void solve_down(const EliminationParts::Subtree& subtree, int side) const {
+    const int root = subtree.end - 1, first = nodes_.column_starts[subtree.first];
+    const int columns = nodes_.column_starts[subtree.end] - first;
+    const bool undivided = parts_.undivided();
+    double* x = undivided ? work_.data() : vectors_.data() + vector_starts_[root];
+    if (!undivided) {
+      std::copy_n(work_.data() + first, columns, x);
+      std::fill_n(x + columns, nodes_.rest(root), 0.0);
+    }
+    for (int s = subtree.first; s < subtree.end; ++s)
+      front_kernels().solve_down(front_of(s, side), x + nodes_.column_starts[s] - first,
+                                 rows_in_subtree_.data() + nodes_.row_starts[s], x);
+    if (!undivided) std::copy_n(x, columns, work_.data() + first);
+  }
+
+  /// As above, for one supernode above the subtrees: its vector has its columns and the rows below.
+  void solve_down(int s, int side) const {
+    const int columns = nodes_.columns(s);
+    double *x = vectors_.data() + vector_starts_[s], *own = work_.data() + nodes_.column_starts[s];
+    std::copy_n(own, columns, x);
+    std::fill_n(x + columns, nodes_.rest(s), 0.0);
+    for (int child = last_child_[s]; child >= 0; child = sibling_[child]) {
+      const double* below = vectors_.data() + below_starts_[child];
+      const int* place = rows_in_parent_.data() + nodes_.row_starts[child];
+      for (int r = 0; r < nodes_.rest(child); ++r) x[place[r]] += below[r];
+    }
+    front_kernels().solve_down(front_of(s, side), x, successive_.data(), x + columns);
+    std::copy_n(x, columns, own);
+  }
+
+  void solve_up(int s, int side) const {
+    front_kernels().solve_up(front_of(s, side), work_.data() + nodes_.column_starts[s],
+                             nodes_.rows.data() + nodes_.row_starts[s], work_.data());
   }
 
   /// Numbers on the stack.
@@ -135,28 +248,100 @@ class Multifrontal final : public LinearSolver {
     }
   }
 
-  /// Allocates memory for L and W, and for the greatest size of the stack.
-  void make_room() {
-    const int count = nodes_.count();
-    last_child_.assign(count, -1);
-    sibling_.assign(count, -1);
-    std::ptrdiff_t top = 0, highest = 0;
-    for (int s = 0; s < count; ++s) {
-      const std::ptrdiff_t stored = std::ptrdiff_t{padded(nodes_.columns(s) + nodes_.rest(s))} * nodes_.columns(s);
-      factor_starts_.push_back(side_size_);
-      side_size_ += stored;
-      scratch_size_ = std::max(scratch_size_, stored);
-      highest = std::max(highest, top + rest_size(s));
-      for (int child = last_child_[s]; child >= 0; child = sibling_[child]) top -= rest_size(child);
-      top += rest_size(s);
+  void find_children() {
+    last_child_.assign(nodes_.count(), -1);
+    sibling_.assign(nodes_.count(), -1);
+    for (int s = 0; s < nodes_.count(); ++s) {
       const int parent = nodes_.parent[s];
       if (parent < 0) continue;
       sibling_[s] = last_child_[parent];
       last_child_[parent] = s;
     }
-    factor_.assign(static_cast<std::size_t>(side_size_ * sides_) + kPadding, 0.0);
-    rest_.assign(static_cast<std::size_t>(highest) + kPadding, 0.0);
-    scratch_.assign(static_cast<std::size_t>(scratch_size_ * sides_) + kPadding, 0.0);
+  }
+
+  /// Allocates memory for L and W, and for the remaining matrices. Those of the roots of subtrees and of supernodes
+  /// above have places of their own. The others are on a stack. Threads need a stack and scratch each.
+  void make_room() {
+    const int count = nodes_.count();
+    factor_starts_.resize(count);
+    scratch_starts_.resize(count);
+    built_at_.resize(count);
+    kept_at_.resize(count);
+    side_size_ = 0;
+    const auto stored = [&](int s) {
+      return std::ptrdiff_t{padded(nodes_.columns(s) + nodes_.rest(s))} * nodes_.columns(s);
+    };
+    for (int s = 0; s < count; ++s) {
+      factor_starts_[s] = side_size_;
+      side_size_ += stored(s) + kFrontPadding;  // kernels read so many numbers after the last column
+    }
+    std::ptrdiff_t rest_end = 0, rest_size_needed = 0, scratch_end = 0, scratch_size_needed = 0;
+    const auto keep = [&](int s) {
+      built_at_[s] = kept_at_[s] = rest_end;
+      rest_end += rest_size(s);
+    };
+    for (const EliminationParts::Level& level : parts_.levels) {
+      for (int s : level.supernodes) {
+        keep(s);
+        scratch_starts_[s] = scratch_end;
+        scratch_size_needed = std::max(scratch_size_needed, scratch_end + sides_ * stored(s));
+        if (workers_) scratch_end += sides_ * stored(s);
+      }
+    }
+    if (!parts_.undivided())
+      for (const EliminationParts::Subtree& subtree : parts_.subtrees) keep(subtree.end - 1);
+    for (const EliminationParts::Subtree& subtree : parts_.subtrees) {
+      std::ptrdiff_t top = rest_end, highest = rest_end, scratch = 0;
+      for (int s = subtree.first; s < subtree.end; ++s) {
+        scratch_starts_[s] = scratch_end;
+        scratch = std::max(scratch, sides_ * stored(s));
+        if (s == subtree.end - 1 && !parts_.undivided()) continue;
+        built_at_[s] = top;
+        highest = std::max(highest, top + rest_size(s));
+        for (int child = last_child_[s]; child >= 0; child = sibling_[child]) top -= rest_size(child);
+        kept_at_[s] = top;
+        top += rest_size(s);
+      }
+      rest_size_needed = std::max(rest_size_needed, highest);
+      scratch_size_needed = std::max(scratch_size_needed, scratch_end + scratch);
+      if (!workers_) continue;
+      rest_end = highest;
+      scratch_end += scratch;
+    }
+    factor_.resize(static_cast<std::size_t>(side_size_ * sides_) + kPadding, 0.0);
+    rest_.resize(static_cast<std::size_t>(std::max(rest_end, rest_size_needed)) + kPadding, 0.0);
+    scratch_.resize(static_cast<std::size_t>(scratch_size_needed) + kPadding, 0.0);
+  }
+
+  /// Vectors of the roots of subtrees and of the supernodes above, see `solve_down`.
+  void make_vectors() {
+    rows_in_subtree_ = nodes_.rows;
+    successive_.resize(size());
+    std::iota(successive_.begin(), successive_.end(), 0);
+    if (parts_.undivided()) return;
+    vector_starts_.assign(nodes_.count(), -1);
+    below_starts_.assign(nodes_.count(), -1);
+    std::ptrdiff_t end = 0;
+    const auto add = [&](int s, int columns) {
+      vector_starts_[s] = end;
+      below_starts_[s] = end + columns;
+      end += columns + nodes_.rest(s);
+    };
+    for (const EliminationParts::Subtree& subtree : parts_.subtrees) {
+      const int root = subtree.end - 1, first = nodes_.column_starts[subtree.first];
+      const int columns = nodes_.column_starts[subtree.end] - first;
+      add(root, columns);
+      const auto below = nodes_.rows.begin() + nodes_.row_starts[root], end_below = below + nodes_.rest(root);
+      for (int r = nodes_.row_starts[subtree.first]; r < nodes_.row_starts[subtree.end]; ++r) {
+        const int row = nodes_.rows[r];
+        rows_in_subtree_[r] = row < first + columns
+                                  ? row - first
+                                  : columns + static_cast<int>(std::lower_bound(below, end_below, row) - below);
+      }
+    }
+    for (const EliminationParts::Level& level : parts_.levels)
+      for (int s : level.supernodes) add(s, nodes_.columns(s));
+    vectors_.assign(static_cast<std::size_t>(end) + kPadding, 0.0);
   }
 
   void number_values() {
@@ -170,8 +355,8 @@ class Multifrontal final : public LinearSolver {
   }
 
   /// Place in values_ of entry p of the pattern.
-  std::ptrdiff_t number_of(std::ptrdiff_t p, int column) const {
-    return p - pattern_.column_starts[column + 1] + value_starts_[column + 1];
+  int number_of(std::ptrdiff_t p, int column) const {
+    return static_cast<int>(p) - pattern_.column_starts[column + 1] + value_starts_[column + 1];
   }
 
   /// Mirrored entry for each entry of the pattern. Rows are sorted, so that the entries of a row are found in the order
@@ -188,9 +373,8 @@ class Multifrontal final : public LinearSolver {
     const std::vector<int> mirror = find_mirrors();
     std::vector<int> place(size()), row_of(size());
     for (int k = 0; k < size(); ++k) place[nodes_.order[k]] = k;
-    places_.resize(static_cast<std::size_t>(value_starts_.back()));
-    pivots_.resize(size());
     rows_in_parent_.resize(nodes_.rows.size());
+    for (int side = 0; side < sides_; ++side) entry_starts_[side].assign(1, 0);
     for (int s = 0; s < nodes_.count(); ++s) {
       const int first = nodes_.column_starts[s], columns = nodes_.columns(s), length = front_of(s, 0).length;
       const int* rows = nodes_.rows.data() + nodes_.row_starts[s];
@@ -201,23 +385,28 @@ class Multifrontal final : public LinearSolver {
           rows_in_parent_[r] = row_of[nodes_.rows[r]];
       for (int c = 0; c < columns; ++c) {
         const int old = nodes_.order[first + c];
-        const std::ptrdiff_t column = factor_starts_[s] + std::ptrdiff_t{length} * c;
-        pivots_[first + c] = column + c;
+        const int column = length * c;
         for (int p = pattern_.column_starts[old]; p < pattern_.column_starts[old + 1]; ++p) {
           const int other = pattern_.row_indices[p];
           if (place[other] < first + c) continue;
-          const std::ptrdiff_t own = number_of(p, old), mirrored = number_of(mirror[p], other);
-          const std::ptrdiff_t to = column + row_of[place[other]];
+          const int own = number_of(p, old), mirrored = number_of(mirror[p], other);
+          const int to = column + row_of[place[other]];
           if (sides_ == 1) {
-            places_[other >= old ? own : mirrored] = to;
+            entries_[0].push_back({other >= old ? own : mirrored, to});
           } else {
-            places_[mirrored] = side_size_ + to;
-            places_[own] = to;  // the diagonal is its own mirrored entry and belongs to the lower side
+            entries_[0].push_back({own, to});
+            if (other != old) entries_[1].push_back({mirrored, to});  // the diagonal belongs to the lower side
           }
         }
       }
+      for (int side = 0; side < sides_; ++side) entry_starts_[side].push_back(static_cast<int>(entries_[side].size()));
     }
   }
+
+  /// Place of a value in the columns of its front.
+  struct Entry {
+    int value, place;
+  };
 
   SparsityPattern pattern_;
   int sides_;
@@ -225,15 +414,20 @@ class Multifrontal final : public LinearSolver {
   std::vector<double> values_;
 
   Supernodes nodes_;
-  std::vector<int> last_child_, sibling_;            // of each supernode; a sibling precedes it
-  std::vector<int> rows_in_parent_;                  // per row below a supernode: its row in the parent's front
-  std::ptrdiff_t side_size_ = 0, scratch_size_ = 0;  // sizes for one side
-  std::vector<std::ptrdiff_t> factor_starts_;        // per supernode
-  std::vector<std::ptrdiff_t> places_;               // place of each value in factor_
-  std::vector<std::ptrdiff_t> pivots_;               // place of the pivot of each column, in the new order
+  EliminationParts parts_;
+  WorkerPool* workers_ = nullptr;
+  std::vector<int> last_child_, sibling_;  // of each supernode; a sibling precedes it
+  std::vector<int> rows_in_parent_;        // per row below a supernode: its row in the parent's front
+  std::vector<int> rows_in_subtree_;       // per row below a supernode of a subtree: its place in the root's vector
+  std::vector<int> successive_;            // 0, 1, 2, ...
+  std::ptrdiff_t side_size_ = 0;           // size of L
+  std::vector<std::ptrdiff_t> factor_starts_, scratch_starts_;  // per supernode
+  std::vector<std::ptrdiff_t> built_at_, kept_at_;              // its remaining matrix, while and after it is computed
+  std::vector<std::ptrdiff_t> vector_starts_, below_starts_;    // its vector, and the rows below its columns in it
+  std::vector<Entry> entries_[2];                               // supernode after supernode, per side
+  std::vector<int> entry_starts_[2];
   mutable std::vector<double> factor_, inverse_pivots_;
-  std::vector<double> rest_;
-  mutable std::vector<double> scratch_, work_;
+  mutable std::vector<double> rest_, scratch_, work_, vectors_;
   bool factorized_ = false;
 };
 

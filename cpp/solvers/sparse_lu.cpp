@@ -65,6 +65,7 @@ class SparseLu final : public LinearSolver {
   }
   void multiply(std::span<const double> x, std::span<double> y) const override { diagonal_pivots_->multiply(x, y); }
   std::unique_ptr<LinearSolver> clone() const override { return std::make_unique<SparseLu>(*this); }
+  void share_work(WorkerPool* workers) override { diagonal_pivots_->share_work(workers); }
 
  private:
   /// Solves A^T x = b, whose rows are together, with b_i = sqrt |a_ii|: it has the units of row i where unknowns are

@@ -9,9 +9,6 @@
 namespace withe {
 namespace {
 
-// Wider supernodes are divided, so that the columns that update a column stay in the cache.
-constexpr int kMostColumns = 48;
-
 // Operations per unknown above which dissection is tried too. It takes as long as ten factorisations of this cost, and
 // an order serves for a hundred.
 constexpr double kWorthDissecting = 5e3;
@@ -164,31 +161,33 @@ void add_groups(const SparsityPattern& pattern, const std::vector<Group>& groups
       result.parent[child] = result.count();
     }
     std::sort(rows.begin(), rows.end());
-    for (int column = groups[g].first; column < end;) {
-      const int next = std::min(column + kMostColumns, end);
-      result.column_starts.push_back(next);
-      for (int row = next; row < end; ++row) result.rows.push_back(row);
-      result.rows.insert(result.rows.end(), rows.begin(), rows.end());
-      result.row_starts.push_back(static_cast<int>(result.rows.size()));
-      result.parent.push_back(next < end ? result.count() + 1 : -1);
-      column = next;
-    }
+    result.column_starts.push_back(end);
+    result.rows.insert(result.rows.end(), rows.begin(), rows.end());
+    result.row_starts.push_back(static_cast<int>(result.rows.size()));
+    result.parent.push_back(-1);
     if (!rows.empty()) children[group_of[rows[0]]].push_back(result.count() - 1);
   }
 }
 
 }  // namespace
 
+double Supernodes::entries(int s) const { return columns(s) * (0.5 * (columns(s) + 1.0) + rest(s)); }
+
 double Supernodes::entries() const {
   double sum = 0.0;
-  for (int s = 0; s < count(); ++s) sum += columns(s) * (0.5 * (columns(s) + 1.0) + rest(s));
+  for (int s = 0; s < count(); ++s) sum += entries(s);
+  return sum;
+}
+
+double Supernodes::operations(int s) const {
+  double sum = 0.0;
+  for (double length = rest(s) + 1.0; length <= rest(s) + columns(s); ++length) sum += length * length;
   return sum;
 }
 
 double Supernodes::operations() const {
   double sum = 0.0;
-  for (int s = 0; s < count(); ++s)
-    for (double length = rest(s) + 1.0; length <= rest(s) + columns(s); ++length) sum += length * length;
+  for (int s = 0; s < count(); ++s) sum += operations(s);
   return sum;
 }
 

@@ -22,10 +22,12 @@ struct Supernodes {
   /// Numbers that L takes, its diagonal included, and additions and multiplications to find them; A is symmetric.
   double entries() const;
   double operations() const;
+  double entries(int s) const;  ///< of one supernode
+  double operations(int s) const;
 };
 
 /// Finds supernodes in the order of approximate minimum degree. If this order is costly and nested dissection costs
-/// less, the order is that of dissection. Children come right before their parent.
+/// less, the order is that of dissection. Every subtree is together, and its root comes last.
 Supernodes find_supernodes(const SparsityPattern& pattern);
 
 }  // namespace withe

@@ -41,6 +41,7 @@ Equations::Equations(const Model& model, const EquationOptions& options)
                  options.solver, options.exact),
       static_duration_(options.static_duration),
       joint_wrenches_(model) {
+  assembler_.share_work(options.workers);
   problem_.exact = options.exact;
   if (contact()) {
     assembler_.couple(terms_.contact->rows().unknowns(), kContactUnknowns);

@@ -30,6 +30,7 @@ struct EquationOptions {
   /// True if matrices have every derivative, including the rows and columns of held unknowns. They are then not
   /// projected, and often unsymmetric.
   bool exact = false;
+  WorkerPool* workers = nullptr;  ///< threads that share the work of these equations, which they must outlive; or null
 };
 
 class Equations {

@@ -49,7 +49,8 @@ void register_integrators(py::module_& module) {
       .def_readwrite("force_tolerance", &Options::force_tolerance)
       .def_readwrite("max_iterations", &Options::max_iterations)
       .def_readwrite("max_halvings", &Options::max_halvings)
-      .def_readwrite("max_steps", &Options::max_steps);
+      .def_readwrite("max_steps", &Options::max_steps)
+      .def_readwrite("threads", &Options::threads);
   def_word(options, "integrator", &Options::integrator, kIntegrators);
   def_word(options, "solver", &Options::solver, kSolvers);
   options.def("switch_off",

@@ -92,6 +92,7 @@ class BuildOptions:
     planar: bool | None
     duration: float | None
     bending: Bending
+    threads: int
     solver: Solver
 
     def checked(self) -> BuildOptions:
@@ -113,6 +114,7 @@ class BuildOptions:
             duration=None if self.duration is None else validation.positive(self.duration, "duration"),
             adaptive=validation.truth(self.adaptive, "adaptive"),
             planar=None if self.planar is None else validation.truth(self.planar, "planar"),
+            threads=validation.integer(self.threads, "threads", 1, 256),
         )
         if checked.tolerance is not None and self.integrator in ("verlet", "static"):
             raise ValueError(f"tolerance must be None with integrator={self.integrator!r}")
