@@ -94,6 +94,16 @@ void find_held_velocity(const Model& model, const HeldTarget& held, const StepPl
   }
 }
 
+/// True if supports move bodies that keep some freedom, or contradict velocities that a user has set.
+bool moves_bodies(const Model& model, const HeldTarget& held, const StepPlan& plan, const State& state) {
+  if (plan.rule == StepRule::backward_euler) return false;
+  const auto is_free = [](const CarriedPart& part) { return part.is_node() && !part.is_held; };
+  if (std::none_of(model.carried.begin(), model.carried.end(), is_free)) return false;
+  return std::any_of(model.constraints.begin(), model.constraints.end(), [&](const Constraint& c) {
+    return !c.held_change(state.q, held.q).isZero(0.0) || !c.held(state.v).isZero(0.0);
+  });
+}
+
 /// Time between the velocities of supports before and after a step. Velocities of backward Euler are means over its
 /// steps, in their middles, which matters if the last step was much longer.
 double held_time(const StepPlan& plan, const State& state) {
@@ -213,6 +223,7 @@ void find_end_velocity(const Equations& equations, const StepPlan& plan, const S
   if (plan.rule != StepRule::backward_euler) set_body_velocities(equations.model(), state.v, work.change, plan.dt, v1);
   balance_bodies(equations.problem(), work.newton.data, v1);
   clear_multipliers(equations.model(), v1);
+  if (equations.model().has_bodies()) work.formula_velocity = v1;
   equations.assembler().set_held_part(work.held_velocity, v1);
   work.follow_gain = 0.0;
   if (plan.rule == StepRule::backward_euler) return;
@@ -277,6 +288,23 @@ void add_rebounds(const Equations& equations, const Parameters& parameters, cons
   state.acceleration += (1.0 / dt) * (state.v - work.velocity);
 }
 
+/// Replaces the velocities at the end of a step in which supports move bodies. A support acts at a point of a body,
+/// with no moment about this point, so the momenta of the free unknowns are those of the midpoint formula 2 v - v0.
+/// That formula has another velocity of the point, `work.formula_velocity`, than the support. If the other velocities
+/// of the formula stayed, a body on a hinge that jumps to a new velocity would turn too fast and too slowly by turns.
+void add_support_impulse(const Equations& equations, const Parameters& parameters, const StepPlan& plan, State& state,
+                         StepWorkspace& work, StepResult& result) {
+  const Model& model = equations.model();
+  MassSystem& masses = work.masses(model);
+  if (!masses.begin(state, parameters)) return;
+  const double before = kinetic_energy(model, equations.mass(), state.v);
+  VectorX held = equations.assembler().held_part(state.v);
+  equations.assembler().set_held_part(work.formula_velocity, state.v);
+  masses.constrain(std::move(held), state.v);
+  result.support_work += kinetic_energy(model, equations.mass(), state.v) - before;
+  state.acceleration += (1.0 / plan.dt) * (state.v - work.velocity);
+}
+
 /// Velocities that a user sets body by body may violate the rates of closed loops of joints. An impulse of the joints
 /// makes them consistent. Returns the kinetic energy that the impulse removes [J].
 double make_rates_consistent(const Model& model, const Parameters& parameters, State& state, StepWorkspace& work) {
@@ -328,9 +356,11 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   work.difference = rate * work.change;
   predictor.record({state.time + 0.5 * dt, h, dt, plan.slot}, state.v, work.difference, acceleration,
                    equations.mass().rows);
+  const bool moves = holds && moves_bodies(model, prescribed.held, plan, state);
   const bool rebounds = work.rebounds.find(equations);
   if (Contact* contact = equations.contact()) result.dissipated -= contact->accept(state, std::max(contact_loss, 0.0));
   advance(equations, plan, q1, work, state);
+  if (moves) add_support_impulse(equations, parameters, plan, state, work, result);
   if (rebounds) add_rebounds(equations, parameters, plan, contact_loss, state, work, result);
   if (const HandForces* hands = equations.hands())
     result.support_work -= hands->accept(prescribed.supports, work.after, state);

@@ -39,6 +39,7 @@ struct StepWorkspace {
   double follow_gain = 0;  ///< kinetic energy that nodes of held bodies get from the velocities of supports [J]
   VectorX z, move, change, working, mean, velocity, held_velocity, held_acceleration, assumed, difference,
       whole_acceleration;
+  VectorX formula_velocity;  ///< at the end of a step with bodies, before supports replace the velocities they hold
   Rebounds rebounds;
   std::unique_ptr<MassSystem> mass_system;  ///< null until it is needed
   PressureGains pressure;                   ///< energy gains of a backward Euler step under `adaptive`

@@ -68,17 +68,19 @@ void MassSystem::evaluate_loops(const VectorX& z, std::span<double> values) {
 
 /// The sum of held velocities h and x that minimises (v - h - x) . M (v - h - x) with G (h + x) = 0, G the rates of the
 /// constraints. Rows of loops are linear: their change from q to q + h has the right-hand side of G x = -G h.
-double MassSystem::close_loops(VectorX& velocity) {
+double MassSystem::constrain(VectorX held, VectorX& velocity) {
   const Model& model = problem_.model;
   const VectorX& q = problem_.start->q;
   const double before = kinetic_energy(model, problem_.mass, velocity);
-  VectorX held = assembler_.held_part(velocity), rows;
   expand_step(problem_, q, held);
+  VectorX rows;
   multiply(model, problem_.mass, velocity - held, rows);
-  evaluate_loops(q, {});
-  rows += data_.gradient.head(model.dof_count);
-  evaluate_loops(q + held, {});
-  rows -= data_.gradient.head(model.dof_count);
+  if (loops_) {
+    evaluate_loops(q, {});
+    rows += data_.gradient.head(model.dof_count);
+    evaluate_loops(q + held, {});
+    rows -= data_.gradient.head(model.dof_count);
+  }
   fold(rows);
   solve(rows);
   velocity = held + rows;

@@ -26,7 +26,9 @@ class MassSystem {
   void solve(VectorX& rows);
   /// Replaces velocities by the nearest ones, measured by M, with which closed loops stay closed. Held velocities stay.
   /// Returns the kinetic energy that this removes [J].
-  double close_loops(VectorX& velocity);
+  double close_loops(VectorX& velocity) { return constrain(assembler_.held_part(velocity), velocity); }
+  /// As `close_loops`, but held velocities become the given ones, by an impulse of the supports.
+  double constrain(VectorX held, VectorX& velocity);
   const MassMatrix& mass() const { return problem_.mass; }
 
  private:

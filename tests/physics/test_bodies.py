@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -482,6 +484,42 @@ def test_small_oscillations_of_a_compound_pendulum() -> None:
     found = scene.build(integrator="static").linearise().frequencies(1)[0]
     expected = np.sqrt(mass * G * arm / (inertia + mass * arm**2)) / (2.0 * np.pi)
     assert found == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.case(
+    "bodies", "Bar on a hinge of the world that jumps to a speed and shakes", source="Lagrange's equation, integrated"
+)
+@pytest.mark.parametrize("integrator", ["energy_momentum", "implicit_midpoint"])
+@pytest.mark.parametrize("jump", [0.0, 0.5])
+def test_a_bar_on_a_hinge_that_jumps_and_shakes(jump: float, integrator: str) -> None:
+    """Angle and rate are of second order from the first step on, and the work of the hinge is the kinetic energy."""
+    arm, amplitude, rate = 0.2, 3.0, 7.0
+    inertia = (0.4**2 + 0.02**2) / 12.0 + arm**2
+
+    def slope(time: float, state: Array) -> list[float]:
+        return [state[1], -arm * amplitude * np.cos(rate * time) * np.cos(state[0]) / inertia]
+
+    expected = solve_ivp(slope, (0.0, 1.0), [0.0, -jump * arm / inertia], rtol=1e-11, atol=1e-13).y[:, -1]
+    errors = []
+    for steps in (100, 200, 400):
+        scene = withe.Scene(gravity=(0, 0, 0))
+        bar = scene.add_body(withe.solids.Box((0.4, 0.02, 0.02)), density=1000.0, position=(arm, 0, 0))
+        hinge = scene.clamp(bar, at=(0, 0, 0), spin=(0, 0, 1))
+        simulation = scene.build(time_step=1.0 / steps, integrator=integrator)
+        simulation.move(hinge, path=lambda t: (0, jump * t + amplitude / rate**2 * (1.0 - np.cos(rate * t)), 0))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", withe.CoarseStepWarning)
+            simulation.step(steps)
+        energy = simulation.energy()
+        assert energy.kinetic == pytest.approx(energy.work, rel=1e-7)
+        axes = simulation.rotation(bar)
+        turned = np.arctan2(axes[1, 0], axes[0, 0]) - expected[0]
+        errors.append([(turned + np.pi) % (2.0 * np.pi) - np.pi, simulation.angular_velocity(bar)[2] - expected[1]])
+    found = np.abs(errors)
+    measured(found[-1].max())
+    assert found[-1].max() < 2e-4
+    for k in range(2):
+        assert_order(list(found[:, k]), 2.0)
 
 
 @pytest.mark.parametrize("planar", [True, False])

@@ -363,3 +363,57 @@ def test_a_body_outside_the_plane_of_a_planar_scene_is_refused():
     with pytest.raises(ValueError, match="no principal axis of body 'tilted' is normal to the plane"):
         scene.build(planar=True)
     assert "spatial" in str(scene.build().plan) or scene.build(planar=False) is not None
+
+
+@pytest.mark.parametrize("planar", [None, False])
+@pytest.mark.parametrize(
+    ("velocity", "spin", "expected"),
+    [
+        ((0, 0.5, 0), None, 0.5 * 0.2),
+        ((0, 0.5, 0), (0, 0, 1.0), 0.5 * 0.2 + (0.4**2 + 0.02**2) / 12 * 1.0),
+        ((1.0, 0, 0), None, 0.0),
+        (None, (0, 0, 2.0), 2.0 * ((0.4**2 + 0.02**2) / 12 + 0.2**2)),
+    ],
+)
+def test_a_hinge_of_the_world_turns_a_set_velocity_into_a_rotation(velocity, spin, expected, planar):
+    """The impulse of the hinge keeps the angular momentum about it [J s / kg], and the motion is then steady."""
+    scene = withe.Scene(gravity=(0, 0, 0))
+    bar = scene.add_body(withe.solids.Box((0.4, 0.02, 0.02)), density=1000.0, position=(0.2, 0, 0), name="bar")
+    scene.clamp(bar, at=(0, 0, 0), spin=(0, 0, 1), name="hinge")
+    simulation = scene.build(time_step=1e-3, planar=planar)
+    simulation.set_velocity("bar", velocity, angular=spin)
+    rate = expected / ((0.4**2 + 0.02**2) / 12 + 0.2**2)
+    for _ in range(5):
+        simulation.step()
+        assert simulation.angular_velocity("bar")[2] == pytest.approx(rate, rel=1e-4, abs=1e-9)
+
+
+def test_a_clamp_keeps_a_body_at_rest_whose_velocity_is_set():
+    """All six rates are held."""
+    scene = withe.Scene(gravity=(0, 0, 0))
+    bar = scene.add_body(withe.solids.Box((0.4, 0.02, 0.02)), density=1000.0, position=(0.2, 0, 0), name="bar")
+    scene.clamp(bar, at=(0, 0, 0))
+    simulation = scene.build(time_step=1e-3)
+    simulation.set_velocity("bar", (0.1, 0.5, 0.2), angular=(1.0, 2.0, 3.0))
+    simulation.step(3)
+    np.testing.assert_allclose(simulation.velocity("bar"), 0.0, atol=1e-12)
+    np.testing.assert_allclose(simulation.angular_velocity("bar"), 0.0, atol=1e-12)
+    np.testing.assert_allclose(simulation.position("bar"), (0.2, 0, 0), atol=1e-12)
+
+
+def test_a_pinned_body_keeps_its_angular_momentum_about_the_pin():
+    """A ball joint of the world: three impulses act at the pin, and no moment."""
+    scene = withe.Scene(gravity=(0, 0, 0))
+    bar = scene.add_body(withe.solids.Box((0.4, 0.1, 0.02)), density=1000.0, position=(0.2, 0.1, 0), name="bar")
+    scene.pin(bar, at=(0, 0, 0))
+    simulation = scene.build(time_step=1e-6)
+    velocity, spin, arm = np.array([0.1, 0.5, 0.2]), np.array([1.0, 2.0, 3.0]), np.array([0.2, 0.1, 0.0])
+    simulation.set_velocity("bar", velocity, angular=spin)
+    sides = np.array([0.4, 0.1, 0.02]) ** 2
+    own = np.diag(sides.sum() - sides) / 12.0
+    about_pin = own + arm @ arm * np.eye(3) - np.outer(arm, arm)
+    expected = np.linalg.solve(about_pin, np.cross(arm, velocity) + own @ spin)
+    for _ in range(3):
+        simulation.step()
+        np.testing.assert_allclose(simulation.angular_velocity("bar"), expected, rtol=1e-4)
+        np.testing.assert_allclose(simulation.velocity("bar"), np.cross(expected, arm), rtol=1e-4, atol=1e-4)

@@ -452,6 +452,9 @@ class Placement:
     ) -> None:
         """Set the motion of a rigid body. Rods that are joined to it keep their velocities except at the joint.
 
+        If the motion contradicts a support of the body, an impulse of the support makes both consistent in the next
+        step. For a bar on a hinge of the world, a velocity of its centre then becomes a rotation about the hinge.
+
         Parameters
         ----------
         body : Body or str
