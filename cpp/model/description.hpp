@@ -43,6 +43,7 @@ struct RodDescription {
   VectorX natural_twist;       ///< per stencil [rad/m]
   VectorX contact_radius;      ///< radius of the round contact surface [m]; empty: no contact
   VectorX fluid_radius;        ///< radius in the fluid [m]
+  MatrixX2 fibre_distance;     ///< of the outermost fibres towards d1 and d2 [m]; empty: the section is unknown
   // The surface of a rigid body is a chain of edges without mass and stiffness. The body carries their nodes and
   // angles. Edges without a contact radius only connect others, or are normals of faces.
   int body = -1;  ///< that body; -1: a rod

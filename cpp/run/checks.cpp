@@ -9,6 +9,7 @@
 #include "common/text.hpp"
 #include "model/edge_vectors.hpp"
 #include "run/places.hpp"
+#include "run/read.hpp"
 
 namespace withe {
 namespace {
@@ -72,6 +73,33 @@ void check_reversible(const Model& model, const Options& options, const Paramete
             "integrator 'fourth_order' supports drag for a time_step up to mass over drag "
             "only, " +
                 std::to_string(p.node_mass(i) / p.node_drag(i)) + " s at node " + std::to_string(i) + instead);
+}
+
+void check_fibre_strain(const Model& model, const Parameters& parameters, const Configuration& now) {
+  for (std::size_t r = 0; r < model.description.rods.size(); ++r) {
+    const RodDescription& rod = model.description.rods[r];
+    if (rod.fibre_distance.rows() == 0) continue;
+    const MatrixX2 change = curvatures(model, parameters, now, static_cast<int>(r)) - parameters.natural_curvature[r];
+    double worst = 0.0, curvature = 0.0, distance = 0.0;
+    for (std::size_t s = 0; s < model.place[r].size(); ++s) {
+      const int b = model.place[r][s].bend;
+      if (b < 0) continue;
+      const auto row = static_cast<Eigen::Index>(s);
+      const auto fibres = [&](int i) {
+        return rod.fibre_distance.row(model.bend[at(b)].edge[i] - model.rod_first_edge[r]);
+      };
+      const double strain = change.row(row).cwiseProduct(fibres(0).cwiseMin(fibres(1))).norm();
+      if (strain <= worst) continue;
+      worst = strain;
+      curvature = change.row(row).norm();
+      distance = strain / curvature;
+    }
+    if (worst < 1.0) continue;
+    require(false, "natural curvature of rod '" + rod.name + "' differs from its curvature by " + text(curvature) +
+                       " 1/m, with fibres up to " + text(1e3 * distance) +
+                       " mm from the axis: the inner fibre would be compressed to nothing. Use a smaller "
+                       "natural_curvature, or change it over a time, over=");
+  }
 }
 
 void check_shares(const Model& model, const ContactPairDescription& pair) {

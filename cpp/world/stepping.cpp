@@ -39,6 +39,7 @@ void World::Implementation::advance(double duration) {
   account_for_settings();
   if (!first_energy) begin_energy_watch();
   begin_crossing_watch();
+  if (actuation_changed) check_fibre_strain(model, parameters, configuration());
   mark.motions = motions;
   mark.history = *this;
   systems.mark();

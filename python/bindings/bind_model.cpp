@@ -109,6 +109,7 @@ void register_rod(py::module_& module) {
       .def_readwrite("natural_twist", &RodDescription::natural_twist)
       .def_readwrite("contact_radius", &RodDescription::contact_radius)
       .def_readwrite("fluid_radius", &RodDescription::fluid_radius)
+      .def_readwrite("fibre_distance", &RodDescription::fibre_distance)
       .def_readwrite("body", &RodDescription::body)
       .def_readwrite("faces", &RodDescription::faces)
       .def_readwrite("edge_faces", &RodDescription::edge_faces)

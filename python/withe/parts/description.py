@@ -164,6 +164,8 @@ def _describe_rod(directory: Directory, rod: RodPart, coefficient: float) -> _co
     description.natural_twist = rod.natural_twist
     description.contact_radius = rod.contact_radius
     description.fluid_radius = rod.section.radii
+    if rod.parameters.youngs_modulus is not None:
+        description.fibre_distance = rod.section.fibres
     _fill(description, rod.parameters.changed("drag", coefficient, rod.section, rod.owner))
     return description
 

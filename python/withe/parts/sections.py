@@ -47,6 +47,11 @@ class SectionProperties(ShortRepr):
         """Default radius of the round surface that touches others (half the smaller side), shape (edges,) [m]."""
         return self.radii if self.widths is None else 0.5 * self.widths.min(axis=1)
 
+    @property
+    def fibres(self) -> FloatArray:
+        """Distances of the outermost fibres along d1 and d2, shape (edges, 2) [m]."""
+        return np.column_stack([self.radii, self.radii]) if self.widths is None else 0.5 * self.widths
+
     @cached_property
     def moments(self) -> FloatArray:
         """Both second moments of area, shape (edges, 2) [m^4]."""
