@@ -37,7 +37,15 @@ double moved_by(VectorX& force, Equations& equations, const Newton& newton, doub
   return newton.norms().displacement(force);
 }
 
-/// Estimated error of the step just taken [m]. Backward Euler: dt^2 / 2 times the mean acceleration. Other schemes:
+/// Displacement by an error of `constant` dt^power times a derivative of the acceleration [m], see `moved_by`.
+double moved_by_error(double constant, double dt, int power, Equations& equations, const Newton& newton, double h,
+                      VectorX& derivative, StepWorkspace& work) {
+  derivative *= constant * std::pow(dt, power) / (h * h);
+  multiply(equations.model(), equations.mass(), derivative, work.assumed);
+  return moved_by(work.assumed, equations, newton, h, work);
+}
+
+/// Estimated errors of the step just taken. Backward Euler: dt^2 / 2 times the mean acceleration. Other schemes:
 /// c dt^(p + 1) times the derivative of order p - 1 of the acceleration.
 ///
 /// - Midpoint has p = 2 and c = 1/12.
@@ -45,38 +53,42 @@ double moved_by(VectorX& force, Equations& equations, const Newton& newton, doub
 ///   Their error is known at the last part, and 0 before.
 ///
 /// Such errors add up to a shift in phase, whose displacement is at most twice a mode's amplitude a. After a time T,
-/// the error of frequency w is min(2 a, a c (w dt)^p w T). Both bounds meet at (w dt)^(p + 1) = 2 dt / (c T). p + 1
-/// running means leave slower modes unchanged, and divide faster modes by that power of the ratio.
-double estimated_error(Equations& equations, const Newton& newton, const Options& options, const StepPlan& plan,
-                       Predictor& predictor, StepWorkspace& work) {
-  VectorX& error = work.assumed;
+/// the error of frequency w is min(2 a, a c (w dt)^p w T). Both bounds meet at (w dt)^(p + 1) = 2 dt / (c T). A
+/// Butterworth filter of order p + 1 leaves slower modes unchanged, and divides faster modes by that power of the
+/// ratio, so that an unresolved amplitude counts once, as 2 a over the duration, however short the steps are. For steps
+/// of both orders that take equally long to compute, the frequencies are about equal, so one filter serves both.
+StepErrors estimated_errors(Equations& equations, const Newton& newton, const Options& options, const StepPlan& plan,
+                            Predictor& predictor, StepWorkspace& work) {
   const VectorX& acceleration = work.mean;
   if (plan.rule == StepRule::backward_euler) {
     work.difference = 0.5 * acceleration;
-    multiply(equations.model(), equations.mass(), work.difference, error);
-    return moved_by(error, equations, newton, plan.dt, work);
+    multiply(equations.model(), equations.mass(), work.difference, work.assumed);
+    return {moved_by(work.assumed, equations, newton, plan.dt, work), {}};
   }
-  double dt = plan.dt, constant = 1.0 / 12.0;
-  int order = 2;
+  constexpr double kMidpointError = 1.0 / 12.0;
+  double dt = plan.dt;
   const VectorX* whole = &acceleration;
-  if (options.integrator == Integrator::fourth_order) {
+  if (plan.composed) {
     const double part = kFourthOrderParts[static_cast<std::size_t>(plan.slot)];
     if (plan.slot == 0) work.whole_acceleration.setZero(acceleration.size());
     work.whole_acceleration += part * acceleration;
-    if (plan.slot + 1 < static_cast<int>(kFourthOrderParts.size())) return 0.0;
+    if (plan.slot + 1 < static_cast<int>(kFourthOrderParts.size())) return {};
     dt = plan.dt / part;
-    order = 4;
-    constant = kFourthOrderError;
     whole = &work.whole_acceleration;
   }
-  constexpr double kSafetyFactor = 2.0;  // factor of the phase shift of fast modes
-  const double cut =
-      std::pow(kSafetyFactor * 2.0 * dt / (constant * options.duration.value_or(1.0)), 1.0 / (order + 1));
-  predictor.differentiate(order - 1, -std::expm1(-cut), dt, *whole, work.difference);
+  const int order = plan.composed ? 4 : 2;
+  const double constant = plan.composed ? kFourthOrderError : kMidpointError;
+  const double cut = std::pow(2.0 * dt / (constant * options.duration.value_or(1.0)), 1.0 / (order + 1));
+  VectorX &first = work.difference, &third = work.third_derivative;
+  const bool both = plan.composed || plan.compares_order;
+  predictor.differentiate(plan.composed ? Predictor::kFifth : Predictor::kThird, cut, dt, *whole, first,
+                          both ? &third : nullptr);
   const double h = 0.5 * plan.dt;
-  work.difference *= constant * std::pow(dt, order + 1) / (h * h);
-  multiply(equations.model(), equations.mass(), work.difference, error);
-  return moved_by(error, equations, newton, h, work);
+  const auto second_order = [&] { return moved_by_error(kMidpointError, dt, 3, equations, newton, h, first, work); };
+  const auto fourth_order = [&] { return moved_by_error(kFourthOrderError, dt, 5, equations, newton, h, third, work); };
+  StepErrors errors{plan.composed ? fourth_order() : second_order(), {}};
+  if (plan.compares_order) errors.other = plan.composed ? second_order() : fourth_order();
+  return errors;
 }
 
 /// Velocity of held unknowns at the end of a step. They have no dynamics of their own, and the midpoint formula 2 v -
@@ -352,7 +364,7 @@ StepResult implicit_step(Equations& equations, const Newton& newton, const Optio
   enter_stops(equations.problem(), q1, state);
   VectorX& acceleration = work.mean;
   acceleration = rate * (work.velocity - state.v);
-  if (options.tolerance) result.error = estimated_error(equations, newton, options, plan, predictor, work);
+  if (options.tolerance) result.errors = estimated_errors(equations, newton, options, plan, predictor, work);
   work.difference = rate * work.change;
   predictor.record({state.time + 0.5 * dt, h, dt, plan.slot}, state.v, work.difference, acceleration,
                    equations.mass().rows);

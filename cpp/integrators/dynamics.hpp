@@ -2,6 +2,7 @@
 /// One time step: backward Euler, implicit midpoint, energy-momentum, and Verlet.
 
 #include <memory>
+#include <optional>
 
 #include "integrators/fourth_order.hpp"
 #include "integrators/newton.hpp"
@@ -12,20 +13,35 @@
 
 namespace withe {
 
-/// One implicit step: its rule and its length; `slot` is the index of a part of a composition.
+/// One implicit step: its rule and its length.
 struct StepPlan {
   StepRule rule = StepRule::midpoint;
-  double dt = 0;  ///< [s]
-  int slot = 0;
+  double dt = 0;                ///< [s]
+  int slot = 0;                 ///< index of a part of a composition
+  bool composed = false;        ///< true if it is a part of a fourth-order step
+  bool compares_order = false;  ///< true if the error of the other order, second or fourth, is estimated too
 };
+
+/// Estimated local errors of a step [m].
+struct StepErrors {
+  double own = 0;
+  /// Of a step of the other order and of the same length, where it was estimated.
+  std::optional<double> other;
+};
+
+/// Amplitude of the motion above the frequency at which the filter of errors cuts off [m]. A step's estimated error of
+/// such motion is 2 a dt / duration, from amplitude a.
+inline double unresolved_amplitude(const Options& options, double error, double dt) {
+  return 0.5 * error * options.duration.value_or(1.0) / dt;
+}
 
 struct StepResult {
   bool accepted = false;
   bool too_deep = false;  ///< surfaces are too deep in each other: contact must be stiffer
   Squeezed squeezed;      ///< contact between parts that cannot yield
   NewtonResult newton;
-  double largest_turn = 0;   ///< largest rotation of an edge [rad]
-  double error = 0;          ///< estimated local error [m]
+  double largest_turn = 0;  ///< largest rotation of an edge [rad]
+  StepErrors errors;
   double load_work = 0;      ///< work of loads and custom forces [J]
   double dissipated = 0;     ///< energy removed by drag, viscosity and contact [J]
   double support_work = 0;   ///< [J]
@@ -38,7 +54,7 @@ struct StepWorkspace {
   NewtonWorkspace newton;
   double follow_gain = 0;  ///< kinetic energy that nodes of held bodies get from the velocities of supports [J]
   VectorX z, move, change, working, mean, velocity, held_velocity, held_acceleration, assumed, difference,
-      whole_acceleration;
+      whole_acceleration, third_derivative;
   VectorX formula_velocity;  ///< at the end of a step with bodies, before supports replace the velocities they hold
   Rebounds rebounds;
   std::unique_ptr<MassSystem> mass_system;  ///< null until it is needed

@@ -70,18 +70,42 @@ void Predictor::record(const Step& step, const VectorX& v0, const VectorX& veloc
   count_ = std::min(count_ + 1, kDepth);
 }
 
-void Predictor::differentiate(int order, double share, double dt, const VectorX& acceleration, VectorX& out) {
-  if (slow_[0].size() != acceleration.size())
-    for (std::size_t k = 0; k < slow_.size(); ++k)
-      slow_[k] = (k < 3 ? 1.0 : 0.0) * acceleration;  // it has always been so
-  slow_[0] += share * (acceleration - slow_[0]);
-  slow_[1] += share * (slow_[0] - slow_[1]);
-  out = slow_[1];
-  for (int k = 0; k < order; ++k) {
-    VectorX& mean = slow_[static_cast<std::size_t>(2 + k)];
-    out = (share / dt) * (out - mean);
-    mean += dt * out;
+namespace {
+
+/// Advances y'' + 2 z w y' + w^2 y = w^2 u by a step of dt, in which u is constant. On return `rate` is y'.
+void oscillate(double damping, double w, double dt, const VectorX& u, VectorX& y, VectorX& rate) {
+  const double s = std::sqrt(1.0 - damping * damping), decay = std::exp(-damping * w * dt),
+               sine = decay * std::sin(s * w * dt) / s, cosine = decay * std::cos(s * w * dt);
+  y -= u;
+  const double of_rate = cosine - damping * sine, of_value = -w * sine;
+  for (Eigen::Index i = 0; i < y.size(); ++i) {
+    const double value = y(i);
+    y(i) = (cosine + damping * sine) * value + (sine / w) * rate(i) + u(i);
+    rate(i) = of_rate * rate(i) + of_value * value;
   }
+}
+
+}  // namespace
+
+void Predictor::differentiate(const Butterworth& filter, double cut, double dt, const VectorX& acceleration,
+                              VectorX& first, VectorX* third) {
+  auto& [mean, value, rate, second_value, second_rate] = slow_;
+  if (mean.size() != acceleration.size()) {
+    mean = acceleration;  // it has always been so
+    for (VectorX* x : {&value, &rate, &second_value, &second_rate}) x->setZero(acceleration.size());
+  }
+  first = (-std::expm1(-cut) / dt) * (acceleration - mean);
+  mean += dt * first;
+  if (third) *third = (-1.0 / dt) * value;
+  oscillate(filter.damping[0], cut / dt, dt, first, value, rate);
+  first = value;
+  if (!third) return;
+  *third += (1.0 / dt) * value;
+  const VectorX& input = *third;
+  VectorX& before = scratch_;
+  before = second_value;
+  oscillate(filter.damping[1], cut / dt, dt, input, second_value, second_rate);
+  *third = (1.0 / dt) * (second_value - before);
 }
 
 bool Predictor::plausible() const {

@@ -46,9 +46,20 @@ class Predictor {
   void record(const Step& step, const VectorX& v0, const VectorX& velocity, const VectorX& acceleration,
               const VectorX& weight);
 
-  /// Derivative of the accelerations in time, of an odd `order` up to three, from order + 2 running means. Each mean
-  /// forgets `share` of the past in a step of dt. Call it in every step or in none.
-  void differentiate(int order, double share, double dt, const VectorX& acceleration, VectorX& out);
+  /// Damping ratios of the oscillators of a Butterworth filter of third or fifth order, whose gain is
+  /// (1 + x^(2 n))^(-1/2) at x times the cutoff frequency.
+  struct Butterworth {
+    std::array<double, 2> damping;
+  };
+  static constexpr Butterworth kThird{{0.5, 0.5}};                                  // the first two poles suffice
+  static constexpr Butterworth kFifth{{0.80901699437494742, 0.30901699437494742}};  // cos 36, cos 72 degrees
+
+  /// First derivative of the accelerations in time, through a low-pass filter of third order, and, unless `third` is
+  /// null, their third derivative, through one of fifth order: a running mean and one or two oscillators, all of the
+  /// frequency `cut` / dt, solved exactly for an acceleration that is constant in the step. `filter` is a Butterworth
+  /// filter for the derivative of its own order. Call it in every step or in none.
+  void differentiate(const Butterworth& filter, double cut, double dt, const VectorX& acceleration, VectorX& first,
+                     VectorX* third);
 
   void resize(Eigen::Index size) {
     for (auto* history : {&acceleration_, &velocity_})
@@ -89,7 +100,8 @@ class Predictor {
   std::array<Choice, kSlots> best_;
   std::array<double, kDepth> time_{};  ///< latest first
   History acceleration_, velocity_;
-  std::array<VectorX, 5> slow_;  ///< running means, empty until wanted
+  VectorX scratch_;
+  std::array<VectorX, 5> slow_;  ///< mean, and values and rates of the oscillators; empty until wanted
 };
 
 }  // namespace withe

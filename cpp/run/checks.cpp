@@ -37,6 +37,20 @@ void check_impacts(const Options& options, const ContactDescription& contact) {
           "implicit integrator");
 }
 
+const char* dissipation_of(const Model& model, const Parameters& p) {
+  if (model.description.contact.any()) return "contact";
+  if (p.viscous) return "viscosity";
+  if (model.description.fluid.model != FluidModel::none) return "a fluid";
+  for (const Support& s : model.supports)
+    if (s.active && s.yields() && (std::isfinite(s.description.hand.force_limit) || s.description.hand.friction != 0.0))
+      return "hands that slip";
+  if ((p.spring_damping.array() != 0.0).any()) return "damping of springs";
+  if ((p.joint_damping.array() != 0.0).any()) return "damping of joints";
+  for (const JointAngle& joint : model.joint_angles)
+    if (joint.stops.stiffness != 0.0 && joint.stops.restitution != 1.0) return "restitution of stops below 1";
+  return nullptr;
+}
+
 void check_reversible(const Model& model, const Options& options, const Parameters& p) {
   check_impacts(options, model.description.contact);
   require(
@@ -47,32 +61,15 @@ void check_reversible(const Model& model, const Options& options, const Paramete
   require(options.integrator != Integrator::verlet || !model.has_bodies(),
           "integrator 'verlet' does not support rigid bodies: use 'energy_momentum' or 'backward_euler'");
   if (options.integrator != Integrator::fourth_order) return;
-  require(!model.description.contact.any(),
-          "integrator 'fourth_order' does not support contact, because its inner steps "
-          "go back in time: use integrator 'implicit_midpoint' or 'energy_momentum'");
-  const std::string instead =
-      ", because its inner steps go back in time: use integrator 'implicit_midpoint' "
-      "or 'energy_momentum'";
-  require(!p.viscous, "integrator 'fourth_order' does not support viscosity" + instead);
-  require(model.description.fluid.model == FluidModel::none,
-          "integrator 'fourth_order' does not support a fluid" + instead);
-  for (const Support& s : model.supports)
-    require(!s.active || !s.yields() ||
-                (!std::isfinite(s.description.hand.force_limit) && s.description.hand.friction == 0.0),
-            "integrator 'fourth_order' does not support hands that slip" + instead);
-  require((p.spring_damping.array() == 0.0).all(),
-          "integrator 'fourth_order' does not support damping of springs" + instead);
-  require((p.joint_damping.array() == 0.0).all(),
-          "integrator 'fourth_order' does not support damping of joints" + instead);
-  for (const JointAngle& joint : model.joint_angles)
-    require(joint.stops.stiffness == 0.0 || joint.stops.restitution == 1.0,
-            "integrator 'fourth_order' does not support restitution of stops below 1" + instead);
+  const char* dissipates = dissipation_of(model, p);
+  require(!dissipates, "integrator 'fourth_order' does not support ", dissipates ? dissipates : "",
+          ", because its inner steps go back in time: use integrator 'implicit_midpoint' or 'energy_momentum'");
   if (!p.dragged) return;
   for (int i = 0; i < model.node_count; ++i)
     require(p.node_drag(i) * options.time_step <= p.node_mass(i),
-            "integrator 'fourth_order' supports drag for a time_step up to mass over drag "
-            "only, " +
-                std::to_string(p.node_mass(i) / p.node_drag(i)) + " s at node " + std::to_string(i) + instead);
+            "integrator 'fourth_order' supports drag for a time_step up to mass over drag only, ",
+            p.node_mass(i) / p.node_drag(i), " s at node ", i,
+            ", because its inner steps go back in time: use integrator 'implicit_midpoint' or 'energy_momentum'");
 }
 
 void check_fibre_strain(const Model& model, const Parameters& parameters, const Configuration& now) {

@@ -18,6 +18,10 @@ constexpr double kSafety = 0.8;
 constexpr double kRoundingShare = 0.01;
 // Part of the greatest error rate that a step forgets: an oscillation has no error twice a period.
 constexpr double kForgetting = 1.0 / 256.0;
+// Cost of a fourth-order step over that of a step of second order: five parts, each with some 1.2 times the iterations.
+constexpr double kComposedCost = 6.0;
+// Ratio of costs from which the order changes. Estimates of both orders vary by about as much within a period.
+constexpr double kMinGain = 1.25;
 
 /// Power of a step's length that its error goes with.
 double local_order(Integrator integrator) {
@@ -33,15 +37,20 @@ double local_order(Integrator integrator) {
 
 }  // namespace
 
-StepControl::StepControl(const Options& options)
+StepControl::StepControl(const Options& options, bool may_compose)
     : adaptive_(options.adaptive),
       explicit_(options.integrator == Integrator::verlet),
+      may_compose_(may_compose && options.tolerance && options.integrator == Integrator::energy_momentum),
       max_halvings_(options.max_halvings),
       order_(local_order(options.integrator)),
       tolerance_(options.tolerance),
       duration_(options.duration.value_or(1.0)) {}
 
 double StepControl::parts_at(int level) const { return std::exp2(static_cast<double>(level) / levels_per_halving()); }
+
+int StepControl::levels_between(double ratio) const {
+  return static_cast<int>(std::ceil(levels_per_halving() * std::log2(ratio)));
+}
 
 Division StepControl::divided(const Division& division, int level) const {
   const double from = division.reached();
@@ -50,6 +59,10 @@ Division StepControl::divided(const Division& division, int level) const {
 
 StepProgress StepControl::begin(StepLengths lengths, bool has_history) const {
   if (!adaptive_ && !tolerance_) lengths.level = 0;
+  if (lengths.composed && !may_compose_) {
+    lengths.composed = false;
+    lengths.level = std::min(deepest_level(), lengths.level + levels_between(kComposedCost));
+  }
   if (tolerance_ && !has_history)
     lengths.level = std::max(lengths.level, levels_per_halving() * std::min(max_halvings_, kFirstHalvings));
   return {lengths, divided({}, lengths.level)};
@@ -74,12 +87,16 @@ StepProgress StepControl::subdivide(StepProgress now, Verdict why) const {
 
 StepProgress StepControl::advance(StepProgress now, Verdict verdict, double dt) const {
   ++now.division.done;
+  const bool was_composed = now.lengths.composed;
   const int before = now.lengths.level;
   if (verdict == Verdict::easy)
     now = grown(now, dt);
   else
     now.lengths.easy_steps = 0;
-  if (now.lengths.level < before && !now.division.finished()) now.division = divided(now.division, now.lengths.level);
+  if (may_compose_) now.lengths = choose_order(now.lengths, dt / now.division.share());
+  const bool shorter = now.lengths.composed != was_composed && now.lengths.level > before;
+  if ((now.lengths.level < before || shorter) && !now.division.finished())
+    now.division = divided(now.division, now.lengths.level);
   return now;
 }
 
@@ -112,8 +129,9 @@ bool StepControl::bears(const StepLengths& lengths, double error, double dt) con
                                 error - allowed <= lengths.event_reserve * kEventShare * *tolerance_);
 }
 
-StepControl::Accepted StepControl::accept(StepLengths lengths, double error, double dt, bool near_limit) const {
-  const double allowed = allowed_error(dt);
+StepControl::Accepted StepControl::accept(StepLengths lengths, const StepErrors& errors, double dt,
+                                          bool near_limit) const {
+  const double error = errors.own, allowed = allowed_error(dt);
   if (tolerance_) {
     const double excess = std::max(error - allowed, 0.0);
     lengths.event_reserve =
@@ -122,15 +140,38 @@ StepControl::Accepted StepControl::accept(StepLengths lengths, double error, dou
   }
   if (near_limit || error > allowed) return {lengths, Verdict::hard};
   if (!tolerance_) return {lengths, Verdict::easy};
-  const double rate = error > kRoundingShare * allowed ? error / std::pow(dt, order_) : 0.0;
-  lengths.error_rate = std::max(rate, lengths.error_rate * (1.0 - kForgetting));
+  const auto note = [&](bool composed, double found, double least) {
+    double& rate = lengths.error_rates[composed];
+    rate = std::max(found > least ? found / std::pow(dt, order(composed)) : 0.0, rate * (1.0 - kForgetting));
+  };
+  note(lengths.composed, error, kRoundingShare * allowed);
+  if (errors.other) note(!lengths.composed, *errors.other, 0.0);
   return {lengths, may_grow(lengths, dt, parts_at(1)) ? Verdict::easy : Verdict::hard};
 }
 
 /// True if a part of dt `times` longer would be accurate enough, the allowed error growing with it.
 bool StepControl::may_grow(const StepLengths& lengths, double dt, double times) const {
   if (!tolerance_) return true;
-  return lengths.error_rate * std::pow(times * dt, order_) < kSafety * times * allowed_error(dt);
+  return lengths.error_rates[lengths.composed] * std::pow(times * dt, order(lengths.composed)) <
+         kSafety * times * allowed_error(dt);
+}
+
+double StepControl::longest_step(const StepLengths& lengths, bool composed, double most) const {
+  const double rate = lengths.error_rates[composed];
+  return rate > 0.0 ? std::min(most, std::pow(kSafety * allowed_error(1.0) / rate, 1.0 / (order(composed) - 1.0)))
+                    : most;
+}
+
+StepLengths StepControl::choose_order(StepLengths lengths, double whole) const {
+  const bool other = !lengths.composed;
+  const double now = longest_step(lengths, lengths.composed, whole), then = longest_step(lengths, other, whole),
+               gain = then / now * (other ? 1.0 / kComposedCost : kComposedCost);
+  if (lengths.error_rates[other] == 0.0 || gain < kMinGain) return lengths;
+  lengths.composed = other;
+  lengths.level = std::clamp(levels_between(whole / then), 0, deepest_level());
+  lengths.easy_steps = 0;
+  lengths.grown = false;
+  return lengths;
 }
 
 }  // namespace withe

@@ -10,9 +10,14 @@
 /// step take the fewest steps. So an event may make as great an error in a step as the steps around it make on average.
 /// The error beyond the event's time must be left in a share s of the tolerance, which is kept for events and which
 /// time fills again. A step may grow where C (times dt)^p, C the greatest of the last errors over dt^p, is allowed.
+///
+/// Where the scene allows fourth-order steps, error control also chooses the order: that whose longest allowed step,
+/// (allowed(1) / C)^(1 / (p - 1)), is longer in relation to its cost.
 
+#include <array>
 #include <optional>
 
+#include "integrators/dynamics.hpp"
 #include "integrators/options.hpp"
 
 namespace withe {
@@ -36,9 +41,11 @@ struct StepLengths {
   int easy_steps = 0;           ///< since the level changed
   int patience = kMinPatience;  ///< easy parts before longer ones are tried
   bool grown = false;           ///< fewer easy parts than the least patience ago
-  double error_rate = 0;        ///< C, greatest estimated error of the last parts over dt^p [m / s^p]
-  double mean_step = 0;         ///< under error control, over some of the last parts, weighed by their lengths [s]
-  double event_reserve = 1;     ///< share that is left of the error that events may make beyond their time [-]
+  bool composed = false;        ///< true if error control takes fourth-order steps
+  /// C, greatest estimated error of the last parts over dt^p [m / s^p]: of the integrator, of fourth-order steps.
+  std::array<double, 2> error_rates{};
+  double mean_step = 0;      ///< under error control, over some of the last parts, weighed by their lengths [s]
+  double event_reserve = 1;  ///< share that is left of the error that events may make beyond their time [-]
 };
 
 /// Equal parts in which the rest of a time step is taken, from a fraction of it on.
@@ -62,7 +69,8 @@ struct StepProgress {
 
 class StepControl {
  public:
-  explicit StepControl(const Options& options);
+  /// `may_compose`: true if error control may take fourth-order steps.
+  explicit StepControl(const Options& options, bool may_compose = false);
 
   /// Parts at the start of a time step. `has_history`: parts were taken before, from which errors are estimated; else
   /// error control begins with a part too short to need an estimate.
@@ -84,8 +92,9 @@ class StepControl {
     StepLengths lengths;
     Verdict verdict = Verdict::easy;
   };
-  Accepted accept(StepLengths lengths, double error, double dt, bool near_limit) const;
+  Accepted accept(StepLengths lengths, const StepErrors& errors, double dt, bool near_limit) const;
 
+  bool may_compose() const { return may_compose_; }
   int levels_per_halving() const { return tolerance_ ? 4 : 1; }
   int deepest_level() const { return levels_per_halving() * max_halvings_; }
   /// Number of parts in a time step at a level.
@@ -96,10 +105,17 @@ class StepControl {
   Division divided(const Division& division, int level) const;
   bool may_grow(const StepLengths& lengths, double dt, double times) const;
   StepProgress grown(StepProgress now, double dt) const;
+  double order(bool composed) const { return composed ? 5.0 : order_; }
+  /// Least number of levels that shorten parts by `ratio`.
+  int levels_between(double ratio) const;
+  /// Longest step that is accurate enough [s], at most `most`.
+  double longest_step(const StepLengths& lengths, bool composed, double most) const;
+  /// Changes the order where the other one is cheaper. `whole`: length of the time step [s].
+  StepLengths choose_order(StepLengths lengths, double whole) const;
 
-  bool adaptive_, explicit_;
+  bool adaptive_, explicit_, may_compose_;
   int max_halvings_;
-  double order_;  ///< p
+  double order_;  ///< p of the integrator
   std::optional<double> tolerance_;
   double duration_;
 };

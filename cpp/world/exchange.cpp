@@ -172,9 +172,9 @@ template <class Archive>
 void exchange(Archive& io, StepHistory& history) {
   auto& [lengths, grid_origin, grid_steps, steps_taken, contact_guard, step_watch, first_energy, greatest_kinetic] =
       history;
-  auto& [level, easy_steps, patience, grown, error_rate, mean_step, event_reserve] = lengths;
-  io(level), io(easy_steps), io(patience), io(grown), io(error_rate), io(mean_step), io(event_reserve), io(grid_origin),
-      io(grid_steps), io(steps_taken);
+  auto& [level, easy_steps, patience, grown, composed, error_rates, mean_step, event_reserve] = lengths;
+  io(level), io(easy_steps), io(patience), io(grown), io(composed), io(error_rates[0]), io(error_rates[1]),
+      io(mean_step), io(event_reserve), io(grid_origin), io(grid_steps), io(steps_taken);
   auto& [greatest, gained, put_in] = contact_guard;
   io(greatest), io(gained), io(put_in);
   auto& [change, motion, most, pull, moved, acceleration] = step_watch;

@@ -42,7 +42,8 @@ struct World::Implementation : Built, Running {
   /// Coefficients before parameters were set in the present state. The work of setting them is found on demand.
   EnergyCoefficients before_settings;
   bool newly_set = false;
-  Division division;  ///< of the present time step
+  Division division;        ///< of the present time step
+  bool composable = false;  ///< true if the present time step may have fourth-order steps
   struct : Moving {
     long taped = 0;  ///< length of the tape
   } kept;            ///< at the start of a part that may be taken back
@@ -118,7 +119,7 @@ struct World::Implementation : Built, Running {
   [[noreturn]] void fail_step(Verdict why, double dt) const;
   /// Error and turns of a part.
   struct PartResult {
-    double error = 0;         ///< estimated [m]
+    StepErrors errors;        ///< estimated [m]
     double turn = 0;          ///< greatest of an edge [rad]
     double held_turn = 0;     ///< greatest of what supports hold [rad]
     double rebound_gain = 0;  ///< greatest, see ReboundWork
@@ -138,6 +139,11 @@ struct World::Implementation : Built, Running {
   void return_to_start();
   void call_before_step(double force_time, double end_time);
   bool scheme_step(double dt, PartResult& part);
+  /// True if error control may take fourth-order steps: nothing dissipates, no support moves, whose velocities are
+  /// known to second order only, and no function of a user needs to be called in the order of time.
+  bool may_compose() const;
+  /// True if the present part is a fourth-order step.
+  bool composes() const { return options.integrator == Integrator::fourth_order || lengths.composed; }
   bool composed_step(double dt, PartResult& part);
   bool inner_step(double dt, int slot, PartResult& part);
   StepRule rule_of_step() const;

@@ -4,6 +4,7 @@
 
 #include "common/check.hpp"
 #include "common/text.hpp"
+#include "run/checks.hpp"
 #include "run/drive.hpp"
 #include "run/energy_watch.hpp"
 #include "run/journal.hpp"
@@ -20,6 +21,8 @@ constexpr int kMaxStiffenings = 4;
 constexpr double kMaxWork = 3e7;
 // Steps between two checks of the mesh, and between two checks of the energy, each of which costs as much as a step.
 constexpr int kResolutionPeriod = 64, kEnergyPeriod = 16;
+// Steps between two estimates of the error of the other order, each of which costs a linear solve.
+constexpr int kOrderPeriod = 4;
 // Greatest turn in a step of frames and edges that supports hold [rad]. In the middle of a step a frame that turns by w
 // has turned by 2 atan(tan(w / 2) / 2), but an edge's angle by w / 2. A rod between them is twisted by the difference,
 // w^3 / 32. In energy-momentum steps edges that turn by w have the rate 2 tan(w / 2) / dt. Parts of fourth-order steps
@@ -36,10 +39,10 @@ bool lessens(double now, double before) { return before == 0.0 || now < 0.9 * be
 /// One time step of `duration`, in equal parts where it does not converge or is not accurate enough.
 void World::Implementation::advance(double duration) {
   const double base = state.time;
+  if (actuation_changed) check_fibre_strain(model, parameters, configuration());
   account_for_settings();
   if (!first_energy) begin_energy_watch();
   begin_crossing_watch();
-  if (actuation_changed) check_fibre_strain(model, parameters, configuration());
   mark.motions = motions;
   mark.history = *this;
   systems.mark();
@@ -66,7 +69,8 @@ void World::Implementation::advance(double duration) {
 
 void World::Implementation::advance_in_parts(double duration) {
   const double base = state.time;
-  const StepControl control(options);
+  composable = may_compose();
+  const StepControl control(options, composable);
   StepProgress progress = control.begin(lengths, !predictor.empty());
   Excess rejected;
   const long max_steps = options.max_steps.value_or(std::lround(kMaxWork / model.node_count));
@@ -139,8 +143,12 @@ Verdict World::Implementation::try_step(const StepControl& control, double dt, E
              energy_scratch);
   commit_step(part);
   const Contact* contact = watched_contact();
-  const bool near_limit = 2.5 * held_turn_of(part) > 1.0 || (contact && contact->unresolved(2.0 * dt));
-  const auto [after, verdict] = control.accept(lengths, part.error, dt, near_limit);
+  const bool near_limit =
+      2.0 * part.turn > 1.5 || 2.5 * held_turn_of(part) > 1.0 || (contact && contact->unresolved(2.0 * dt));
+  const auto [after, verdict] = control.accept(lengths, part.errors, dt, near_limit);
+  if (options.tolerance && acts_in_middle(options.integrator))
+    statistics.unresolved_amplitude =
+        std::max(statistics.unresolved_amplitude, unresolved_amplitude(options, part.errors.own, dt));
   lengths = after;
   return verdict;
 }
@@ -160,12 +168,12 @@ Contact* World::Implementation::watched_contact() const {
 /// Turn of what is held in a part, over the greatest that is accurate.
 double World::Implementation::held_turn_of(const PartResult& part) const {
   if (!options.adaptive || !acts_in_middle(options.integrator)) return 0.0;
-  return part.held_turn / (options.integrator == Integrator::fourth_order ? kMaxHeldTurnOfPart : kMaxHeldTurn);
+  return part.held_turn / (composes() ? kMaxHeldTurnOfPart : kMaxHeldTurn);
 }
 
 /// Verdict on a part that was solved. `rejected`: what parts were rejected for before.
 Verdict World::Implementation::judge(const StepControl& control, const PartResult& part, double dt, Excess& rejected) {
-  if (!control.bears(lengths, part.error, dt)) return Verdict::inaccurate;
+  if (!control.bears(lengths, part.errors.own, dt)) return Verdict::inaccurate;
   Contact* contact = watched_contact();
   const Excess now{held_turn_of(part),
                    contact && !obstacle_motions.empty() ? farthest_obstacle(kept.state, state) : 0.0};
@@ -204,13 +212,21 @@ void World::Implementation::commit_step(const PartResult& part) {
   statistics.steps += 1;
   steps_taken += 1;
   if (rule_of_step() == StepRule::energy_momentum) statistics.energy_momentum_steps += 1;
+  if (composes()) statistics.fourth_order_steps += 1;
   statistics.largest_turn = std::max(statistics.largest_turn, part.turn);
   retire_ramps();
 }
 
 /// One step of the scheme; changes nothing where it does not converge.
 bool World::Implementation::scheme_step(double dt, PartResult& part) {
-  return options.integrator == Integrator::fourth_order ? composed_step(dt, part) : inner_step(dt, 0, part);
+  return composes() ? composed_step(dt, part) : inner_step(dt, 0, part);
+}
+
+bool World::Implementation::may_compose() const {
+  const auto stands = [](const SupportMotion& m) { return m.position == m.to_position && m.rotation == m.to_rotation; };
+  return options.tolerance && options.integrator == Integrator::energy_momentum && !parameters.dragged && !tape &&
+         !callbacks.force && !callbacks.prescribes && std::all_of(motions.begin(), motions.end(), stands) &&
+         !dissipation_of(model, parameters);
 }
 
 bool World::Implementation::composed_step(double dt, PartResult& part) {
@@ -284,7 +300,7 @@ bool World::Implementation::inner_step(double dt, int slot, PartResult& part) {
   for (std::size_t s = 0; s < motions.size(); ++s) motions[s].put(prescribed.supports[s]);
   const bool begins = division.first() && slot == 0;
   if (tape) record_step(*tape, model, contact(), *this, *this, {rule_of_step(), dt, systems.work.move, begins});
-  part.error = r.error;
+  part.errors = r.errors;
   part.turn = std::max(part.turn, r.largest_turn);
   part.rebound_gain = std::max(part.rebound_gain, r.rebound_gain);
   part.held_turn = std::max(part.held_turn, prescribed.held.turn);
@@ -307,8 +323,10 @@ StepRule World::Implementation::rule_of_step() const { return equation_options(o
 StepResult World::Implementation::step_by_rule(double dt, int slot) {
   if (options.integrator == Integrator::verlet)
     return verlet_step(systems.scheme(), parameters, prescribed, dt, state, systems.work);
-  return implicit_step(systems.scheme(), systems.newton(), options, parameters, prescribed, {rule_of_step(), dt, slot},
-                       state, predictor, systems.work);
+  const bool compares = composable && (composes() || steps_taken % kOrderPeriod == 0);
+  const StepPlan plan{rule_of_step(), dt, slot, composes(), compares};
+  return implicit_step(systems.scheme(), systems.newton(), options, parameters, prescribed, plan, state, predictor,
+                       systems.work);
 }
 
 }  // namespace withe

@@ -174,7 +174,7 @@ void World::Implementation::keep_reactions(double dt, bool begins) {
     joint_impulses.clear();
     impulse_time = 0.0;
   }
-  const bool only = division.whole() && options.integrator != Integrator::fourth_order;
+  const bool only = division.whole() && !composes();
   if (only || (model.supports.empty() && joint_wrenches.empty())) return;
   impulses.resize(model.supports.size());
   joint_impulses.resize(joint_wrenches.size());

@@ -33,7 +33,10 @@ struct Statistics {
   long factorizations = 0;
   double largest_turn = 0;  ///< of an edge in one step [rad]; plain midpoint loses energy balance above about 0.1
   long energy_momentum_steps = 0;  ///< inner steps by that rule, those of fourth order included
-  long branch_changes = 0;         ///< equilibria that were found on another branch
+  long fourth_order_steps = 0;     ///< steps composed of five
+  /// Greatest amplitude so far of motion that steps under `tolerance` do not resolve [m].
+  double unresolved_amplitude = 0;
+  long branch_changes = 0;  ///< equilibria that were found on another branch
   double assembly_time = 0, solve_time = 0, fluid_time = 0, total_time = 0;  ///< [s]
 };
 

@@ -145,6 +145,8 @@ void register_results(py::module_& module) {
       .def_readonly("factorizations", &Statistics::factorizations)
       .def_readonly("largest_turn", &Statistics::largest_turn)
       .def_readonly("energy_momentum_steps", &Statistics::energy_momentum_steps)
+      .def_readonly("fourth_order_steps", &Statistics::fourth_order_steps)
+      .def_readonly("unresolved_amplitude", &Statistics::unresolved_amplitude)
       .def_readonly("branch_changes", &Statistics::branch_changes)
       .def_readonly("assembly_time", &Statistics::assembly_time)
       .def_readonly("solve_time", &Statistics::solve_time)

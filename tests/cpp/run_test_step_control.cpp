@@ -1,3 +1,4 @@
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -130,7 +131,7 @@ TEST(StepControl, KeepsTheSumOfErrorsBelowTheTolerance) {
       }
       errors += error;
       ++parts;
-      const auto [after, verdict] = control.accept(now.lengths, error, dt, false);
+      const auto [after, verdict] = control.accept(now.lengths, {error, {}}, dt, false);
       now.lengths = after;
       now = control.advance(now, verdict, dt);
     }
@@ -149,13 +150,64 @@ TEST(StepControl, AnEventMayErrByMoreUntilItsReserveIsSpent) {
   EXPECT_GT(error, control.allowed_error(dt));
   int events = 0;
   for (; control.bears(lengths, error, dt) && events < 1000; ++events) {
-    const auto [after, verdict] = control.accept(lengths, error, dt, false);
+    const auto [after, verdict] = control.accept(lengths, {error, {}}, dt, false);
     EXPECT_EQ(verdict, Verdict::hard);
     lengths = after;
     lengths.mean_step = 0.01;
   }
   EXPECT_GT(events, 2);
   EXPECT_LT(events, 1000);
+}
+
+/// Steps of time steps of length 1 over a duration of 100, whose errors are those of one mode of a frequency: dt^3 / 12
+/// and 9.3e-4 dt^5 times its derivatives. Returns the number of parts of either order in the second half.
+std::array<int, 2> parts_of_mode(double frequency, double tolerance) {
+  Options options = options_of(tolerance);
+  options.duration = 100.0;
+  const StepControl control(options, true);
+  StepLengths lengths = control.begin({}, false).lengths;
+  std::array<int, 2> parts{};
+  for (int k = 0; k < 100; ++k) {
+    StepProgress now = control.begin(lengths, k > 0);
+    while (!now.division.finished()) {
+      const double dt = now.division.share();
+      const double second = std::pow(frequency * dt, 3) / 12.0, fourth = 9.3e-4 * std::pow(frequency * dt, 5);
+      const bool composed = now.lengths.composed;
+      const StepErrors errors{composed ? fourth : second, composed ? second : fourth};
+      if (!control.bears(now.lengths, errors.own, dt)) {
+        now = control.subdivide(now, Verdict::inaccurate);
+        continue;
+      }
+      if (k >= 50) ++parts[composed];
+      const auto [after, verdict] = control.accept(now.lengths, errors, dt, false);
+      now.lengths = after;
+      now = control.advance(now, verdict, dt);
+    }
+    lengths = now.lengths;
+  }
+  return parts;
+}
+
+TEST(StepControl, TakesTheOrderThatCostsLess) {
+  const auto tight = parts_of_mode(1.0, 1e-5), loose = parts_of_mode(1.0, 10.0);
+  EXPECT_EQ(tight[0], 0);
+  EXPECT_GT(tight[1], 50);
+  EXPECT_EQ(loose[1], 0);
+}
+
+TEST(StepControl, FourthOrderStepsTakeAsManyPartsAsTheirErrorAllows) {
+  // Sixteen times the tolerance allows twice the length.
+  const int coarse = parts_of_mode(10.0, 1e-2)[1], fine = parts_of_mode(10.0, 1e-2 / 16.0)[1];
+  EXPECT_NEAR(static_cast<double>(fine) / coarse, 2.0, 0.4);
+}
+
+TEST(StepControl, ReturnsToSecondOrderInShorterPartsWhereFourthIsNotAllowed) {
+  const StepControl free(options_of(1e-3), true), bound(options_of(1e-3), false);
+  const StepLengths composed{.level = 4, .composed = true};
+  EXPECT_TRUE(free.begin(composed, true).lengths.composed);
+  const StepLengths after = bound.begin(composed, true).lengths;
+  EXPECT_FALSE(after.composed);
+  EXPECT_GT(after.level, composed.level + 4);
 }
 
 }  // namespace

@@ -760,7 +760,8 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
             than 0.25 rad.
         tolerance : float [m]
             Bound on the error of positions over `duration`, by which steps are subdivided. A fifth of the bound is
-            reserved for events such as impacts.
+            reserved for events such as impacts. With "energy_momentum", steps may also have fourth order: see
+            `Statistics.fourth_order_steps`.
         planar : bool
             True for two dimensions, False for three. By default a planar scene is solved in its plane, and
             `equilibrium` warns if the scene would buckle out of the plane. With True, custom forces and loads that are

@@ -230,6 +230,11 @@ class Statistics:
         Greatest turn of an edge within one inner step.
     energy_momentum_steps : int
         Inner steps of the energy-momentum rule: all steps of the default integrator and of "fourth_order".
+    fourth_order_steps : int
+        Fourth-order steps. Under `tolerance=` the solver takes them where they cost less than steps of second order.
+    unresolved_amplitude : float [m]
+        Greatest amplitude so far of vibrations whose phase the steps under `tolerance=` do not resolve. The error that
+        these vibrations cause is at most twice as large.
     branch_changes : int
         Number of equilibria with `Equilibrium.branch_changed`.
     assembly_time, solve_time, fluid_time, total_time : float [s]
@@ -243,6 +248,8 @@ class Statistics:
     factorizations: int
     largest_turn: float
     energy_momentum_steps: int
+    fourth_order_steps: int
+    unresolved_amplitude: float
     branch_changes: int
     assembly_time: float
     solve_time: float
