@@ -58,12 +58,13 @@ def static_residual(case: StressCase, simulation: withe.Simulation, moment: int)
 
 
 def residual(case: StressCase, simulation: withe.Simulation, before: Look) -> float | None:
-    """The same for the last time step; None where it was cut, or is of another scheme."""
+    """The same for the last time step; None where it was cut, is of another scheme, or has viscous forces."""
     after = look(simulation)
     schemes = {"implicit_midpoint": 0.5, "backward_euler": 1.0}
     if (
         case.event == "drawn curl"
         or case.method not in schemes
+        or case.damping_ratio > 0.0
         or case.steps < 4
         or after.steps != before.steps + 1
         or after.replaced != before.replaced

@@ -21,10 +21,11 @@ HANG = 180.0  # [s], on the wall
 CRASH = "crash or hang"
 
 
-def case_options(doc: str, count: int) -> argparse.Namespace:
-    """Which cases to judge: `cases`, `first`, `case`."""
+def case_options(doc: str, count: int, *extra: tuple[str, dict]) -> argparse.Namespace:
+    """Which cases to judge: `cases`, `first`, `case`; and options of the benchmark's own."""
     return arguments(
         doc,
+        *extra,
         ("--cases", {"type": int, "default": count, "help": "how many (default: %(default)s)"}),
         ("--first", {"type": int, "default": 0, "help": "number of the first"}),
         ("--case", {"type": int, "help": "only this one, and everything about it"}),
@@ -86,21 +87,23 @@ def report_verdicts(
     verdicts: Sequence[Any],
     by: dict[str, tuple[str, Iterable[str]]],
     columns: dict[str, Callable[[Any], object]],
+    name: str = "",
 ) -> collections.Counter[str]:
     """Tables of what was accepted, by attributes of the cases (title: attribute, values), and of all that was not.
 
-    Returns how often each reason was given.
+    `name` is that of a set of cases. Returns how often each reason was given.
     """
+    of_set = f": {name}" if name else ""
     for title, (attribute, values) in by.items():
         rows = []
         for value in values:
             chosen = [v for v, case in zip(verdicts, cases, strict=True) if getattr(case, attribute) == value]
             rows.append((value, f"{sum(not v.reason for v in chosen)} of {len(chosen)}"))
-        report.table(f"Accepted, by {title}", (title, "accepted"), rows)
+        report.table(f"Accepted, by {title}{of_set}", (title, "accepted"), rows)
     reasons = collections.Counter(verdict.reason for verdict in verdicts if verdict.reason)
-    report.table("Not accepted", ("reason", "cases"), reasons.most_common())
+    report.table(f"Not accepted{of_set}", ("reason", "cases"), reasons.most_common())
     report.table(
-        "Case by case (run one with --case NUMBER)",
+        f"Case by case (run one with --case NUMBER){of_set}",
         ("case", *columns, "reason"),
         [
             (case.number, *(show(case) for show in columns.values()), f"{verdict.reason}: {verdict.detail}")
@@ -108,5 +111,5 @@ def report_verdicts(
             if verdict.reason
         ],
     )
-    report.figures["verdicts"] = [asdict(verdict) for verdict in verdicts]
+    report.figures[f"verdicts_{name}" if name else "verdicts"] = [asdict(verdict) for verdict in verdicts]
     return reasons

@@ -26,6 +26,9 @@ __all__ = [
 ]
 
 SEED = 20_240_917
+# Damping of the slowest mode, over its critical damping, in the damped set: rubber and foam have the most, metal the
+# least.
+DAMPING_RATIOS = (1e-3, 1e-1)
 EVENTS = ("load", "jump", "flip", "curl", "drawn curl", "weight")
 # The default twice. Plain midpoint steps gain energy in such scenes, and warn (`EnergyDriftWarning`).
 METHODS = ("static", "energy_momentum", "backward_euler", "energy_momentum", "error-controlled")
@@ -58,6 +61,8 @@ class StressCase:
         Whether the far end is clamped too.
     planar : bool
         Whether everything lies in a plane.
+    damping_ratio : float
+        Damping of the slowest mode by the material's viscosity, over its critical damping.
     """
 
     number: int
@@ -72,6 +77,7 @@ class StressCase:
     direction: np.ndarray = field(repr=False)
     both_ends: bool = False
     planar: bool = False
+    damping_ratio: float = 0.0
 
     @property
     def slenderness(self) -> float:
@@ -101,6 +107,11 @@ class StressCase:
         return 2 * math.pi / math.sqrt(square)
 
     @property
+    def viscosity(self) -> float:
+        """Kelvin-Voigt viscosity that damps the slowest mode by `damping_ratio` [Pa s]."""
+        return self.youngs_modulus * 2 * self.damping_ratio * self.period / (2 * math.pi)
+
+    @property
     def time_step(self) -> float:
         """Between a hundredth of the period and all of it [s]."""
         return 0.01 * self.coarseness * self.period
@@ -118,9 +129,9 @@ class StressCase:
         return self.strength * most if "curl" in self.event else min(most, self.strength / self.length)
 
 
-def draw_case(number: int, methods: tuple[str, ...] = METHODS) -> StressCase:
-    """The case of a number: always the same."""
-    rng = np.random.default_rng([SEED, number])
+def draw_case(number: int, methods: tuple[str, ...] = METHODS, *, seed: int = SEED, damped: bool = False) -> StressCase:
+    """Return the case of a number and a seed, with or without viscosity: always the same."""
+    rng = np.random.default_rng([seed, number])
 
     def log(low: float, high: float) -> float:
         return float(np.exp(rng.uniform(np.log(low), np.log(high))))
@@ -150,6 +161,7 @@ def draw_case(number: int, methods: tuple[str, ...] = METHODS) -> StressCase:
         direction=direction / np.linalg.norm(direction),
         both_ends=bool(rng.random() < 0.3),
         planar=planar,
+        damping_ratio=log(*DAMPING_RATIOS) if damped else 0.0,
     )
 
 
@@ -169,7 +181,9 @@ def build(case: StressCase, **changes: object) -> withe.Simulation:
     """The simulation of a case, before its event; `changes` replace options of `Scene.build`."""
     weight = case.gravity * case.direction
     scene = withe.Scene(gravity=tuple(weight))
-    material = withe.Material(youngs_modulus=case.youngs_modulus, poisson_ratio=0.5, density=1000.0)
+    material = withe.Material(
+        youngs_modulus=case.youngs_modulus, poisson_ratio=0.5, density=1000.0, viscosity=case.viscosity
+    )
     drawn = case.event == "drawn curl"
     x = np.linspace(0.0, case.length, case.nodes)
     points = _coil(case) if drawn else np.column_stack([x, 0 * x, 0 * x])

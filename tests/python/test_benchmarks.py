@@ -225,6 +225,51 @@ def test_a_case_of_the_stress_test_is_the_same_every_time():
     assert draw_case(18).length != first.length
 
 
+def test_damped_cases_are_the_same_scenes_with_viscosity_and_other_seeds_are_others():
+    from stress_cases import DAMPING_RATIOS, draw_case
+
+    for number in range(20):
+        plain, damped = vars(draw_case(number)), vars(draw_case(number, damped=True))
+        differing = {name for name in plain if not np.array_equal(plain[name], damped[name])}
+        assert differing == {"damping_ratio"}
+        assert DAMPING_RATIOS[0] <= damped["damping_ratio"] <= DAMPING_RATIOS[1]
+    assert draw_case(0, seed=1).length != draw_case(0).length
+
+
+def test_refusals_are_accepted_only_where_the_curvature_confirms_them():
+    import dataclasses
+    import functools
+
+    import robustness
+    from stress_cases import draw_case
+
+    crushed = dataclasses.replace(draw_case(291), nodes=40, strength=1.0, radius=1.0, length=20.0)
+    verdict = robustness.judge(291, draw=lambda number: crushed)
+    assert verdict.refused
+    assert not verdict.reason
+    gentle = dataclasses.replace(crushed, radius=0.1)
+    simulation = robustness.build(gentle)
+    check = functools.partial(robustness._check_refusal, gentle, simulation, 0)
+    with pytest.raises(robustness._RejectedError, match="unfounded refusal"):
+        check("the inner fibre would be compressed to nothing")
+    with pytest.raises(robustness._RejectedError, match="unfounded refusal"):
+        robustness._check_refusal(crushed, robustness.build(crushed), 0, "another message")
+
+
+def test_motion_that_is_not_chaotic_is_compared_to_its_end():
+    import dataclasses
+
+    import robustness
+    from stress_cases import draw_case
+
+    calm = dataclasses.replace(draw_case(24), nodes=6, method="error-controlled", strength=0.2)
+    finer = robustness._within_limit(calm, tolerance=1e-4 * calm.length)
+    assert robustness._horizon(calm, finer) == 1.0
+    pushed = [positions + np.array((0.0, 0.0, 0.05 * calm.length)) for positions in finer]
+    with pytest.raises(robustness._RejectedError, match="differs from a finer run"):
+        robustness._compare(calm, pushed, robustness.Verdict(24))
+
+
 @pytest.mark.parametrize("method", ["static", "backward_euler"])
 def test_forces_summed_again_balance_and_a_wrong_load_shows(method):
     import dataclasses
