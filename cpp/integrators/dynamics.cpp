@@ -55,8 +55,8 @@ double moved_by_error(double constant, double dt, int power, Equations& equation
 /// Such errors add up to a shift in phase, whose displacement is at most twice a mode's amplitude a. After a time T,
 /// the error of frequency w is min(2 a, a c (w dt)^p w T). Both bounds meet at (w dt)^(p + 1) = 2 dt / (c T). A
 /// Butterworth filter of order p + 1 leaves slower modes unchanged, and divides faster modes by that power of the
-/// ratio, so that an unresolved amplitude counts once, as 2 a over the duration, however short the steps are. For steps
-/// of both orders that take equally long to compute, the frequencies are about equal, so one filter serves both.
+/// ratio. So an unresolved amplitude counts once, as 2 a over the duration, however short the steps are. For steps of
+/// both orders that take equally long to compute, the frequencies are about equal, so one filter serves both.
 StepErrors estimated_errors(Equations& equations, const Newton& newton, const Options& options, const StepPlan& plan,
                             Predictor& predictor, StepWorkspace& work) {
   const VectorX& acceleration = work.mean;

@@ -25,7 +25,7 @@ struct StepPlan {
 /// Estimated local errors of a step [m].
 struct StepErrors {
   double own = 0;
-  /// Of a step of the other order and of the same length, where it was estimated.
+  /// Error of a step of the other order and of the same length, where it was estimated.
   std::optional<double> other;
 };
 

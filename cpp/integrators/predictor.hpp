@@ -54,10 +54,10 @@ class Predictor {
   static constexpr Butterworth kThird{{0.5, 0.5}};                                  // the first two poles suffice
   static constexpr Butterworth kFifth{{0.80901699437494742, 0.30901699437494742}};  // cos 36, cos 72 degrees
 
-  /// First derivative of the accelerations in time, through a low-pass filter of third order, and, unless `third` is
-  /// null, their third derivative, through one of fifth order: a running mean and one or two oscillators, all of the
-  /// frequency `cut` / dt, solved exactly for an acceleration that is constant in the step. `filter` is a Butterworth
-  /// filter for the derivative of its own order. Call it in every step or in none.
+  /// First derivative of the accelerations in time, through a low-pass filter of third order. Unless `third` is null,
+  /// also their third derivative, through a filter of fifth order. The filters are a running mean and one or two
+  /// oscillators of the frequency `cut` / dt, solved exactly for an acceleration that is constant in the step. `filter`
+  /// is a Butterworth filter for the derivative of its own order. Call it in every step or in none.
   void differentiate(const Butterworth& filter, double cut, double dt, const VectorX& acceleration, VectorX& first,
                      VectorX* third);
 

@@ -5,7 +5,8 @@
 /// Lengths change by powers of two and rarely, or symmetry and energy suffer; under error control, whose error would
 /// change by four, by the fourth root of two.
 ///
-/// Error control bounds the error per unit of time, allowed(dt) = (1 - s) tolerance dt / duration. In an impact this
+/// Error control bounds the estimated error per unit of time, allowed(dt) = f (1 - s) tolerance dt / duration, where f
+/// is the share of an error that its estimate has at least. In an impact this
 /// bound would cost far more steps than it is worth: of all ways to make the same total error, equal errors in every
 /// step take the fewest steps. So an event may make as great an error in a step as the steps around it make on average.
 /// The error beyond the event's time must be left in a share s of the tolerance, which is kept for events and which

@@ -139,8 +139,8 @@ struct World::Implementation : Built, Running {
   void return_to_start();
   void call_before_step(double force_time, double end_time);
   bool scheme_step(double dt, PartResult& part);
-  /// True if error control may take fourth-order steps: nothing dissipates, no support moves, whose velocities are
-  /// known to second order only, and no function of a user needs to be called in the order of time.
+  /// True if error control may take fourth-order steps. Nothing dissipates, and no function of a user needs to be
+  /// called in the order of time. No support moves, because velocities of supports are known to second order only.
   bool may_compose() const;
   /// True if the present part is a fourth-order step.
   bool composes() const { return options.integrator == Integrator::fourth_order || lengths.composed; }

@@ -94,9 +94,7 @@ def test_small_vibrations_of_drawn_rods_end_within_the_tolerance(number):
     for tolerance in (3e-6, 3e-5, 3e-4):
         found, statistics = end_of(scene, begin, duration, tolerance)
         error = np.linalg.norm(found - reference, axis=1).max()
-        # A mode at the cutoff frequency of the filter errs by 1.2 times its estimate, and more in long steps of fourth
-        # order, for which the leading term of the error is too small.
-        assert 1e-3 * tolerance < error < 1.5 * tolerance
+        assert 1e-3 * tolerance < error < tolerance
         steps.append(statistics.steps + 5 * statistics.fourth_order_steps)
     assert steps[0] > steps[1] > steps[2]
 
@@ -149,7 +147,7 @@ def fast_and_slow(amplitude, tolerance):
 
 def test_motion_that_steps_do_not_resolve_is_reported_with_its_amplitude():
     amplitude = 1e-4
-    loose = fast_and_slow(amplitude, 5.0 * amplitude)
+    loose = fast_and_slow(amplitude, 8.0 * amplitude)
     assert 0.5 * amplitude < loose.unresolved_amplitude < 2.0 * amplitude
     tight = fast_and_slow(amplitude, 0.2 * amplitude)
     assert tight.unresolved_amplitude < 0.1 * amplitude
@@ -186,7 +184,7 @@ def test_impacts_keep_the_tolerance_too(integrator):
     steps = []
     for tolerance in (1e-3, 1e-4, 1e-5):
         places, count = dropped(integrator, tolerance, 0.03)
-        assert np.abs(places - reference).max() < 2.5 * tolerance
+        assert np.abs(places - reference).max() < 2.0 * tolerance
         steps.append(count)
     assert steps[0] < steps[1] < steps[2]
 
