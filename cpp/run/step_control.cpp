@@ -13,7 +13,7 @@ constexpr int kFirstHalvings = 8;
 // Share of the tolerance that is kept for events; share of the duration over which parts are averaged.
 constexpr double kEventShare = 0.2, kAveraging = 1.0 / 64.0;
 // Share of the allowed error that an estimate may reach. Errors of drawn vibrations of rods are up to 1.4 times their
-// estimates: modes near the cutoff of the filter count for less than their error, and long fourth-order steps have
+// estimates. Modes near the cutoff of the filter count for less than their error, and long fourth-order steps have
 // errors beyond the leading term.
 constexpr double kEstimateShare = 0.7;
 // Share of the allowed error that a longer part may be expected to have.
