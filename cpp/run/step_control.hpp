@@ -6,11 +6,11 @@
 /// change by four, by the fourth root of two.
 ///
 /// Error control bounds the estimated error per unit of time, allowed(dt) = f (1 - s) tolerance dt / duration, where f
-/// is the share of an error that its estimate has at least. In an impact this
-/// bound would cost far more steps than it is worth: of all ways to make the same total error, equal errors in every
-/// step take the fewest steps. So an event may make as great an error in a step as the steps around it make on average.
-/// The error beyond the event's time must be left in a share s of the tolerance, which is kept for events and which
-/// time fills again. A step may grow where C (times dt)^p, C the greatest of the last errors over dt^p, is allowed.
+/// is the least ratio of an estimate to the error. In an impact this bound would cost far more steps than it is worth:
+/// of all ways to make the same total error, equal errors in every step take the fewest steps. So an event may make as
+/// great an error in a step as the steps around it make on average. The error beyond the event's time must be left in a
+/// share s of the tolerance, which is kept for events and which time fills again. A step may grow where C (times dt)^p,
+/// C the greatest of the last errors over dt^p, is allowed.
 ///
 /// Where the scene allows fourth-order steps, error control also chooses the order: that whose longest allowed step,
 /// (allowed(1) / C)^(1 / (p - 1)), is longer in relation to its cost.

@@ -143,8 +143,7 @@ Verdict World::Implementation::try_step(const StepControl& control, double dt, E
              energy_scratch);
   commit_step(part);
   const Contact* contact = watched_contact();
-  const bool near_limit =
-      2.0 * part.turn > 1.5 || 2.5 * held_turn_of(part) > 1.0 || (contact && contact->unresolved(2.0 * dt));
+  const bool near_limit = 2.5 * held_turn_of(part) > 1.0 || (contact && contact->unresolved(2.0 * dt));
   const auto [after, verdict] = control.accept(lengths, part.errors, dt, near_limit);
   if (options.tolerance && acts_in_middle(options.integrator))
     statistics.unresolved_amplitude =
