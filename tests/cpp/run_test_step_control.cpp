@@ -164,6 +164,7 @@ TEST(StepControl, AnEventMayErrByMoreUntilItsReserveIsSpent) {
 std::array<int, 2> parts_of_mode(double frequency, double tolerance) {
   Options options = options_of(tolerance);
   options.duration = 100.0;
+  options.max_halvings = 20;
   const StepControl control(options, true);
   StepLengths lengths = control.begin({}, false).lengths;
   std::array<int, 2> parts{};
