@@ -5,8 +5,9 @@
 namespace withe {
 namespace {
 
-// Operations below which a matrix is not divided: waking the threads takes as long as some 1e5 operations.
-constexpr double kMinDivided = 2e6;
+// Operations below which a matrix is not divided: one thread then takes about a millisecond, and waking the others for
+// each level takes a part of that.
+constexpr double kMinDivided = 1e7;
 // Least number of subtrees of a tree whose branches are alike. More subtrees are easier to share, but leave more
 // supernodes above them.
 constexpr double kSubtrees = 16.0;

@@ -115,7 +115,7 @@ class Multifrontal final : public LinearSolver {
   std::unique_ptr<LinearSolver> clone() const override { return std::make_unique<Multifrontal>(*this); }
 
   void share_work(WorkerPool* workers) override {
-    const bool shared = workers && workers->workers() > 1 && !parts_.undivided(), before = workers_;
+    const bool shared = workers && workers->workers() > 1 && !parts_.undivided(), before = workers_ != nullptr;
     workers_ = shared ? workers : nullptr;
     if (shared != before) make_room();
   }

@@ -42,10 +42,10 @@ struct Case {
 /// Nets, rods that touch, and one front alone; all are large enough to be divided.
 std::vector<Case> cases() {
   Random random(3);
-  return {{"pinned net", net_pattern(14, Crossings::pinned)},
-          {"rigid net", net_pattern(17, Crossings::rigid)},
-          {"rods", rods_pattern(2400, random)},
-          {"dense", dense_pattern(301)}};
+  return {{"pinned net", net_pattern(18, Crossings::pinned)},
+          {"rigid net", net_pattern(21, Crossings::rigid)},
+          {"rods", rods_pattern(3000, random)},
+          {"dense", dense_pattern(345)}};
 }
 
 struct Solutions {

@@ -9,7 +9,7 @@ import pytest
 import withe
 
 RUBBER = withe.Material(youngs_modulus=1e6, poisson_ratio=0.5, density=1000.0)
-CORDS = 14  # large enough that the engine divides the matrix
+CORDS = 17  # large enough that the engine divides the matrix
 
 
 def _net() -> withe.Scene:

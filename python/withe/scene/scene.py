@@ -775,7 +775,7 @@ class Scene(AppliedLoads, Loads, Contacts, Supports):
             the arcs of edges.
         threads : int
             Number of threads that share the work of each step. The results have the same bits for every number. More
-            than one thread pays in nets and piles of 2,000 unknowns and more. Unbranched rods, and rods joined in a
+            than one thread pays in nets and piles of 5,000 unknowns and more. Unbranched rods, and rods joined in a
             tree, are too fast to share.
         solver : withe.Solver
             Options of Newton's method, of its linear equations and of the subdivision of steps.
