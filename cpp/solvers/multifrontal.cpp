@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <functional>
 #include <numeric>
 #include <vector>
@@ -21,16 +22,33 @@ constexpr double kMinShared = 2e5, kMinSharedEntries = 2e5;
 
 int padded(int length) { return (length + kFrontPadding - 1) / kFrontPadding * kFrontPadding; }
 
-/// Sets columns to zero, in large matrices only from the diagonal down.
-void clear_columns(double* column, int length, int count) {
-  if (count <= kPanelColumns) {
-    std::fill_n(column, std::ptrdiff_t{length} * count, 0.0);
+/// Sets columns [first, end) of a matrix to zero, where they are many only from the diagonal down.
+void clear_columns(double* matrix, int length, int first, int end) {
+  double* column = matrix + std::ptrdiff_t{length} * first;
+  if (end - first <= kPanelColumns) {
+    std::fill_n(column, std::ptrdiff_t{length} * (end - first), 0.0);
     return;
   }
-  for (int c = 0; c < count; ++c, column += length) {
+  for (int c = first; c < end; ++c, column += length) {
     const int row = c / kFrontPadding * kFrontPadding;
     std::fill_n(column + row, length - row, 0.0);
   }
+}
+
+/// Calls work(first, end) for pieces of the columns of a triangle, of which the later ones are shorter. Without workers
+/// there is one piece.
+template <class Work>
+void in_pieces(WorkerPool* workers, int columns, const Work& work) {
+  if (!workers) return work(0, columns);
+  const int pieces = 4 * workers->workers();
+  const auto start = [&](int piece) {
+    return static_cast<int>(columns * (1.0 - std::sqrt(1.0 - static_cast<double>(piece) / pieces)));
+  };
+  const auto one = [&](std::size_t piece) {
+    const int k = static_cast<int>(piece);
+    work(start(k), k + 1 == pieces ? columns : start(k + 1));
+  };
+  workers->run(static_cast<std::size_t>(pieces), std::ref(one));
 }
 
 /// values(): column by column, in the order of the pattern; symmetric: the lower triangle.
@@ -146,17 +164,22 @@ class Multifrontal final : public LinearSolver {
                  std::atomic<bool>& usable) {
     const Front fronts[2] = {front_of(s, 0), front_of(s, sides_ - 1)};
     for (int side = 0; side < sides_; ++side) {
-      clear_columns(fronts[side].factor, fronts[side].length, fronts[side].columns);
+      clear_columns(fronts[side].factor, fronts[side].length, 0, fronts[side].columns);
       for (int p = entry_starts_[side][s]; p < entry_starts_[side][s + 1]; ++p)
         fronts[side].factor[entries_[side][p].place] = values_[entries_[side][p].value];
-      clear_columns(fronts[side].rest, fronts[side].rest_length, nodes_.rest(s));
+      in_pieces(workers, nodes_.rest(s),
+                [&](int first, int end) { clear_columns(fronts[side].rest, fronts[side].rest_length, first, end); });
     }
     if (!shift.empty())
       for (int c = 0; c < fronts[0].columns; ++c)
         fronts[0].factor[std::ptrdiff_t{fronts[0].length} * c + c] += shift[nodes_.order[nodes_.column_starts[s] + c]];
-    for (int child = last_child_[s]; child >= 0; child = sibling_[child])
-      for (int side = 0; side < sides_; ++side)
-        add_rest(child, rest_.data() + kept_at_[child] + side * rest_side_size(child), fronts[side]);
+    for (int child = last_child_[s]; child >= 0; child = sibling_[child]) {
+      for (int side = 0; side < sides_; ++side) {
+        const double* rest = rest_.data() + kept_at_[child] + side * rest_side_size(child);
+        in_pieces(workers, nodes_.rest(child),
+                  [&](int first, int end) { add_rest(child, rest, first, end, fronts[side]); });
+      }
+    }
     if (workers)
       eliminate_together(*workers, fronts[0], fronts[sides_ - 1]);
     else
@@ -235,11 +258,12 @@ class Multifrontal final : public LinearSolver {
   std::ptrdiff_t rest_size(int s) const { return sides_ * rest_side_size(s); }
   std::ptrdiff_t rest_side_size(int s) const { return std::ptrdiff_t{padded(nodes_.rest(s))} * nodes_.rest(s); }
 
-  /// Adds the remaining matrix of a child to the front of its parent.
-  void add_rest(int child, const double* rest, const Front& parent) const {
+  /// Adds columns of the remaining matrix of a child to the front of its parent.
+  void add_rest(int child, const double* rest, int first, int end, const Front& parent) const {
     const int rows = nodes_.rest(child), length = padded(rows);
     const int* place = rows_in_parent_.data() + nodes_.row_starts[child];
-    for (int column = 0; column < rows; ++column, rest += length) {
+    rest += std::ptrdiff_t{length} * first;
+    for (int column = first; column < end; ++column, rest += length) {
       const int to = place[column];
       double* target = to < parent.columns
                            ? parent.factor + std::ptrdiff_t{parent.length} * to
