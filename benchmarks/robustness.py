@@ -149,7 +149,9 @@ def _run(case: StressCase, verdict: Verdict) -> list[np.ndarray]:
         start = time.thread_time()
         try:
             simulation.step()
-        except ValueError as error:
+        except withe.ConvergenceError as error:
+            if "inner fibre" not in str(error):
+                raise
             _check_refusal(case, simulation, i, str(error))
             verdict.refused = True
             return []
@@ -170,7 +172,7 @@ def _check_refusal(case: StressCase, simulation: withe.Simulation, step: int, me
     """Reject a refusal that a read-out does not confirm."""
     natural = natural_curvature_of(case, int(step >= case.steps // 2))
     change = np.linalg.norm(simulation.curvatures("rod") - natural, axis=1).max()
-    if "compressed to nothing" not in message or step not in (0, case.steps // 2) or change * case.radius < 0.99:
+    if step not in (0, case.steps // 2) or change * case.radius < 0.99:
         raise _RejectedError("unfounded refusal", message)
 
 

@@ -8,6 +8,7 @@
 #include "common/check.hpp"
 #include "common/text.hpp"
 #include "model/edge_vectors.hpp"
+#include "run/failure.hpp"
 #include "run/places.hpp"
 #include "run/read.hpp"
 
@@ -72,7 +73,7 @@ void check_reversible(const Model& model, const Options& options, const Paramete
             ", because its inner steps go back in time: use integrator 'implicit_midpoint' or 'energy_momentum'");
 }
 
-void check_fibre_strain(const Model& model, const Parameters& parameters, const Configuration& now) {
+void check_fibre_strain(const Model& model, const Parameters& parameters, const Configuration& now, double time) {
   for (std::size_t r = 0; r < model.description.rods.size(); ++r) {
     const RodDescription& rod = model.description.rods[r];
     if (rod.fibre_distance.rows() == 0) continue;
@@ -92,10 +93,12 @@ void check_fibre_strain(const Model& model, const Parameters& parameters, const 
       distance = strain / curvature;
     }
     if (worst < 1.0) continue;
-    require(false, "natural curvature of rod '" + rod.name + "' differs from its curvature by " + text(curvature) +
-                       " 1/m, with fibres up to " + text(1e3 * distance) +
-                       " mm from the axis: the inner fibre would be compressed to nothing. Use a smaller "
-                       "natural_curvature, or change it over a time, over=");
+    throw ConvergenceFailure(
+        "natural curvature of rod '" + rod.name + "' differs from its curvature by " + text(curvature) +
+            " 1/m, with fibres up to " + text(1e3 * distance) +
+            " mm from the axis: the inner fibre would be compressed to nothing. Use a smaller natural_curvature, or "
+            "change it over a time, over=",
+        time, 0.0, static_cast<int>(r), -1, 0.0);
   }
 }
 

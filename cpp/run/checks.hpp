@@ -18,10 +18,10 @@ void check_impacts(const Options& options, const ContactDescription& contact);
 const char* dissipation_of(const Model& model, const Parameters& p);
 /// Refuses forces that cannot be run backwards under a scheme that steps back in time.
 void check_reversible(const Model& model, const Options& options, const Parameters& p);
-/// Refuses natural curvatures that strain a fibre of a rod by -1 or more at its present shape, where the section is
-/// known. The strain of the fibre at a distance r from the axis is r times the change of curvature
+/// Throws ConvergenceFailure for natural curvatures that strain a fibre of a rod by -1 or more at its present shape,
+/// where the section is known. The strain of the fibre at a distance r from the axis is r times the change of curvature
 /// [Euler and Bernoulli].
-void check_fibre_strain(const Model& model, const Parameters& parameters, const Configuration& now);
+void check_fibre_strain(const Model& model, const Parameters& parameters, const Configuration& now, double time);
 /// Refuses friction of a pair that has not one share for each node and edge of the rod.
 void check_shares(const Model& model, const ContactPairDescription& pair);
 /// Refuses a turn that moves the shape of an obstacle.

@@ -39,7 +39,7 @@ bool lessens(double now, double before) { return before == 0.0 || now < 0.9 * be
 /// One time step of `duration`, in equal parts where it does not converge or is not accurate enough.
 void World::Implementation::advance(double duration) {
   const double base = state.time;
-  if (actuation_changed) check_fibre_strain(model, parameters, configuration());
+  if (actuation_changed) check_fibre_strain(model, parameters, configuration(), state.time);
   account_for_settings();
   if (!first_energy) begin_energy_watch();
   begin_crossing_watch();

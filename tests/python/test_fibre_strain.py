@@ -1,4 +1,4 @@
-"""Natural curvatures that no material bears are refused before the first step."""
+"""Natural curvatures that no material can bear end in an error before the first step."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ def test_a_curvature_that_crushes_the_inner_fibre_is_refused_before_the_step():
     simulation = scene.build(time_step=1e-4)
     simulation.set(rod, natural_curvature=(0.0, 120.0))
     with pytest.raises(
-        ValueError, match=r"rod 1.* by 120 1/m, with fibres up to 10 mm .* compressed to nothing.* over="
+        withe.ConvergenceError, match=r"rod 1.* by 120 1/m, with fibres up to 10 mm .* compressed to nothing.* over="
     ):
         simulation.step()
     assert simulation.time == 0.0
@@ -37,10 +37,10 @@ def test_the_change_of_curvature_counts_and_not_the_curvature():
     simulation = scene.build(time_step=1e-6)
     simulation.step()
     simulation.set(rod, natural_curvature=(0.0, 0.0))
-    with pytest.raises(ValueError, match="compressed to nothing"):
+    with pytest.raises(withe.ConvergenceError, match="compressed to nothing"):
         simulation.step()
     straight, rod = arm(start=None, end=None, nodes=None, points=points, radius=0.011, natural="straight")
-    with pytest.raises(ValueError, match="compressed to nothing"):
+    with pytest.raises(withe.ConvergenceError, match="compressed to nothing"):
         straight.build(time_step=1e-6).step()
 
 
@@ -65,5 +65,15 @@ def test_each_axis_of_a_rectangle_has_its_own_distance(width, height):
     simulation.step()
     simulation.reset()
     simulation.set(rod, natural_curvature=thick)
-    with pytest.raises(ValueError, match="fibres up to 10 mm"):
+    with pytest.raises(withe.ConvergenceError, match="fibres up to 10 mm"):
         simulation.step()
+
+
+def test_other_simulations_of_a_batch_step_on():
+    scene, rod = arm(radius=RADIUS, name="arm")
+    batch = scene.build_batch(2, time_step=1e-4)
+    batch.set("arm", natural_curvature=[[0.0, 5.0], [0.0, 120.0]])
+    batch.step(2)
+    assert list(batch.failed) == [False, True]
+    assert "compressed to nothing" in str(batch.failures[1])
+    assert list(batch.time) == [2e-4, 0.0]
