@@ -70,7 +70,7 @@ def test_each_axis_of_a_rectangle_has_its_own_distance(width, height):
 
 
 def test_other_simulations_of_a_batch_step_on():
-    scene, rod = arm(radius=RADIUS, name="arm")
+    scene, _ = arm(radius=RADIUS, name="arm")
     batch = scene.build_batch(2, time_step=1e-4)
     batch.set("arm", natural_curvature=[[0.0, 5.0], [0.0, 120.0]])
     batch.step(2)
