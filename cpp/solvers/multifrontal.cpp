@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cmath>
 #include <functional>
 #include <numeric>
 #include <vector>
@@ -33,22 +32,6 @@ void clear_columns(double* matrix, int length, int first, int end) {
     const int row = c / kFrontPadding * kFrontPadding;
     std::fill_n(column + row, length - row, 0.0);
   }
-}
-
-/// Calls work(first, end) for pieces of the columns of a triangle, of which the later ones are shorter. Without workers
-/// there is one piece.
-template <class Work>
-void in_pieces(WorkerPool* workers, int columns, const Work& work) {
-  if (!workers) return work(0, columns);
-  const int pieces = 4 * workers->workers();
-  const auto start = [&](int piece) {
-    return static_cast<int>(columns * (1.0 - std::sqrt(1.0 - static_cast<double>(piece) / pieces)));
-  };
-  const auto one = [&](std::size_t piece) {
-    const int k = static_cast<int>(piece);
-    work(start(k), k + 1 == pieces ? columns : start(k + 1));
-  };
-  workers->run(static_cast<std::size_t>(pieces), std::ref(one));
 }
 
 /// values(): column by column, in the order of the pattern; symmetric: the lower triangle.
@@ -198,8 +181,7 @@ class Multifrontal final : public LinearSolver {
   void solve(std::span<double> right_hand_side, int down, int up) const {
     require_solvable(factorized_, right_hand_side, size());
     for (int k = 0; k < size(); ++k) work_[k] = right_hand_side[nodes_.order[k]];
-    const bool shared = workers_ && kMinSharedEntries <= static_cast<double>(factor_.size());
-    run(parts_.subtrees.size(), [&](std::size_t i) { solve_down(parts_.subtrees[i], down); }, shared);
+    run(parts_.subtrees.size(), [&](std::size_t i) { solve_down(parts_.subtrees[i], down); });
     for (const EliminationParts::Level& level : parts_.levels)
       run(
           level.supernodes.size(), [&](std::size_t i) { solve_down(level.supernodes[i], down); },
@@ -208,12 +190,9 @@ class Multifrontal final : public LinearSolver {
       run(
           level->supernodes.size(), [&](std::size_t i) { solve_up(level->supernodes[i], up); },
           level->entries >= kMinSharedEntries);
-    run(
-        parts_.subtrees.size(),
-        [&](std::size_t i) {
-          for (int s = parts_.subtrees[i].end - 1; s >= parts_.subtrees[i].first; --s) solve_up(s, up);
-        },
-        shared);
+    run(parts_.subtrees.size(), [&](std::size_t i) {
+      for (int s = parts_.subtrees[i].end - 1; s >= parts_.subtrees[i].first; --s) solve_up(s, up);
+    });
     for (int k = 0; k < size(); ++k) right_hand_side[nodes_.order[k]] = work_[k];
   }
 

@@ -7,12 +7,14 @@
 namespace withe {
 namespace {
 
-// Pieces of a panel's work for each thread: a thread that starts late does fewer of them.
-constexpr int kPiecesPerWorker = 3;
-
 int rounded_up(double number) { return static_cast<int>(std::ceil(number / kFrontPadding)) * kFrontPadding; }
 
 }  // namespace
+
+int triangle_start(int columns, int piece, int pieces) {
+  if (piece == pieces) return columns;
+  return std::min(columns, rounded_up(columns * (1.0 - std::sqrt(1.0 - static_cast<double>(piece) / pieces))));
+}
 
 void eliminate_together(WorkerPool& workers, const Front& lower, const Front& upper) {
   const FrontKernels& kernels = front_kernels();
@@ -32,18 +34,10 @@ void eliminate_together(WorkerPool& workers, const Front& lower, const Front& up
       kernels.finish_rows(front(side), front(1 - side), panel, row(piece), row(piece + 1));
     };
     workers.run(static_cast<std::size_t>(sides * pieces), std::ref(finish));
-    // Columns to the right, in pieces of equal area: they become shorter.
-    const int width = lower.rows - panel.end;
-    const auto column = [&](int piece) {
-      if (piece == pieces) return lower.rows;
-      const double left = std::sqrt(1.0 - static_cast<double>(piece) / pieces);
-      return std::min(panel.end + rounded_up(width * (1.0 - left)), lower.rows);
-    };
-    const auto update = [&](std::size_t task) {
-      const int side = static_cast<int>(task) / pieces, piece = static_cast<int>(task) % pieces;
-      kernels.update(front(side), front(1 - side), panel, column(piece), column(piece + 1));
-    };
-    workers.run(static_cast<std::size_t>(sides * pieces), std::ref(update));
+    for (int side = 0; side < sides; ++side)
+      in_pieces(&workers, lower.rows - panel.end, [&](int column, int end) {
+        kernels.update(front(side), front(1 - side), panel, panel.end + column, panel.end + end);
+      });
   }
 }
 
