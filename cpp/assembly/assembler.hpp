@@ -109,7 +109,6 @@ class Assembler {
     workers_ = workers;
     solver_->share_work(workers);
   }
-  WorkerPool* workers() const { return workers_; }
   /// Places of the diagonal in the solver's values, per unknown.
   const std::vector<std::ptrdiff_t>& diagonal_offsets() const { return diagonal_; }
   double diagonal(int dof) const {

@@ -62,15 +62,15 @@ void check_reversible(const Model& model, const Options& options, const Paramete
   require(options.integrator != Integrator::verlet || !model.has_bodies(),
           "integrator 'verlet' does not support rigid bodies: use 'energy_momentum' or 'backward_euler'");
   if (options.integrator != Integrator::fourth_order) return;
+  const char* instead =
+      ", because its inner steps go back in time: use integrator 'implicit_midpoint' or 'energy_momentum'";
   const char* dissipates = dissipation_of(model, p);
-  require(!dissipates, "integrator 'fourth_order' does not support ", dissipates ? dissipates : "",
-          ", because its inner steps go back in time: use integrator 'implicit_midpoint' or 'energy_momentum'");
+  require(!dissipates, "integrator 'fourth_order' does not support ", dissipates ? dissipates : "", instead);
   if (!p.dragged) return;
   for (int i = 0; i < model.node_count; ++i)
     require(p.node_drag(i) * options.time_step <= p.node_mass(i),
             "integrator 'fourth_order' supports drag for a time_step up to mass over drag only, ",
-            p.node_mass(i) / p.node_drag(i), " s at node ", i,
-            ", because its inner steps go back in time: use integrator 'implicit_midpoint' or 'energy_momentum'");
+            p.node_mass(i) / p.node_drag(i), " s at node ", i, instead);
 }
 
 void check_fibre_strain(const Model& model, const Parameters& parameters, const Configuration& now, double time) {

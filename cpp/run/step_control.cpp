@@ -44,7 +44,7 @@ double local_order(Integrator integrator) {
 StepControl::StepControl(const Options& options, bool may_compose)
     : adaptive_(options.adaptive),
       explicit_(options.integrator == Integrator::verlet),
-      may_compose_(may_compose && options.tolerance && options.integrator == Integrator::energy_momentum),
+      may_compose_(may_compose),
       max_halvings_(options.max_halvings),
       order_(local_order(options.integrator)),
       tolerance_(options.tolerance),

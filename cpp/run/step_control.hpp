@@ -12,8 +12,9 @@
 /// share s of the tolerance, which is kept for events and which time fills again. A step may grow where C (times dt)^p,
 /// C the greatest of the last errors over dt^p, is allowed.
 ///
-/// Where the scene allows fourth-order steps, error control also chooses the order: that whose longest allowed step,
-/// (allowed(1) / C)^(1 / (p - 1)), is longer in relation to its cost.
+/// Where the scene allows fourth-order steps, error control also chooses the order. The longest allowed step of an
+/// order is (allowed(1) / C)^(1 / (p - 1)). Error control takes the order with the greater ratio of this step to its
+/// cost.
 
 #include <array>
 #include <optional>
@@ -70,7 +71,7 @@ struct StepProgress {
 
 class StepControl {
  public:
-  /// `may_compose`: true if error control may take fourth-order steps.
+  /// `may_compose`: true if error control may take fourth-order steps besides those of second order.
   explicit StepControl(const Options& options, bool may_compose = false);
 
   /// Parts at the start of a time step. `has_history`: parts were taken before, from which errors are estimated; else
@@ -95,7 +96,6 @@ class StepControl {
   };
   Accepted accept(StepLengths lengths, const StepErrors& errors, double dt, bool near_limit) const;
 
-  bool may_compose() const { return may_compose_; }
   int levels_per_halving() const { return tolerance_ ? 4 : 1; }
   int deepest_level() const { return levels_per_halving() * max_halvings_; }
   /// Number of parts in a time step at a level.

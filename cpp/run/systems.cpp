@@ -27,7 +27,7 @@ void Systems::build(const Model& model, const Options& options) {
   else if (!workers_ || workers_->workers() != options.threads)
     workers_ = std::make_unique<WorkerPool>(options.threads);
   newton_ = std::make_unique<Newton>(model, options);
-  scheme_ = std::make_unique<Equations>(model, scheme_options());
+  scheme_ = std::make_unique<Equations>(model, shared(options));
 }
 
 void Systems::drop_others() {
@@ -45,8 +45,8 @@ void Systems::drop_scratch() {
   work = std::move(fresh);
 }
 
-EquationOptions Systems::scheme_options() const {
-  EquationOptions result = equation_options(*options_);
+EquationOptions Systems::shared(const Options& options) const {
+  EquationOptions result = equation_options(options);
   result.workers = workers_.get();
   return result;
 }
@@ -54,9 +54,7 @@ EquationOptions Systems::scheme_options() const {
 EquationOptions Systems::static_options() const {
   Options symmetric = *options_;
   symmetric.integrator = Integrator::statics;
-  EquationOptions result = equation_options(symmetric);
-  result.workers = workers_.get();
-  return result;
+  return shared(symmetric);
 }
 
 Equations& Systems::statics() {

@@ -39,8 +39,7 @@ class Systems {
   Equations& statics();
   /// Symmetric equations for read-outs, which leave every factorisation alone.
   Equations& readout() const;
-  /// Form of the equations of the time steps, and of symmetric equations of equilibria.
-  EquationOptions scheme_options() const;
+  /// Form of symmetric equations of equilibria.
   EquationOptions static_options() const;
   /// The adjoint of equilibria.
   StepGradient& gradient() const;
@@ -58,6 +57,8 @@ class Systems {
   StepWorkspace work;
 
  private:
+  /// Form of the equations of some options, whose work the threads of this scene share.
+  EquationOptions shared(const Options& options) const;
   void factorize_again(System owner);
 
   const Model* model_ = nullptr;
