@@ -47,6 +47,7 @@ GOALS = {
     "loop": 100,
     "self": 100,
     "six cables": 95,
+    "curls": 80,
     "specks": 100,
 }
 
@@ -112,7 +113,8 @@ def synthetic(count, scale, first_seed):
         for seed in range(first_seed, first_seed + count):
             scene = make_case(case, seed, scale)
             tracing = trace_mask(scene.mask)
-            result = score(scene, tracing, tip_tolerance=5.0 * max(scale, 1.0))
+            distance, tip = (8.0, 8.0) if case == "curls" else (2.0, 5.0)
+            result = score(scene, tracing, distance, tip * max(scale, 1.0))
             right += result.right
             touching += not result.right and result.count > len(scene.centrelines)
             tips += not result.right and result.distance <= 2.0

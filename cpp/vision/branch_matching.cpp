@@ -24,13 +24,16 @@ double signed_angle(const Vector2& from, const Vector2& to) {
   return std::atan2(from.x() * to.y() - from.y() * to.x(), from.dot(to));
 }
 
-/// Energy of a pair. It is infinite if the turn exceeds 90 degrees within a width, as of two tips that touch.
+/// Energy of a pair. It is infinite if the turn exceeds 90 degrees within a width, as of two tips that touch. A pair
+/// that closes one edge to a ring costs a single end more: a cable with a curl looks like one that a ring touches, and
+/// rings are rare.
 double pair_energy(const Branch& a, const Branch& b) {
   const Vector2 chord = b.point - a.point;
   const double width = a.half_width + b.half_width;
   const double turn = std::abs(signed_angle(a.tangent, -b.tangent));
   if (turn > 0.5 * std::numbers::pi && chord.norm() < 1.5 * width) return kForbidden;
-  return bending_energy(a, b);
+  const bool ring = a.edge >= 0 && a.edge == b.edge;
+  return bending_energy(a, b) + (ring ? single_energy(width) : 0);
 }
 
 /// Finds the best and the second best way to pair branches. If their number is odd, one branch stays single. Further
@@ -218,6 +221,11 @@ std::vector<std::pair<int, int>> pair_ends(const std::vector<double>& singles, s
     search.run(group, pairs);
   }
   return pairs;
+}
+
+Vector2 way_place(const Vector2& from, const Vector2& leaving, const Vector2& to, const Vector2& arriving, double t) {
+  const double u = 1 - t, length = (to - from).norm();
+  return u * u * (1 + 2 * t) * from + t * t * (1 + 2 * u) * to + length * t * u * (u * leaving - t * arriving);
 }
 
 double bending_energy(const Branch& from, const Branch& to) {

@@ -15,6 +15,10 @@ namespace withe {
 /// L (k1/3 + k2/6), and b increases by L (k1/6 + k2/3).
 double bending_energy(const Branch& from, const Branch& to);
 
+/// Place at t, from 0 to 1, of the cubic line from a point in one direction to another point, which it reaches in
+/// another direction (unit vectors).
+Vector2 way_place(const Vector2& from, const Vector2& leaving, const Vector2& to, const Vector2& arriving, double t);
+
 struct Matching {
   std::vector<std::pair<int, int>> pairs;  ///< pairs of branches; other branches end here
   double energy = 0;                       ///< [1/px]; infinite if none was found or there are too many branches

@@ -380,6 +380,7 @@ std::vector<Branch> measure_branches(const SkeletonGraph& graph, const ZoneOptio
     for (std::size_t end = 0; end < 2; ++end) {
       branches[2 * e + end] =
           measure_branch(graph, edge, static_cast<int>(end), skips[end], skips[1 - end], options.tangent_length);
+      branches[2 * e + end].edge = static_cast<int>(e);
     }
   }
   return branches;

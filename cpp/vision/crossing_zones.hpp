@@ -23,6 +23,7 @@ struct Branch {
   double curvature = 0;               ///< positive to the left of the tangent [1/px]
   double half_width = 0;              ///< [px]
   int skip = 0;                       ///< pixels between the point and the end of the edge
+  int edge = -1;                      ///< of the graph
 };
 
 struct Zone {
@@ -39,7 +40,7 @@ struct SideBySide {
 };
 
 /// Reason why a result is uncertain.
-enum class Doubt { similar_energies, parallel_strands, different_colors };
+enum class Doubt { similar_energies, parallel_strands, different_colors, ends_on_itself };
 
 struct DoubtfulZone {
   Vector2 point = Vector2::Zero();
@@ -47,11 +48,11 @@ struct DoubtfulZone {
 };
 
 struct ZoneOptions {
-  double short_link = 2;          ///< links up to this long join zones [widths]
-  double merged_link = 12;        ///< also links up to this long, if the mask is wider than the cables [widths]
-  double merged_widening = 1.1;   ///< width of the mask in such links, relative to the cables
-  double tangent_length = 4;      ///< length over which tangents are fitted [widths]
-  double similar_energies = 0.2;  ///< two matchings closer than this are ambiguous, relative
+  double short_link = 2;           ///< links up to this long join zones [widths]
+  double merged_link = 12;         ///< also links up to this long, if the mask is wider than the cables [widths]
+  double merged_widening = 1.1;    ///< width of the mask in such links, relative to the cables
+  double tangent_length = 4;       ///< length over which tangents are fitted [widths]
+  double similar_energies = 0.38;  ///< two matchings closer than this are ambiguous, relative
 };
 
 /// Pairs of branches that continue each other.

@@ -33,9 +33,16 @@ struct SkeletonNode {
   std::vector<int> edges;  ///< an edge that starts and ends here is listed twice
 };
 
+/// An end of the skeleton that was removed: a fray, or a cable that ends close to a crossing.
+struct Spur {
+  Vector2 root = Vector2::Zero();
+  Vector2 tip = Vector2::Zero();
+};
+
 struct SkeletonGraph {
   std::vector<SkeletonNode> nodes;
   std::vector<SkeletonEdge> edges;
+  std::vector<Spur> spurs;
 };
 
 /// Builds the graph of a skeleton; half widths are measured in the mask that it is the skeleton of, up to `limit`.

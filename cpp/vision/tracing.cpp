@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 
+#include "vision/branch_matching.hpp"
 #include "vision/cable_ends.hpp"
 #include "vision/cable_fit.hpp"
 #include "vision/cable_paths.hpp"
@@ -177,6 +178,9 @@ constexpr double kShortestPiece = 2.2;
 /// before them or behind the fork [half widths].
 constexpr double kSpurRatioOfPieces = 2.2;
 
+/// A branch deviates from its tangent by less than this on its way to a removed end behind a crossing [rad].
+constexpr double kMostTurn = 0.9;
+
 /// Shortest cable in a mask that is cut between colours [widths].
 constexpr double kShortestOfColors = 6;
 
@@ -245,6 +249,57 @@ Outlines outline_cables(const Found& found, const std::vector<CablePath>& paths,
 
 using Joints = std::vector<std::pair<CableEnd, CableRow>>;
 
+/// The removed end of the skeleton in which a branch continues across another cable; null if there is none. A cable
+/// that ends close behind a crossing looks like a fray of the other cable.
+const Spur* spur_ahead(const SkeletonGraph& graph, const Branch& branch) {
+  constexpr double longest = 12;    // [half widths]
+  constexpr double shortest = 0.8;  // of a spur [half widths]
+  const Spur* best = nullptr;
+  double in_line = std::cos(kMostTurn);
+  for (const Spur& spur : graph.spurs) {
+    const Vector2 chord = spur.tip - branch.point, end = spur.tip - spur.root;
+    const double length = chord.norm();
+    if (length > longest * branch.half_width || end.norm() < shortest * branch.half_width) continue;
+    const double cosine = branch.tangent.dot(chord) / length;
+    if (cosine < in_line || chord.dot(end) <= 0) continue;
+    in_line = cosine;
+    best = &spur;
+  }
+  return best;
+}
+
+/// Points from a branch across another cable, along a removed end of the skeleton, to the end of the mask.
+std::vector<Vector2> grow_along(const BitImage& mask, const Branch& branch, const Spur& spur) {
+  const Vector2 chord = spur.tip - branch.point;
+  const double length = chord.norm();
+  // The line of least bending without a known direction at its far end.
+  const Vector2 direction = chord / length;
+  const Vector2 arrival = (3 * direction - branch.tangent).normalized();
+  std::vector<Vector2> points;
+  for (double s = 1; s < length; s += 1)
+    points.push_back(way_place(branch.point, branch.tangent, spur.tip, arrival, s / length));
+  Branch behind = branch;
+  behind.point = spur.tip;
+  behind.tangent = arrival;
+  points.push_back(spur.tip);
+  const std::vector<Vector2> rest = grow_end(mask, behind);
+  points.insert(points.end(), rest.begin(), rest.end());
+  return points;
+}
+
+/// Points from a branch straight across another cable to the end of the mask; none if the mask hardly goes on behind
+/// the far flank, at a distance along the tangent.
+std::vector<Vector2> grow_across(const BitImage& mask, const Branch& branch, double far_flank) {
+  const Vector2 normal(-branch.tangent.y(), branch.tangent.x());
+  const double least = far_flank + branch.half_width;
+  for (const double aside : {-0.3, 0.0, 0.3}) {
+    const Vector2 start = branch.point + aside * branch.half_width * normal;
+    if (reach_border(mask, start, branch.tangent, least + 1) < least) return {};
+  }
+  const Vector2 behind = branch.point + far_flank * branch.tangent;
+  return grow_along(mask, branch, {behind, behind});
+}
+
 /// Extends ends to the flanks that they point at, and fits their cables again.
 Joints extend_to_flanks(const Found& found, Outlines& outlines, std::vector<Cable>& cables) {
   std::vector<char> again(outlines.cables.size(), 0);
@@ -257,13 +312,22 @@ Joints extend_to_flanks(const Found& found, Outlines& outlines, std::vector<Cabl
     const RayHit hit = cast_ray(cables, before, zone, branch.point, branch.tangent, longest);
     CableOutline& outline = outlines.cables[static_cast<std::size_t>(end.cable)];
     again[static_cast<std::size_t>(end.cable)] = 1;
+    if (const Spur* spur = spur_ahead(found.graph, branch)) {
+      outline.extend(end.at_end, grow_along(found.mask, branch, *spur));
+      continue;
+    }
     if (hit.through.cable < 0) {
       outline.extend(end.at_end, grow_end(found.mask, branch));
       continue;
     }
     const Cable& through = cables[static_cast<std::size_t>(hit.through.cable)];
     const double half_width = 0.5 * through.widths[static_cast<std::size_t>(hit.through.row)];
-    const double distance = hit.distance - half_width / std::max(hit.sine, 0.3);
+    const double flank = half_width / std::max(hit.sine, 0.3), distance = hit.distance - flank;
+    const std::vector<Vector2> across = grow_across(found.mask, branch, hit.distance + flank);
+    if (!across.empty()) {
+      outline.extend(end.at_end, across);
+      continue;
+    }
     std::vector<Vector2> points;
     for (double s = 1; s < distance; s += 1) points.push_back(branch.point + s * branch.tangent);
     if (distance > 0) points.push_back(branch.point + distance * branch.tangent);
@@ -289,6 +353,7 @@ void join_flanks(const Found& found, Outlines& outlines, Tracing& tracing) {
     Eigen::Index nearest = through.row;
     (other.centreline.rowwise() - point.transpose()).rowwise().squaredNorm().minCoeff(&nearest);
     if (through.cable == end.cable) nearest = std::min<Eigen::Index>(through.row, other.centreline.rows() - 1);
+    if (through.cable == end.cable) tracing.doubts.push_back({point, Doubt::ends_on_itself});
     tracing.joints.push_back({point, {end.cable, row}, {through.cable, static_cast<int>(nearest)}});
   }
 }

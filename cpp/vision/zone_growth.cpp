@@ -19,6 +19,9 @@ constexpr double kSharp = 0.7;
 /// A union must lower the energy at least to this share.
 constexpr double kGain = 0.8;
 
+/// The middle of a link may deviate from the way of a pair by a width, and by this share of its length.
+constexpr double kDeviation = 0.1;
+
 /// Zones and the links between them that become one zone.
 struct ZoneUnion {
   std::vector<int> zones;
@@ -91,7 +94,32 @@ class Growth {
     if (branches.size() > kMostBranches || branches.size() % 2 == 1) return std::numeric_limits<double>::infinity();
     const EndMatching matching = match_ends(branches);
     if (2 * matching.pairs.size() < branches.size()) return std::numeric_limits<double>::infinity();
+    for (const int link : set.links) {
+      if (!is_covered(graph_.edges[at(link)], branches, matching)) return std::numeric_limits<double>::infinity();
+    }
     return matching.energy;
+  }
+
+  /// True if a link lies near the way of a pair. A cable that crosses itself forms a ring, which is no part of the
+  /// straight way from one of its branches to the other.
+  static bool is_covered(const SkeletonEdge& link, const std::vector<Branch>& branches, const EndMatching& matching) {
+    if (link.points.empty()) return true;
+    const Vector2 middle = link.points[link.points.size() / 2].position();
+    const double reach = 2 * link.half_width + kDeviation * link.length;
+    return std::any_of(matching.pairs.begin(), matching.pairs.end(), [&](const std::pair<int, int>& pair) {
+      return distance_to_way(middle, branches[at(pair.first)], branches[at(pair.second)]) < reach;
+    });
+  }
+
+  /// Distance of a point from the cubic line that leads from one branch into another.
+  static double distance_to_way(const Vector2& point, const Branch& from, const Branch& to) {
+    constexpr int places = 16;
+    double least = std::numeric_limits<double>::infinity();
+    for (int i = 0; i <= places; ++i) {
+      const Vector2 place = way_place(from.point, from.tangent, to.point, -to.tangent, static_cast<double>(i) / places);
+      least = std::min(least, (place - point).norm());
+    }
+    return least;
   }
 
   void add_links(ZoneUnion& set, double longest) const {

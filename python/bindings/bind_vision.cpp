@@ -57,6 +57,8 @@ const char* reason_of(Doubt doubt) {
       return "parallel strands";
     case Doubt::different_colors:
       return "different colors";
+    case Doubt::ends_on_itself:
+      return "ends on itself";
   }
   return "unknown";
 }

@@ -37,6 +37,29 @@ def test_noise_as_large_as_the_cables_does_not_mislead(case, seed, scale):
     assert score(scene, trace_mask(scene.mask)).right
 
 
+@pytest.mark.parametrize(
+    "seed",
+    [
+        709,  # the ring of the curl begins and ends in one zone
+        713,
+        614,  # the end behind the crossing is shorter than a fray
+        712,
+        723,
+    ],
+)
+def test_curls_are_followed_to_the_end_behind_their_crossing(seed):
+    scene = make_case("curls", seed)
+    tracing = trace_mask(scene.mask)
+    assert score(scene, tracing, tolerance=8, tip_tolerance=8).right
+
+
+def test_curls_whose_end_is_not_found_are_ambiguous():
+    scenes = [make_case("curls", seed) for seed in (606, 621, 631)]
+    for scene in scenes:
+        tracing = trace_mask(scene.mask)
+        assert score(scene, tracing, tolerance=8, tip_tolerance=8).right or tracing.ambiguous
+
+
 @pytest.mark.parametrize("scale", [0.5, 2])
 def test_a_cable_that_crosses_itself_is_found_at_any_scale(scale):
     scene = make_case("self", 1, scale)

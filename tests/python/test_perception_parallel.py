@@ -80,7 +80,7 @@ def test_two_bends_that_lie_on_each_other_may_touch_or_cross(radius, overlap):
     assert np.hypot(*(tracing.ambiguous[0].point - [320, 240])) < 10
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", [case for case in CASES if case != "curls"])  # they cross themselves at small angles
 def test_plain_scenes_are_not_ambiguous(case):
     assert trace_mask(make_case(case, 3).mask).ambiguous == []
 

@@ -65,7 +65,8 @@ class Ambiguity:
     point : ndarray of shape (2,) [px]
     reason : str
         "similar energies": another way to pair the branches bends the cables hardly more. "parallel strands": cables
-        lie side by side. "different colors": a cable continues in a clearly different colour.
+        lie side by side. "different colors": a cable continues in a clearly different colour. "ends on itself": a
+        cable with a curl seems to end at its own flank.
     """
 
     point: Array

@@ -32,6 +32,7 @@ CASES = (
     "loop",
     "self",
     "six cables",
+    "curls",
     "specks",
 )
 
@@ -144,9 +145,29 @@ def _grow(
     rng: np.random.Generator, start: Array, heading: float, length: float, bend: float, step: float = 1.0
 ) -> Array:
     """A random smooth curve; `bend` is the typical curvature [1/px], varying over some 80 px."""
-    n = int(length / step)
+    return _turned(start, heading, _curvatures(rng, int(length / step), bend, step), step)
+
+
+def _curvatures(rng: np.random.Generator, count: int, bend: float, step: float = 1.0) -> Array:
+    """Random smooth curvatures [1/px] of `count` steps."""
     reach = 3 * 80
-    curvature = _smooth_noise(rng, (n + 2 * reach,), 40 / step)[reach : reach + n] * bend
+    return _smooth_noise(rng, (count + 2 * reach,), 40 / step)[reach : reach + count] * bend
+
+
+def _curled(rng: np.random.Generator, start: Array, heading: float, length: float, bend: float, scale: float) -> Array:
+    """A random smooth curve with a loop of about one turn."""
+    curvature = _curvatures(rng, int(length), bend)
+    radius = rng.uniform(18, 45) * scale
+    turn = min(int(2 * np.pi * radius * rng.uniform(0.9, 1.15)), len(curvature))
+    first = int(rng.integers(0, len(curvature) - turn + 1))
+    share = np.zeros(len(curvature))
+    share[first : first + turn] = 1
+    share = np.convolve(share, np.full(15, 1 / 15), "same")
+    return _turned(start, heading, curvature * (1 - share) + share * rng.choice([-1, 1]) / radius, 1.0)
+
+
+def _turned(start: Array, heading: float, curvature: Array, step: float) -> Array:
+    """The curve with given curvatures [1/px] at its steps."""
     angle = heading + np.concatenate([[0.0], np.cumsum(curvature * step)])[:-1]
     steps = step * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     return np.vstack([start, start + np.cumsum(steps, axis=0)])
@@ -303,6 +324,16 @@ def _random_lines(
                 lines.append(line)
             if len(lines) == 6:
                 return lines, [False] * 6, np.radians(25)
+        return None
+    if kind == "curls":
+        for _ in range(400):
+            start = rng.uniform([20, 20], [width - 20, height - 20])
+            line = _curled(rng, start, rng.uniform(0, 6.3), rng.uniform(300, 600) * scale, 1 / 120 / scale, scale)
+            ok = _inside(line, shape, 14 * scale)
+            if ok and _is_clear([*lines, line], [12 * scale] * 4, [False] * 4, shape, np.radians(25)):
+                lines.append(line)
+            if len(lines) == 4:
+                return lines, [False] * 4, np.radians(25)
         return None
     raise ValueError(f"case must be one of {', '.join(CASES)}, got {case!r}")
 
