@@ -351,9 +351,13 @@ BitImage without_thin_lines(BitImage mask) {
 
 }  // namespace
 
+bool has_dark_ground(const ColorImage& image, int contrast) {
+  return (1.0 - kDarkestShadow) * median_level(image) < contrast;
+}
+
 void ground_mask(const ColorImage& image, int contrast, std::uint8_t* mask) {
   if (image.height <= 0 || image.width <= 0) return;
-  if ((1.0 - kDarkestShadow) * median_level(image) < contrast) {
+  if (has_dark_ground(image, contrast)) {
     foreground_mask(image, contrast, mask);
     return;
   }

@@ -21,4 +21,7 @@ namespace withe {
 /// `contrast` is the least difference of a cable from the ground [grey levels].
 void ground_mask(const ColorImage& image, int contrast, std::uint8_t* mask);
 
+/// True if the ground is so dark that its shadows are below `contrast`.
+bool has_dark_ground(const ColorImage& image, int contrast);
+
 }  // namespace withe

@@ -179,6 +179,10 @@ void register_vision(py::module_& module) {
              "Pixels whose colour is far from that of the border.");
   module.def("ground_mask", &ground_mask, py::arg("image"), py::arg("contrast"),
              "Pixels that differ from the ground beneath by more than a shadow can.");
+  module.def(
+      "has_dark_ground",
+      [](const Bytes& image, int contrast) { return withe::has_dark_ground(to_image(image), contrast); },
+      py::arg("image"), py::arg("contrast"), "True if shadows on the ground are fainter than the contrast.");
   module.def("trace_lines", &trace_lines, py::arg("mask"), py::arg("image") = py::none(), py::arg("method") = "withe",
              "Every line in a mask, in order, and labels.");
 }

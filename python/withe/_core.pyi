@@ -68,6 +68,7 @@ __all__: list[str] = [
     "drawn_strains",
     "foreground_mask",
     "ground_mask",
+    "has_dark_ground",
     "hsv_mask",
     "sheets_at_forces",
     "sheets_at_poses",
@@ -1708,6 +1709,13 @@ def ground_mask(
 ) -> numpy.typing.NDArray[numpy.uint8]:
     """
     Pixels that differ from the ground beneath by more than a shadow can.
+    """
+
+def has_dark_ground(
+    image: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8], contrast: typing.SupportsInt | typing.SupportsIndex
+) -> bool:
+    """
+    True if shadows on the ground are fainter than the contrast.
     """
 
 def hsv_mask(

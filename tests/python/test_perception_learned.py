@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 import withe
+from scoring import score
 from withe.__main__ import main
 from withe.perception import ground_filter, learned_filter, learned_mask, network_mask, trace, train_mask
+from withe.perception.backgrounds import cast_shadow
 from withe.perception.clutter import GROUNDS
 from withe.perception.cluttered_pictures import make_picture
 from withe.perception.onnx_file import Graph
@@ -147,6 +149,18 @@ def test_a_plain_ground_is_left_to_the_ground_filter():
     assert withe.perception.Tracing.from_dict(default.to_dict()).mask_method == "ground"
 
 
+def test_the_network_adds_white_cables_on_a_light_ground():
+    scene = make_case("crossing 60", 3008)
+    rng = np.random.default_rng(8)
+    ground = cast_shadow(np.full((*scene.mask.shape, 3), [196.0, 200.0, 202.0]), scene.mask, rng)
+    image = render(scene, rng, [(245, 245, 245), (20, 20, 22)], background=ground, grain=3, shading=0.45)
+    assert len(trace(image, mask="ground")) < 2
+    tracing = trace(image)
+    assert tracing.mask_method == "both"
+    assert score(scene, tracing, tolerance=8, tip_tolerance=8).right
+    np.testing.assert_array_equal(trace(image, mask="both").labels, tracing.labels)
+
+
 def test_a_cluttered_ground_is_left_to_the_network(cluttered):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", withe.PoorMaskWarning)
@@ -163,7 +177,7 @@ def test_without_the_network_the_ground_filter_is_the_default(cluttered, monkeyp
 
 
 def test_an_unknown_word_for_the_mask_is_refused(cluttered):
-    with pytest.raises(ValueError, match="mask must be 'ground', 'learned'"):
+    with pytest.raises(ValueError, match="mask must be 'ground', 'both', 'learned'"):
         trace(cluttered.image, mask="clever")
 
 

@@ -304,7 +304,6 @@ def make_picture(
     background: Array | None = None,
     cables: bool | None = None,
     widths: tuple[float, float] = _WIDTHS,
-    lines_on_plain: bool = False,
 ) -> ClutteredPicture:
     """Return a random picture of cables on cluttered ground.
 
@@ -324,9 +323,6 @@ def make_picture(
         True for cables that cover 0.4 % of the picture or more, False for none. By default a twelfth has none.
     widths : (float, float) [px]
         Least and greatest width of the cables.
-    lines_on_plain : bool
-        True to draw flat lines on plain grounds too, where cables have shading then. On plain grounds without lines,
-        cables may be as flat as lines.
     """
     rng = np.random.default_rng(seed)
     names = list(grounds)
@@ -343,7 +339,7 @@ def make_picture(
             region = clouds(rng, max(shape), 0.4 * max(shape), octaves=1)[: shape[0], : shape[1]]
             picture = mixed(picture, other, (region > rng.uniform(-1, 1)).astype(np.float32))
             is_cluttered = True
-        if ground is None and rng.random() < 0.45 and (is_cluttered or lines_on_plain):
+        if ground is None and rng.random() < 0.45 and is_cluttered:
             picture = _overlay(picture, rng)
             is_cluttered = True
     lines: list[Array] = []
@@ -362,6 +358,5 @@ def make_picture(
     image = photographed(picture, rng)
     if cables and mask.mean() < _LEAST_COVER:
         again = [*np.atleast_1d(seed).tolist(), 1]
-        return make_picture(again, shape, grounds, ground, background=background, cables=True, widths=widths,
-                            lines_on_plain=lines_on_plain)  # fmt: skip
+        return make_picture(again, shape, grounds, ground, background=background, cables=True, widths=widths)
     return ClutteredPicture(image, mask, kind)

@@ -14,13 +14,15 @@ from withe.common import validation
 from withe.common.extras import require
 from withe.perception.mask_network import MULTIPLE
 
-__all__ = ["LIKELY", "SHIPPED", "cable_probability", "can_run", "learned_filter"]
+__all__ = ["LIKELY", "SHIPPED", "cable_probability", "can_run", "learned_filter", "least_width"]
 
 Image = NDArray[np.uint8]
 
 SHIPPED = Path(__file__).parent / "mask.onnx"
 LIKELY = 0.5  # probability above which a pixel is in the mask
 _LONGEST = 960  # a larger picture is reduced to this width or height, at which cables are as wide as in training [px]
+_NARROWEST = 3.5  # cables in the training are 4 px wide or more [px]
+_BLACK = 12  # darker pixels are brightened to this level: no picture in the training has a ground of pure black
 _in_use = threading.Lock()  # OpenCV's networks serve one thread at a time
 
 
@@ -74,11 +76,12 @@ def cable_probability(image: Image, path: Path = SHIPPED) -> NDArray[np.float32]
     cv2 = require("cv2", "vision")
     network = _network(path)
     height, width = image.shape[:2]
-    factor = min(1.0, _LONGEST / max(height, width))
+    factor = _reduction(image)
     if factor < 1:
         size = max(1, round(width * factor)), max(1, round(height * factor))
         image = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
     rows, columns = image.shape[:2]
+    image = np.maximum(image, _BLACK)
     padding = ((0, -rows % MULTIPLE), (0, -columns % MULTIPLE), (0, 0))
     blob = cv2.dnn.blobFromImage(np.pad(image, padding, mode="symmetric"), 1 / 255)
     with _in_use:
@@ -90,6 +93,15 @@ def cable_probability(image: Image, path: Path = SHIPPED) -> NDArray[np.float32]
     if factor < 1:
         result = cv2.resize(np.ascontiguousarray(result), (width, height), interpolation=cv2.INTER_LINEAR)
     return np.ascontiguousarray(result)
+
+
+def _reduction(image: Image) -> float:
+    return float(min(1.0, _LONGEST / max(image.shape[:2])))
+
+
+def least_width(image: Image) -> float:
+    """Return the width of the thinnest cables in a picture that the network was trained to see [px]."""
+    return _NARROWEST / _reduction(image)
 
 
 def can_run() -> bool:

@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 from withe import _core
 from withe.common.extras import require
 
-__all__ = ["MaskFunction", "border_filter", "color_filter", "ground_filter", "network_mask"]
+__all__ = ["MaskFunction", "border_filter", "color_filter", "ground_filter", "has_dark_ground", "network_mask"]
+
+_CONTRAST = 25  # least difference of a cable from the ground [grey levels]
 
 Image = NDArray[np.uint8]
 MaskFunction = Callable[[Image], Any]
@@ -21,7 +23,7 @@ Range = tuple[Sequence[int], Sequence[int]]
 _HIGHEST = (180, 255, 255)
 
 
-def ground_filter(image: Image, contrast: int = 25) -> NDArray[np.bool_]:
+def ground_filter(image: Image, contrast: int = _CONTRAST) -> NDArray[np.bool_]:
     """Return the pixels that differ from the ground by more than a shadow can. This is the default filter.
 
     The filter suits cables on a ground of one colour or of weak texture, such as plain wood, under uneven light and
@@ -50,7 +52,12 @@ def ground_filter(image: Image, contrast: int = 25) -> NDArray[np.bool_]:
     return mask
 
 
-def border_filter(image: Image, contrast: int = 25) -> NDArray[np.bool_]:
+def has_dark_ground(image: Image) -> bool:
+    """Return True if the ground of a picture is so dark that cables are brighter, and shadows do not count."""
+    return 0 not in image.shape and _core.has_dark_ground(image, _CONTRAST)
+
+
+def border_filter(image: Image, contrast: int = _CONTRAST) -> NDArray[np.bool_]:
     """Return the pixels that differ from the median colour of the image's border.
 
     The threshold on the largest difference of a channel is the one that separates two classes best (Otsu). It uses

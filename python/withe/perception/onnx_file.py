@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Graph"]
+__all__ = ["FLOAT", "Graph"]
 
 _IR_VERSION = 7  # of the ONNX format; OpenCV 4.8 and later read it
 _OPSET = 11
-_FLOAT, _INT64 = 1, 7  # TensorProto.DataType
+FLOAT = 1  # TensorProto.DataType of 32 bits
+_KINDS = {"float32": FLOAT, "int64": 7, "float16": 10}
 # AttributeProto.AttributeType by the type of the value: a number, a text, or a list of integers.
 _ATTRIBUTE_TYPES = {float: 1, int: 2, str: 3, list: 7}
 
@@ -56,15 +57,19 @@ def _attribute(name: str, value: float | str | Sequence[int]) -> bytes:
 
 
 def _tensor(name: str, values: NDArray[Any]) -> bytes:
-    kind = _FLOAT if values.dtype == np.float32 else _INT64
     dims = b"".join(_integer(1, size) for size in values.shape)
-    return dims + _integer(2, kind) + _block(8, name) + _block(9, np.ascontiguousarray(values).tobytes())
+    return (
+        dims
+        + _integer(2, _KINDS[values.dtype.name])
+        + _block(8, name)
+        + _block(9, np.ascontiguousarray(values).tobytes())
+    )
 
 
 def _value(name: str, shape: Sequence[int | str]) -> bytes:
     """Return the declaration of an input or output of floats. Sizes that vary are texts."""
     dims = b"".join(_block(1, _block(2, size) if isinstance(size, str) else _integer(1, size)) for size in shape)
-    return _block(1, name) + _block(2, _block(1, _integer(1, _FLOAT) + _block(2, dims)))
+    return _block(1, name) + _block(2, _block(1, _integer(1, FLOAT) + _block(2, dims)))
 
 
 @dataclass
@@ -91,7 +96,7 @@ class Graph:
             Kind of the operation, such as "Conv".
         inputs : sequence of str
             Names of earlier outputs, of the constants, or "" for an input that is left out.
-        constants : mapping of str to ndarray of float32 or int64
+        constants : mapping of str to ndarray of float32, float16 or int64
             Weights that are among the inputs.
         **attributes : float, int, str or list of int
             Attributes of the operation.

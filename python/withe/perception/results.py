@@ -15,7 +15,7 @@ from withe.perception.triangulation import CableInSpace, triangulate
 __all__ = ["Ambiguity", "Crossing", "Joint", "MaskMethod", "Tracing"]
 
 Array = NDArray[np.float64]
-MaskMethod = Literal["ground", "learned", "given"]
+MaskMethod = Literal["ground", "both", "learned", "given"]
 
 FORMAT_VERSION = 1
 
@@ -64,9 +64,12 @@ class Ambiguity:
     ----------
     point : ndarray of shape (2,) [px]
     reason : str
-        "similar energies": another way to pair the branches bends the cables hardly more. "parallel strands": cables
-        lie side by side. "different colors": a cable continues in a clearly different colour. "ends on itself": a
-        cable with a curl seems to end at its own flank.
+        One of these:
+
+        - "similar energies": another way to pair the branches bends the cables hardly more
+        - "parallel strands": cables lie side by side
+        - "different colors": a cable continues in a clearly different colour
+        - "ends on itself": a cable with a curl seems to end at its own flank
     """
 
     point: Array
@@ -95,9 +98,9 @@ class Tracing:
     mask_quality : MaskQuality or None
         Measures of the mask. ``mask_quality.is_good`` is False where the mask does not look like cables; then `trace`
         warns with `PoorMaskWarning`. None for a tracing from `from_dict`.
-    mask_method : {"ground", "learned", "given"}
+    mask_method : {"ground", "both", "learned", "given"}
         Origin of the mask: "ground" from the difference from a plain ground, "learned" from the shipped network,
-        "given" from the argument `mask`.
+        "both" from either of them, "given" from the argument `mask`.
     timings : dict of str to float [s]
         Time by step.
     """

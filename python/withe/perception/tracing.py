@@ -14,7 +14,7 @@ from withe import _core
 from withe.common.user_warnings import warn
 from withe.errors import PoorMaskWarning
 from withe.perception.images import as_array, check_image, read_image
-from withe.perception.learned_mask import LIKELY, cable_probability, can_run
+from withe.perception.learned_mask import LIKELY, cable_probability, can_run, least_width
 from withe.perception.mask_quality import (
     CLEAR_CONTRAST,
     LEAST_SHARPNESS,
@@ -24,7 +24,7 @@ from withe.perception.mask_quality import (
     has_plain_border,
     measure_quality,
 )
-from withe.perception.masks import MaskFunction, ground_filter
+from withe.perception.masks import MaskFunction, ground_filter, has_dark_ground
 from withe.perception.results import Ambiguity, Crossing, Joint, MaskMethod, Tracing
 
 __all__ = ["check_mask", "trace", "trace_mask"]
@@ -32,9 +32,8 @@ __all__ = ["check_mask", "trace", "trace_mask"]
 Image = NDArray[np.uint8]
 Method = Literal["withe", "mbest"]
 
-_CONFIRMED = 0.35  # least intersection over union of both masks, with which the learned one confirms the other
-_SAME = 0.65  # overlap above which both masks show the same cables
-_CERTAIN = 0.8  # certainty of the learned mask, above which it is preferred
+_CONFIRMED = 0.5  # least intersection over union of both masks, with which the learned one confirms the other
+_SURE = 0.7  # probability above which the network adds a pixel to the mask of a plain ground
 
 
 def check_mask(mask: ArrayLike, name: str = "mask") -> NDArray[np.uint8]:
@@ -91,62 +90,76 @@ def _check_method(method: str) -> None:
 class _Attempt:
     """A mask of a picture that withe made, what was traced in it, its quality, and the time of making it [s]."""
 
-    method: Literal["ground", "learned"]
+    method: Literal["ground", "both", "learned"]
     pixels: NDArray[np.uint8]
     found: dict[str, Any]
     quality: MaskQuality
     seconds: float
 
 
-def _mask_word(mask: str) -> Literal["ground", "learned"]:
-    if mask == "ground":
-        return "ground"
-    if mask == "learned":
-        return "learned"
-    raise ValueError(f"mask must be 'ground', 'learned', an array or a function, got {mask!r}")
+def _mask_word(mask: str) -> Literal["ground", "both", "learned"]:
+    for word in ("ground", "both", "learned"):
+        if mask == word:
+            return word
+    raise ValueError(f"mask must be 'ground', 'both', 'learned', an array or a function, got {mask!r}")
 
 
-def _attempt(picture: Image, mask_method: Literal["ground", "learned"], method: Method) -> _Attempt:
+def _attempt(
+    picture: Image,
+    mask_method: Literal["ground", "both", "learned"],
+    method: Method,
+    ground: NDArray[np.uint8] | None = None,
+) -> _Attempt:
+    """Trace the mask of a method; `ground` is the mask of the ground filter, if it is known."""
     started = time.perf_counter()
-    probability = cable_probability(picture) if mask_method == "learned" else None
-    pixels = check_mask(ground_filter(picture) if probability is None else probability > LIKELY)
+    probability = None if mask_method == "ground" else cable_probability(picture)
+    if probability is not None and mask_method == "learned":
+        pixels = check_mask(probability > LIKELY)
+    else:
+        pixels = check_mask(ground_filter(picture)) if ground is None else ground
+        if probability is not None:
+            pixels = check_mask((pixels > 0) | (probability > _SURE))
     seconds = time.perf_counter() - started
     found = _core.trace_lines(pixels, picture, method)
     quality, lines = _quality(found), (found["centrelines"], found["widths"])
-    if probability is None:
-        quality = compare_with_picture(quality, picture, pixels, *lines)
-    else:
+    if probability is not None and mask_method == "learned":
         quality = compare_with_network(quality, picture, probability, pixels, *lines)
+    else:
+        quality = compare_with_picture(quality, picture, pixels, *lines)
     return _Attempt(mask_method, pixels, found, quality, seconds)
 
 
-def _best_attempt(picture: Image, method: Method) -> _Attempt:
-    """Return the tracing by the ground filter where the ground is plain, and else by the network.
+def _typical_width(found: dict[str, Any]) -> float:
+    return float(np.median(np.concatenate(found["widths"])))
 
-    Where the ground is not plain, the mask of the ground filter is kept if the network confirms it and is not certain
-    of its own. Cables on weak textures, such as wood, have sharper borders in it.
+
+def _best_attempt(picture: Image, method: Method) -> _Attempt:
+    """Return the tracing by the ground filter, with the network's help where the ground is plain, or by the network.
+
+    On a plain ground that is not dark, the ground filter misses white cables on white ground, and cables in the shadow
+    of others; the network adds pixels of which it is sure. Where the ground is not plain, the mask of the ground filter
+    is kept if the network confirms it: cables on weak textures, such as wood, have sharper borders in it. The network
+    does not see cables that are thinner than those of its training.
     """
     ground = _attempt(picture, "ground", method)
     is_clear = ground.quality.is_good and len(ground.found["centrelines"]) > 0
+    if not can_run() or (is_clear and _typical_width(ground.found) < least_width(picture)):
+        return ground
     is_plain = has_plain_border(picture)
     if is_plain and is_clear and ground.quality.contrast > CLEAR_CONTRAST:
-        return ground
+        return ground if has_dark_ground(picture) else _attempt(picture, "both", method, ground.pixels)
     # A blurred picture is no better for the network, and its blur is the reason to report.
-    if not can_run() or (is_plain and ground.quality.sharpness < LEAST_SHARPNESS):
+    if is_plain and ground.quality.sharpness < LEAST_SHARPNESS:
         return ground
     learned = _attempt(picture, "learned", method)
-    if is_clear and len(learned.found["centrelines"]) == 0:  # cables too thin for the network
-        return ground
     both, either = (f(ground.pixels > 0, learned.pixels > 0).sum() for f in (np.logical_and, np.logical_or))
-    overlap = both / max(either, 1)
-    is_certain = learned.quality.is_good and learned.quality.certainty > _CERTAIN
-    is_same = ground.quality.is_good and overlap > _SAME
-    return ground if is_same or (overlap > _CONFIRMED and not is_certain) else learned
+    is_confirmed = both > _CONFIRMED * either
+    return ground if is_confirmed and not (is_plain and learned.quality.is_good) else learned
 
 
 def trace(
     image: ArrayLike | str | os.PathLike[str],
-    mask: ArrayLike | MaskFunction | Literal["ground", "learned"] | None = None,
+    mask: ArrayLike | MaskFunction | Literal["ground", "both", "learned"] | None = None,
     method: Method = "withe",
 ) -> Tracing:
     """Find every cable in a picture, and which one lies on top where they cross.
@@ -155,18 +168,20 @@ def trace(
     ----------
     image : str, Path or array_like of shape (height, width, 3)
         A file, or red, green and blue as uint8. One channel (grey) and a fourth (alpha, ignored) are accepted.
-    mask : array_like of shape (height, width), callable, or {"ground", "learned"}, optional
+    mask : array_like of shape (height, width), callable, or {"ground", "both", "learned"}, optional
         Pixels of cables: booleans or numbers, or a function from the picture to such an array, as `color_filter` and
         `network_mask` return. The word "ground" takes the pixels that differ from a plain ground (`ground_filter`). The
-        word "learned" takes those that the shipped network finds on any ground (`learned_filter`). By default "ground"
-        where the border of the picture is plain and the mask looks like cables, and else mostly "learned".
+        word "learned" takes those that the shipped network finds on any ground (`learned_filter`). The word "both"
+        takes those of "ground" and those of which the network is sure. By default "both" where the border of the
+        picture is plain and the mask looks like cables, but "ground" where that ground is dark, and else mostly
+        "learned".
     method : {"withe", "mbest"}
         Method of this package, or the published one for comparison.
 
     Returns
     -------
     Tracing
-        Its `mask_method` is the mask that was used: "ground", "learned" or "given".
+        Its `mask_method` is the mask that was used: "ground", "both", "learned" or "given".
 
     Warns
     -----
@@ -179,9 +194,10 @@ def trace(
     ValueError
         A picture that cannot be read or has another shape or type, or a mask of another size.
     FileNotFoundError
-        The network of "learned" is missing.
+        The network of "both" and "learned" is missing.
     ImportError
-        A file or "learned" was given and OpenCV is not installed: ``pip install ".[vision]"`` in a clone of withe.
+        A file, "both" or "learned" was given and OpenCV is not installed: ``pip install ".[vision]"`` in a clone of
+        withe.
         Without OpenCV the default mask is "ground".
 
     Examples
