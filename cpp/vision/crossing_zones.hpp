@@ -23,7 +23,7 @@ struct Branch {
   double curvature = 0;               ///< positive to the left of the tangent [1/px]
   double half_width = 0;              ///< [px]
   int skip = 0;                       ///< pixels between the point and the end of the edge
-  int edge = -1;                      ///< of the graph
+  int edge = -1;                      ///< whose end it is; -1 if it is not of a graph
 };
 
 struct Zone {
