@@ -18,7 +18,7 @@ constexpr double kTouching = 3;          ///< greatest distance of ends that tou
 constexpr double kSteepest = 0.5;        ///< least cosine of the angle of each end to the stretch
 constexpr double kSteepestChange = 0.9;  ///< least cosine between clearly different colours
 constexpr double kLikeWidths = 0.65;     ///< least ratio of the widths of both ends
-constexpr double kCovered = 0.9;         ///< least share of the stretch in the mask
+constexpr double kCovered = 0.65;        ///< least share of the stretch in the mask: shadows leave gaps
 constexpr double kBlob = 2.5;            ///< pieces up to this long show no direction [widths]
 constexpr double kLikeBlobs = 0.4;       ///< least ratio of the widths of a strand and such a piece
 constexpr double kCutWidth = 3;          ///< a cut between colours, and pixels of its border [px]
@@ -43,9 +43,7 @@ bool is_covered(const BitImage& mask, const StrandClasses& classes, const Branch
   const int first = class_at(from.point), last = class_at(to.point);
   int inside = 0, own = 0, left = 0;
   for (int i = 0; i <= steps; ++i) {
-    const double t = static_cast<double>(i) / steps, u = 1 - t;
-    const Vector2 point = u * u * (1 + 2 * t) * from.point + t * t * (1 + 2 * u) * to.point +
-                          length * t * u * (u * from.tangent + t * to.tangent);
+    const Vector2 point = way_place(from.point, from.tangent, to.point, -to.tangent, static_cast<double>(i) / steps);
     inside += mask.at(static_cast<int>(std::lround(point.x())), static_cast<int>(std::lround(point.y()))) ? 1 : 0;
     const int here = class_at(point);
     if (here == first || here == last) {

@@ -42,6 +42,13 @@ def test_white_and_black_cables_are_found_though_they_have_no_colour(seed):
     assert overlap(ground_filter(image), scene.mask) > 0.8
 
 
+@pytest.mark.parametrize("seed", [119, 125])
+def test_cables_go_on_beneath_others_whose_shadow_cuts_the_mask(seed):
+    vivid = [*COLOURS, (40, 150, 60), (235, 200, 40), (120, 50, 140), (240, 240, 240)]
+    scene, image = picture(seed, wood, vivid, case="six cables")
+    assert score(scene, trace(image, mask="ground"), tolerance=8, tip_tolerance=8).right
+
+
 def test_a_grey_cable_apart_from_others_is_no_shadow():
     scene, image = picture(6, plain, [(70, 70, 70)], case="self", darkness=0.2)
     assert overlap(ground_filter(image), scene.mask) > 0.75
