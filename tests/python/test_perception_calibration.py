@@ -59,8 +59,16 @@ def test_files_grey_pictures_and_pictures_without_a_board_are_accepted(calibrate
     coloured = np.repeat(images[1][..., None], 3, axis=2)
     blank = np.full_like(images[0], 128)
     again = Camera.calibrate([tmp_path / "0.png", coloured, blank, *images[2:]], board)
-    assert again.matrix == pytest.approx(camera.matrix, rel=1e-7)  # OpenCV differs by 2e-9 from run to run
-    assert again.distortion == pytest.approx(camera.distortion, abs=1e-7)
+    assert again.matrix == pytest.approx(camera.matrix, rel=1e-9)
+    assert again.distortion == pytest.approx(camera.distortion, abs=1e-9)
+
+
+def test_equal_pictures_give_equal_bits(calibrated):
+    board, images, camera = calibrated
+    threads = cv2.getNumThreads()
+    again = Camera.calibrate(images, board)
+    assert again.distortion.tobytes() == camera.distortion.tobytes()
+    assert cv2.getNumThreads() == threads
 
 
 def test_pictures_that_do_not_determine_a_lens_are_refused(calibrated):

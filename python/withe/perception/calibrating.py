@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,6 +31,17 @@ class Lens:
     matrix: Array
     distortion: Array
     error: float
+
+
+@contextmanager
+def _one_thread(cv2: Any) -> Iterator[None]:
+    """Let OpenCV use one thread: it adds the sums of several in the order in which they end, which varies."""
+    threads = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        yield
+    finally:
+        cv2.setNumThreads(threads)
 
 
 def calibrate_lens(images: Iterable[ArrayLike | str | os.PathLike[str]], board: Chessboard | CharucoBoard) -> Lens:
@@ -62,9 +74,10 @@ def calibrate_lens(images: Iterable[ArrayLike | str | os.PathLike[str]], board: 
             "numbers of squares of the board, and take sharp pictures in which the tilted board fills much of the frame"
         )
     # Boards that do not fill the corners of the picture hardly determine k3, the coefficient of r^6.
-    error, matrix, distortion, turns, _ = cv2.calibrateCamera(
-        places, seen, shape[::-1], None, None, flags=cv2.CALIB_FIX_K3
-    )
+    with _one_thread(cv2):
+        error, matrix, distortion, turns, _ = cv2.calibrateCamera(
+            places, seen, shape[::-1], None, None, flags=cv2.CALIB_FIX_K3
+        )
     normals = np.array([cv2.Rodrigues(turn)[0][:, 2] for turn in turns])
     cosines = np.clip(normals @ normals.T, -1.0, 1.0)
     if np.arccos(cosines.min()) < _LEAST_TILT:
