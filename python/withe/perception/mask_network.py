@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from withe.common.extras import require
 from withe.perception.onnx_file import FLOAT, Graph
 
-__all__ = ["LAYERS", "MULTIPLE", "make_module", "to_onnx"]
+__all__ = ["LAYERS", "MULTIPLE", "as_written", "make_module", "to_onnx"]
 
 MULTIPLE = 32  # the height and the width of the network's input are multiples of it [px]
 _NEARLY_ZERO = 1e-5  # added to variances in batch normalization
@@ -117,16 +117,38 @@ def make_module() -> Any:
     return CableNetwork()
 
 
-def _folded(weights: Mapping[str, NDArray[Any]], name: str) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return the kernel and bias of a layer with its normalization, and for the first layer the shift of the input."""
+def _folded(weights: Mapping[str, NDArray[Any]], name: str) -> tuple[NDArray[np.float16], NDArray[np.float32]]:
+    """Return the kernel of a layer with its normalization, rounded to 16 bits, and the bias."""
     stem = f"layers.{name}"
     if name == "head":
-        return weights[f"{stem}.weight"].astype(np.float32), weights[f"{stem}.bias"].astype(np.float32)
+        return weights[f"{stem}.weight"].astype(np.float16), weights[f"{stem}.bias"].astype(np.float32)
     kernel = weights[f"{stem}.0.weight"].astype(float)
     mean, variance = (weights[f"{stem}.1.running_{word}"].astype(float) for word in ("mean", "var"))
     scale = weights[f"{stem}.1.weight"] / np.sqrt(variance + _NEARLY_ZERO)
     bias = weights[f"{stem}.1.bias"] - mean * scale
-    return (kernel * scale[:, None, None, None]).astype(np.float32), bias.astype(np.float32)
+    return (kernel * scale[:, None, None, None]).astype(np.float16), bias.astype(np.float32)
+
+
+def as_written(weights: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Return a state of the torch module whose layers are those of the ONNX file, with their normalization folded in.
+
+    Parameters
+    ----------
+    weights : mapping of str to ndarray
+        State of the torch module.
+    """
+    result = dict(weights)
+    for name in LAYERS:
+        kernel, bias = _folded(weights, name)
+        stem = f"layers.{name}"
+        if name == "head":
+            result.update({f"{stem}.weight": kernel.astype(np.float32), f"{stem}.bias": bias})
+            continue
+        result[f"{stem}.0.weight"] = kernel.astype(np.float32)
+        one = np.ones_like(bias)
+        result |= {f"{stem}.1.weight": one * np.float32(np.sqrt(1 + _NEARLY_ZERO)), f"{stem}.1.bias": bias}
+        result |= {f"{stem}.1.running_mean": 0 * one, f"{stem}.1.running_var": one}
+    return result
 
 
 def to_onnx(weights: Mapping[str, NDArray[Any]], note: Mapping[str, str]) -> bytes:
@@ -147,7 +169,7 @@ def to_onnx(weights: Mapping[str, NDArray[Any]], note: Mapping[str, str]) -> byt
     def layer(name: str, source: str) -> str:
         shape = LAYERS[name]
         kernel, bias = _folded(weights, name)
-        half = graph.add("Cast", [f"{name}.kernel"], {f"{name}.kernel": kernel.astype(np.float16)}, to=FLOAT)
+        half = graph.add("Cast", [f"{name}.kernel"], {f"{name}.kernel": kernel}, to=FLOAT)
         output = graph.add(
             "Conv",
             [source, half, f"{name}.bias"],

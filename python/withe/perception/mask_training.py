@@ -25,7 +25,7 @@ from withe.common.progress import progress as progress_bar
 from withe.io import written_beside
 from withe.learning.network_training import own_torch
 from withe.perception.cluttered_pictures import make_picture
-from withe.perception.mask_network import make_module, to_onnx
+from withe.perception.mask_network import as_written, make_module, to_onnx
 
 __all__ = ["STEPS", "MaskTraining", "train_mask"]
 
@@ -39,7 +39,7 @@ _WARM_UP = 150  # steps in which the rate increases
 _CONSTANT = 0.75  # share of the steps after which the rate decreases
 _SAVE_EVERY = 250  # [steps]
 _FORMAT = "withe mask training, 1"
-_AGREEMENT = 0.02  # greatest difference of OpenCV's probabilities, from rounded weights, from those of torch
+_AGREEMENT = 1e-4  # greatest difference of OpenCV's probabilities from those of torch
 
 Sample = tuple[NDArray[np.uint8], NDArray[np.bool_]]
 
@@ -136,7 +136,7 @@ def train_mask(
         first = len(record.losses)
         bar = stack.enter_context(progress_bar(steps, "training", progress, unit="steps"))
         module.train()
-        half = _multiplies_half(torch)
+        half = _multiplies_half()
         window: deque[Sample] = deque(maxlen=_WINDOW)
         oldest = max(0, _FRESH * (first + 1) + _BATCH - _WINDOW)
         samples = stack.enter_context(_Samples(seed, oldest, workers))
@@ -177,9 +177,9 @@ def _constant_until(steps: int) -> int:
     return math.floor(_CONSTANT * steps)
 
 
-def _multiplies_half(torch: Any) -> bool:
+def _multiplies_half() -> bool:
     """Return True if the processor multiplies matrices of 16 bits, in which a step takes half as long."""
-    ask = getattr(torch.cpu, "get_capabilities", None)  # of newer versions
+    ask = getattr(require("torch", "learn").cpu, "get_capabilities", None)  # of newer versions
     return ask is not None and bool(ask().get("amx_bf16", False))
 
 
@@ -293,7 +293,9 @@ def _finish(record: MaskTraining, module: Any) -> None:
     """Write the network, and compare OpenCV's result with that of torch."""
     cv2, torch = require("cv2", "vision"), require("torch", "learn")
     note = {"seed": str(record.seed), "steps": str(record.steps), "seconds": f"{record.seconds:.0f}"}
-    content = to_onnx({name: values.numpy() for name, values in module.state_dict().items()}, note)
+    weights = {name: values.numpy() for name, values in module.state_dict().items()}
+    content = to_onnx(weights, note)
+    module.load_state_dict({name: torch.from_numpy(values) for name, values in as_written(weights).items()})
     module.eval()
     network = cv2.dnn.readNetFromONNX(np.frombuffer(content, np.uint8))
     picture = make_picture([record.seed, 2], (_SIZE, _SIZE + 64)).image
