@@ -117,7 +117,7 @@ def synthetic(count, scale, first_seed):
             result = score(scene, tracing, distance, tip * max(scale, 1.0))
             right += result.right
             touching += not result.right and result.count > len(scene.centrelines)
-            tips += not result.right and result.distance <= 2.0
+            tips += not result.right and result.distance <= distance
         goal = GOALS[case] - (0 if scale == 1 else 5)
         extra = "".join(f", {n} {word}" for n, word in ((touching, "split"), (tips, "by tips only")) if n)
         line(f"{case}, scale {scale:g}: right [%]", f"{100 * right / count:.1f}{extra}", 100 * right / count, goal)

@@ -12,9 +12,9 @@
 /// share s of the tolerance, which is kept for events and which time fills again. A step may grow where C (times dt)^p,
 /// C the greatest of the last errors over dt^p, is allowed.
 ///
-/// Where the scene allows fourth-order steps, error control also chooses the order. The longest allowed step of an
-/// order is (allowed(1) / C)^(1 / (p - 1)). Error control takes the order with the greater ratio of this step to its
-/// cost.
+/// If the scene allows fourth-order steps, error control also chooses the order of each step. It computes for either
+/// order the longest allowed step, (allowed(1) / C)^(1 / (p - 1)), and divides this step by its cost. The order with
+/// the greater quotient is taken.
 
 #include <array>
 #include <optional>

@@ -101,7 +101,7 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-/// Median grey level of sampled pixels.
+/// Median grey level of sampled pixels; 0 if there are none.
 double median_level(const ColorImage& image) {
   std::vector<double> levels;
   for (int y = std::min(kStep / 2, image.height - 1); y < image.height; y += kStep) {
@@ -110,7 +110,7 @@ double median_level(const ColorImage& image) {
       levels.push_back((color[0] + color[1] + color[2]) / 3.0);
     }
   }
-  return median(std::move(levels));
+  return levels.empty() ? 0.0 : median(std::move(levels));
 }
 
 /// Logarithms at sampled pixels, and the surface of the ground through them.

@@ -243,7 +243,7 @@ int root_of_spur(const SkeletonGraph& graph, const SkeletonEdge& edge) {
 
 void remove_spur(SkeletonGraph& graph, int number, int root) {
   SkeletonEdge& edge = graph.edges[static_cast<std::size_t>(number)];
-  const int tip = edge.nodes[0] == root ? edge.nodes[1] : edge.nodes[0];
+  const int tip = other_end(edge, edge.nodes[0] == root ? 0 : 1);
   graph.spurs.push_back({graph.nodes[at(root)].position, graph.nodes[at(tip)].position});
   edge.removed = true;
   edge.points.clear();

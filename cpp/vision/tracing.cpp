@@ -178,9 +178,6 @@ constexpr double kShortestPiece = 2.2;
 /// before them or behind the fork [half widths].
 constexpr double kSpurRatioOfPieces = 2.2;
 
-/// A branch deviates from its tangent by less than this on its way to a removed end behind a crossing [rad].
-constexpr double kMostTurn = 0.9;
-
 /// Shortest cable in a mask that is cut between colours [widths].
 constexpr double kShortestOfColors = 6;
 
@@ -252,10 +249,11 @@ using Joints = std::vector<std::pair<CableEnd, CableRow>>;
 /// The removed end of the skeleton in which a branch continues across another cable; null if there is none. A cable
 /// that ends close behind a crossing looks like a fray of the other cable.
 const Spur* spur_ahead(const SkeletonGraph& graph, const Branch& branch) {
-  constexpr double longest = 12;    // [half widths]
-  constexpr double shortest = 0.8;  // of a spur [half widths]
+  constexpr double longest = 12;     // [half widths]
+  constexpr double shortest = 0.8;   // of a spur [half widths]
+  constexpr double most_turn = 0.9;  // from the tangent of the branch [rad]
   const Spur* best = nullptr;
-  double in_line = std::cos(kMostTurn);
+  double in_line = std::cos(most_turn);
   for (const Spur& spur : graph.spurs) {
     const Vector2 chord = spur.tip - branch.point, end = spur.tip - spur.root;
     const double length = chord.norm();
@@ -307,15 +305,15 @@ Joints extend_to_flanks(const Found& found, Outlines& outlines, std::vector<Cabl
   const std::vector<HiddenStretch> before = outlines.stretches;
   for (const CableEnd& end : outlines.on_flanks) {
     const Branch& branch = found.links.branches[static_cast<std::size_t>(end.half)];
-    const int zone = found.links.zone_of[static_cast<std::size_t>(end.half)];
-    const double longest = 12 * 2 * branch.half_width;
-    const RayHit hit = cast_ray(cables, before, zone, branch.point, branch.tangent, longest);
     CableOutline& outline = outlines.cables[static_cast<std::size_t>(end.cable)];
     again[static_cast<std::size_t>(end.cable)] = 1;
     if (const Spur* spur = spur_ahead(found.graph, branch)) {
       outline.extend(end.at_end, grow_along(found.mask, branch, *spur));
       continue;
     }
+    const int zone = found.links.zone_of[static_cast<std::size_t>(end.half)];
+    const double longest = 12 * 2 * branch.half_width;
+    const RayHit hit = cast_ray(cables, before, zone, branch.point, branch.tangent, longest);
     if (hit.through.cable < 0) {
       outline.extend(end.at_end, grow_end(found.mask, branch));
       continue;

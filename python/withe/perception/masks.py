@@ -54,7 +54,7 @@ def ground_filter(image: Image, contrast: int = _CONTRAST) -> NDArray[np.bool_]:
 
 def has_dark_ground(image: Image) -> bool:
     """Return True if the ground of a picture is so dark that cables are brighter, and shadows do not count."""
-    return 0 not in image.shape and _core.has_dark_ground(image, _CONTRAST)
+    return _core.has_dark_ground(image, _CONTRAST)
 
 
 def border_filter(image: Image, contrast: int = _CONTRAST) -> NDArray[np.bool_]:

@@ -12,10 +12,11 @@ from withe.perception.camera import Camera
 from withe.perception.mask_quality import MaskQuality
 from withe.perception.triangulation import CableInSpace, triangulate
 
-__all__ = ["Ambiguity", "Crossing", "Joint", "MaskMethod", "Tracing"]
+__all__ = ["Ambiguity", "Crossing", "Joint", "MadeMask", "MaskMethod", "Tracing"]
 
 Array = NDArray[np.float64]
-MaskMethod = Literal["ground", "both", "learned", "given"]
+MadeMask = Literal["ground", "both", "learned"]
+MaskMethod = Literal[MadeMask, "given"]
 
 FORMAT_VERSION = 1
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -315,25 +316,18 @@ def _random_lines(
         line = np.cumsum(step * np.stack([np.cos(angle), np.sin(angle)], axis=1), axis=0)
         line += center - line.mean(axis=0)
         return [line], [False], np.radians(25)
-    if kind == "six cables":
+    if kind in ("six cables", "curls"):
+        count, shortest = (6, 250) if kind == "six cables" else (4, 300)
+        grow = _grow if kind == "six cables" else partial(_curled, scale=scale)
         for _ in range(400):
             start = rng.uniform([20, 20], [width - 20, height - 20])
-            line = _grow(rng, start, rng.uniform(0, 6.3), rng.uniform(250, 550) * scale, 1 / 120 / scale)
+            heading, length = rng.uniform(0, 6.3), rng.uniform(shortest, shortest + 300) * scale
+            line = grow(rng, start, heading, length, 1 / 120 / scale)
             ok = _inside(line, shape, 14 * scale)
-            if ok and _is_clear([*lines, line], [12 * scale] * 7, [False] * 7, shape, np.radians(25)):
+            if ok and _is_clear([*lines, line], [12 * scale] * count, [False] * count, shape, np.radians(25)):
                 lines.append(line)
-            if len(lines) == 6:
-                return lines, [False] * 6, np.radians(25)
-        return None
-    if kind == "curls":
-        for _ in range(400):
-            start = rng.uniform([20, 20], [width - 20, height - 20])
-            line = _curled(rng, start, rng.uniform(0, 6.3), rng.uniform(300, 600) * scale, 1 / 120 / scale, scale)
-            ok = _inside(line, shape, 14 * scale)
-            if ok and _is_clear([*lines, line], [12 * scale] * 4, [False] * 4, shape, np.radians(25)):
-                lines.append(line)
-            if len(lines) == 4:
-                return lines, [False] * 4, np.radians(25)
+            if len(lines) == count:
+                return lines, [False] * count, np.radians(25)
         return None
     raise ValueError(f"case must be one of {', '.join(CASES)}, got {case!r}")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,7 +25,7 @@ from withe.perception.mask_quality import (
     measure_quality,
 )
 from withe.perception.masks import MaskFunction, ground_filter, has_dark_ground
-from withe.perception.results import Ambiguity, Crossing, Joint, MaskMethod, Tracing
+from withe.perception.results import Ambiguity, Crossing, Joint, MadeMask, MaskMethod, Tracing
 
 __all__ = ["check_mask", "trace", "trace_mask"]
 
@@ -90,43 +90,47 @@ def _check_method(method: str) -> None:
 class _Attempt:
     """A mask of a picture that withe made, what was traced in it, its quality, and the time of making it [s]."""
 
-    method: Literal["ground", "both", "learned"]
+    method: MadeMask
     pixels: NDArray[np.uint8]
     found: dict[str, Any]
     quality: MaskQuality
     seconds: float
 
 
-def _mask_word(mask: str) -> Literal["ground", "both", "learned"]:
-    for word in ("ground", "both", "learned"):
+def _mask_word(mask: str) -> MadeMask:
+    for word in get_args(MadeMask):
         if mask == word:
-            return word
+            return word  # type: ignore[no-any-return]
     raise ValueError(f"mask must be 'ground', 'both', 'learned', an array or a function, got {mask!r}")
 
 
-def _attempt(
-    picture: Image,
-    mask_method: Literal["ground", "both", "learned"],
-    method: Method,
-    ground: NDArray[np.uint8] | None = None,
-) -> _Attempt:
-    """Trace the mask of a method; `ground` is the mask of the ground filter, if it is known."""
+def _make_mask(
+    picture: Image, word: MadeMask, ground: NDArray[np.uint8] | None
+) -> tuple[NDArray[np.uint8], NDArray[np.float32] | None]:
+    """Return a mask, and for "learned" the probabilities by which its quality is judged.
+
+    `ground` is the mask of the ground filter, if it is known.
+    """
+    if word == "learned":
+        probability = cable_probability(picture)
+        return check_mask(probability > LIKELY), probability
+    pixels = check_mask(ground_filter(picture)) if ground is None else ground
+    if word == "both":
+        pixels = check_mask((pixels > 0) | (cable_probability(picture) > _SURE))
+    return pixels, None
+
+
+def _attempt(picture: Image, word: MadeMask, method: Method, ground: NDArray[np.uint8] | None = None) -> _Attempt:
     started = time.perf_counter()
-    probability = None if mask_method == "ground" else cable_probability(picture)
-    if probability is not None and mask_method == "learned":
-        pixels = check_mask(probability > LIKELY)
-    else:
-        pixels = check_mask(ground_filter(picture)) if ground is None else ground
-        if probability is not None:
-            pixels = check_mask((pixels > 0) | (probability > _SURE))
+    pixels, probability = _make_mask(picture, word, ground)
     seconds = time.perf_counter() - started
     found = _core.trace_lines(pixels, picture, method)
     quality, lines = _quality(found), (found["centrelines"], found["widths"])
-    if probability is not None and mask_method == "learned":
-        quality = compare_with_network(quality, picture, probability, pixels, *lines)
-    else:
+    if probability is None:
         quality = compare_with_picture(quality, picture, pixels, *lines)
-    return _Attempt(mask_method, pixels, found, quality, seconds)
+    else:
+        quality = compare_with_network(quality, picture, probability, pixels, *lines)
+    return _Attempt(word, pixels, found, quality, seconds)
 
 
 def _typical_width(found: dict[str, Any]) -> float:
@@ -159,7 +163,7 @@ def _best_attempt(picture: Image, method: Method) -> _Attempt:
 
 def trace(
     image: ArrayLike | str | os.PathLike[str],
-    mask: ArrayLike | MaskFunction | Literal["ground", "both", "learned"] | None = None,
+    mask: ArrayLike | MaskFunction | MadeMask | None = None,
     method: Method = "withe",
 ) -> Tracing:
     """Find every cable in a picture, and which one lies on top where they cross.
@@ -197,8 +201,7 @@ def trace(
         The network of "both" and "learned" is missing.
     ImportError
         A file, "both" or "learned" was given and OpenCV is not installed: ``pip install ".[vision]"`` in a clone of
-        withe.
-        Without OpenCV the default mask is "ground".
+        withe. Without OpenCV the default mask is "ground".
 
     Examples
     --------
